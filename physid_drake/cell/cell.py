@@ -1,0 +1,137 @@
+"""The Cell: a Drake diagram built once, and rollouts of it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import Diagram, DiagramBuilder
+
+from physid_drake.cell.config import CellConfig
+from physid_drake.cell.diagram import Scene, add_scene
+from physid_drake.cell.hand_path import HandPath
+from physid_drake.cell.motion import Motion, Start
+from physid_drake.cell.setters import (
+    Body,
+    HandContactSetter,
+    InertiaSetter,
+    ParameterSetter,
+    SupportSetter,
+    check_body,
+)
+from physid_drake.cell.solid import Solid, solid_of
+from physid_drake.cell.stepper import Stepper
+from physid_drake.cell.support import rest_depths
+from physid_drake.recording import Shape
+
+Array = NDArray[np.float64]
+
+
+class Cell:
+    """Table, object and hand in Drake. Built once per process; theta goes into the Context.
+
+    Attributes:
+        diagram: the Drake diagram: ``plant``, ``scene_graph`` and the parameter setters.
+        solid: the object's shape.
+    """
+
+    def __init__(
+        self,
+        shape: Shape,
+        *,
+        hand_radius: float | None,
+        config: CellConfig | None = None,
+        edge: Array | None = None,
+    ) -> None:
+        """Build the diagram.
+
+        Args:
+            shape: the object's.
+            hand_radius: of the hand's tip [m]; None without a hand.
+            config: contact, solver, friction cells.
+            edge: (2, 2) lower and upper corner of the table top [m], for a table to fall from.
+
+        Raises:
+            CellError: if the shape cannot be built.
+        """
+        self.config = config or CellConfig()
+        self.solid: Solid = solid_of(shape)
+        self.mean_depth = self.config.contact.rest_depth_m
+        builder = DiagramBuilder()
+        self.scene: Scene = add_scene(builder, self.config, self.solid, hand_radius, edge=edge)
+        cells = self.config.friction_cells[0] * self.config.friction_cells[1]
+        self._cells = cells
+        self.setters: tuple[ParameterSetter, ...] = tuple(
+            builder.AddSystem(setter)
+            for setter in (
+                InertiaSetter(self.scene),
+                SupportSetter(self.scene, self.config, cells, self.mean_depth),
+                HandContactSetter(self.scene, self.config),
+            )
+        )
+        self.diagram: Diagram = builder.Build()
+        self.simulator = Simulator(self.diagram)
+        solver = self.config.solver
+        if solver.scheme == "cenic":
+            ApplySimulatorConfig(
+                SimulatorConfig(
+                    integration_scheme="cenic",
+                    max_step_size=solver.slide_time_step_s,
+                    use_error_control=False,
+                ),
+                self.simulator,
+            )
+        hydroelastic = self.config.contact.model == "hydroelastic" and solver.scheme == "cenic"
+        self._stepper = Stepper(
+            self.scene, self.simulator, solver, hand_radius,
+            tilt_depth=self.mean_depth if hydroelastic and edge is None else None,
+        )  # fmt: skip
+        self._applied: tuple[float, ...] | None = None
+
+    def set_body(self, body: Body) -> None:
+        """Write the parameters into the Context.
+
+        Raises:
+            ParameterError: if one is not physical.
+        """
+        check_body(body, self._cells)
+        root = self.simulator.get_mutable_context()
+        for setter in self.setters:
+            setter.apply(root, body)
+
+    def rollout(
+        self,
+        body: Body,
+        *,
+        start: Start,
+        path: HandPath | None,
+        begin: float,
+        end: float,
+        hand_height: float | None = None,
+    ) -> Motion:
+        """Simulate one push.
+
+        Args:
+            body: the physical parameters.
+            start: the object's state at ``begin``.
+            path: the hand's path; None without a hand.
+            begin: start time [s].
+            end: end time [s].
+            hand_height: of the tip's contact above the table [m]; half the object's height if None.
+        """
+        self.set_body(body)
+        return self._stepper.run(
+            body=body, start=start, rest=self.rest_pose(body), path=path,
+            height=0.5 * self.solid.height if hand_height is None else hand_height, begin=begin, end=end,
+        )  # fmt: skip
+
+    def rest_pose(self, body: Body) -> Array:
+        """Settled pose (7,) of B, quaternion wxyz and position, at the origin with yaw 0."""
+        depth = self.mean_depth
+        if self.solid.rolling_radius is not None:
+            return np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5 * self.solid.height - depth])
+        plane, _ = rest_depths(self.scene.support, body.p_BBcm, depth)
+        pitch, roll = float(plane[1]), -float(plane[2])
+        quaternion = np.array([1.0, 0.5 * roll, 0.5 * pitch, 0.0])
+        z = 0.5 * self.solid.height - float(plane[0])
+        return np.array([*(quaternion / np.linalg.norm(quaternion)), 0.0, 0.0, z])

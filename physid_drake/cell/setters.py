@@ -1,0 +1,215 @@
+"""Parameter setters: small systems that hold theta in the diagram's Context and write it into the plant's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import (
+    AddCompliantHydroelasticPropertiesForHalfSpace,
+    AddRigidHydroelasticProperties,
+    GeometryId,
+    ProximityProperties,
+    RoleAssign,
+)
+from pydrake.multibody.tree import SpatialInertia, UnitInertia
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from physid_drake.cell.config import CellConfig
+from physid_drake.cell.diagram import (
+    GRAVITY,
+    SLAB_THICKNESS,
+    TABLE_FRICTION,
+    Scene,
+    contact_properties,
+    facet_areas,
+    paired_friction,
+)
+from physid_drake.errors import ParameterError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """The physical parameters of a cell, as the rollout uses them.
+
+    Attributes:
+        mass: kg.
+        p_BBcm: (2,) centre of mass in B, at half height [m].
+        inertia_ratio: inertia over that of uniform density [-].
+        hand_friction: between hand and object [-].
+        support_friction: (cells,) kinetic, between object and table [-].
+        static_ratio: static over kinetic support friction [-], >= 1; discrete solvers know only kinetic.
+        restitution: Poisson's, between hand and object [-].
+    """
+
+    mass: float
+    p_BBcm: Array
+    inertia_ratio: float
+    hand_friction: float
+    support_friction: Array
+    static_ratio: float = 1.0
+    restitution: float = 0.0
+
+
+class ParameterSetter(LeafSystem):
+    """A system whose numeric parameter is a part of theta; ``apply`` writes it into the plant's Context.
+
+    .. pydrake_system::
+        name: <parameter>_setter
+        output_ports:
+        - value
+    """
+
+    def __init__(self, name: str, scene: Scene, size: int) -> None:
+        LeafSystem.__init__(self)
+        self.set_name(f"{name}_setter")
+        self.scene = scene
+        self._index = self.DeclareNumericParameter(BasicVector(np.zeros(size)))
+        self.DeclareVectorOutputPort("value", size, self._copy)
+
+    def _copy(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self.value(context))
+
+    def value(self, context: Context) -> Array:
+        """The parameter held in this system's Context."""
+        value: Array = context.get_numeric_parameter(self._index).CopyToVector()
+        return value
+
+    def apply(self, root: Context, body: Body) -> None:
+        """Store this setter's part of ``body`` in its Context and write it into the plant's.
+
+        Args:
+            root: the diagram's Context.
+            body: the parameters.
+        """
+        value = self.part_of(body)
+        self.GetMyMutableContextFromRoot(root).get_mutable_numeric_parameter(self._index).SetFromVector(value)
+        self.write(root, value)
+
+    def part_of(self, body: Body) -> Array:
+        """This setter's numbers (size,)."""
+        raise NotImplementedError
+
+    def write(self, root: Context, value: Array) -> None:
+        """Write the numbers into the plant's or the scene graph's Context."""
+        raise NotImplementedError
+
+    def replace(self, root: Context, geometry: GeometryId, properties: ProximityProperties) -> None:
+        """Replace a geometry's proximity properties in this Context only."""
+        scene_graph = self.scene.scene_graph
+        scene_graph.AssignRole(
+            scene_graph.GetMyMutableContextFromRoot(root),
+            self.scene.plant.get_source_id(),
+            geometry,
+            properties,
+            RoleAssign.kReplace,
+        )
+
+
+class InertiaSetter(ParameterSetter):
+    """Mass [kg], centre of mass x, y [m], inertia ratio [-]."""
+
+    def __init__(self, scene: Scene) -> None:
+        super().__init__("inertia", scene, 4)
+
+    def part_of(self, body: Body) -> Array:
+        """Mass, centre of mass, inertia ratio."""
+        return np.array([body.mass, *body.p_BBcm, body.inertia_ratio])
+
+    def write(self, root: Context, value: Array) -> None:
+        """Write the object's spatial inertia M_BBo_B."""
+        mass, ratio = value[0], value[3]
+        p_BBcm = np.array([value[1], value[2], 0.0])
+        central = UnitInertia(*(ratio * np.array(self.scene.solid.gyration)))
+        spatial = SpatialInertia(mass, p_BBcm, central.ShiftFromCenterOfMass(p_BBcm))
+        self.scene.object.SetSpatialInertiaInBodyFrame(self.scene.plant.GetMyMutableContextFromRoot(root), spatial)
+
+
+class SupportSetter(ParameterSetter):
+    """Static ratio, mass (the stiffness follows the weight), and kinetic friction per cell [-]."""
+
+    def __init__(self, scene: Scene, config: CellConfig, cells: int, mean_depth: float) -> None:
+        super().__init__("support_friction", scene, 2 + cells)
+        self._dissipation = config.contact.dissipation_s_per_m
+        self._mean_depth = mean_depth
+        self._hydroelastic = scene.solid.rolling_radius is None and any(len(points) > 1 for _, points in scene.feet)
+
+    def part_of(self, body: Body) -> Array:
+        """Static ratio, mass, frictions."""
+        return np.array([body.static_ratio, body.mass, *body.support_friction])
+
+    def write(self, root: Context, value: Array) -> None:
+        """Write friction per foot, and the stiffness that gives the chosen rest depth."""
+        ratio, mass, friction = value[0], value[1], value[2:]
+        stiffness = mass * GRAVITY / self._mean_depth
+        if self._hydroelastic:
+            self._write_modulus(root, stiffness)
+        for (geometry, points), cell in zip(self.scene.feet, self.scene.foot_cells, strict=True):
+            mu = paired_friction(float(friction[cell]))
+            mu_static = paired_friction(float(friction[cell] * ratio))
+            if self._hydroelastic:
+                properties = contact_properties(friction=mu, static_friction=mu_static)
+                AddRigidHydroelasticProperties(properties)
+            else:
+                share = float(self.scene.support.weights[points[0]])
+                properties = contact_properties(
+                    friction=mu,
+                    static_friction=mu_static,
+                    stiffness=stiffness * share,
+                    dissipation=self._dissipation,
+                )
+            self.replace(root, geometry, properties)
+
+    def _write_modulus(self, root: Context, stiffness: float) -> None:
+        """The table's modulus [Pa]: stiffness = modulus / thickness * area of the facets."""
+        area = float(facet_areas(self.scene.support, self.scene.solid.underside).sum())
+        properties = contact_properties(friction=TABLE_FRICTION, dissipation=self._dissipation)
+        AddCompliantHydroelasticPropertiesForHalfSpace(SLAB_THICKNESS, stiffness * SLAB_THICKNESS / area, properties)
+        self.replace(root, self.scene.table_geometry, properties)
+
+
+class HandContactSetter(ParameterSetter):
+    """Hand friction [-] and mass [kg]: the contact's stiffness keeps its natural frequency."""
+
+    def __init__(self, scene: Scene, config: CellConfig) -> None:
+        super().__init__("hand_friction", scene, 2)
+        self._frequency = config.contact.hand_frequency_rad_s
+
+    def part_of(self, body: Body) -> Array:
+        """Friction and mass."""
+        return np.array([body.hand_friction, body.mass])
+
+    def write(self, root: Context, value: Array) -> None:
+        """Write the tip's friction and the faces' stiffness."""
+        if self.scene.hand_geometry is None:
+            return
+        stiffness = float(value[1]) * self._frequency**2
+        tip = contact_properties(friction=paired_friction(float(value[0])), stiffness=1e6 * stiffness)
+        self.replace(root, self.scene.hand_geometry, tip)
+        for face in self.scene.face_geometries:
+            self.replace(root, face, contact_properties(friction=TABLE_FRICTION, stiffness=stiffness))
+
+
+def check_body(body: Body, cells: int) -> None:
+    """Refuse parameters that no object has.
+
+    Raises:
+        ParameterError: naming the parameter, the rule and the value.
+    """
+    slippery = float(np.min(body.support_friction))
+    rules = [
+        ("mass", body.mass, body.mass > 0.0, "above 0 kg"),
+        ("inertia_ratio", body.inertia_ratio, body.inertia_ratio > 0.0, "above 0"),
+        ("hand_friction", body.hand_friction, body.hand_friction >= 0.0, "at least 0"),
+        ("support_friction", slippery, slippery >= 0.0, "at least 0"),
+        ("static_ratio", body.static_ratio, body.static_ratio >= 1.0, "at least 1"),
+        ("restitution", body.restitution, 0.0 <= body.restitution <= 1.0, "in [0, 1]"),
+    ]  # fmt: skip
+    for name, value, fine, rule in rules:
+        if not (np.isfinite(value) and fine):
+            raise ParameterError(f"{name} must be {rule}, but is {value:g}.")
+    if len(body.support_friction) != cells:
+        raise ParameterError(f"support_friction needs {cells} cells, but has {len(body.support_friction)}.")

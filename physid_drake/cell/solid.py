@@ -1,0 +1,199 @@
+"""What the cell needs to know of an object's shape: outline, underside, height, inertia, Drake geometry."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import Box as DrakeBox
+from pydrake.geometry import Convex, Mesh, Shape
+from pydrake.geometry import Cylinder as DrakeCylinder
+from pydrake.math import RigidTransform, RollPitchYaw
+from scipy.spatial import ConvexHull, QhullError
+
+from physid_drake.cell.outline import Disc, Outline, Polygon, rectangle
+from physid_drake.errors import CellError
+from physid_drake.recording import Box, Cylinder, MeshShape, Prism
+from physid_drake.recording import Shape as RecordedShape
+
+Array = NDArray[np.float64]
+FACE_THICKNESS = 2e-3  # m: how far the flat colliding faces of a prism reach inward
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solid:
+    """An object of uniform density, seen by the cell.
+
+    Attributes:
+        outline: what the hand touches, from above, in B.
+        underside: what stands on the table, in B; the axis' rectangle for a lying cylinder.
+        height: m; the underside is at z = -height / 2 in B.
+        gyration: (3,) squared radii of gyration about Bo's axes x, y, z [m^2].
+        rolling_radius: m for a lying cylinder (axis along y of B), else None.
+        faces: Drake shapes and poses ``X_BG`` that collide with the hand.
+        visual: Drake shapes and poses that are only seen.
+    """
+
+    outline: Outline
+    underside: Outline
+    height: float
+    gyration: tuple[float, float, float]
+    rolling_radius: float | None
+    faces: tuple[tuple[Shape, RigidTransform], ...]
+    visual: tuple[tuple[Shape, RigidTransform], ...]
+
+
+def solid_of(shape: RecordedShape) -> Solid:
+    """The solid for a recorded shape.
+
+    Raises:
+        CellError: if a mesh cannot be read or has no volume.
+    """
+    match shape:
+        case Box():
+            return _box(shape)
+        case Cylinder(axis="z"):
+            return _standing_cylinder(shape)
+        case Cylinder():
+            return _lying_cylinder(shape)
+        case Prism():
+            return _prism(shape)
+        case MeshShape():
+            return _mesh(shape)
+    raise CellError(f"no solid for a shape of type {type(shape).__name__}")
+
+
+def _box(shape: Box) -> Solid:
+    x, y, z = shape.size
+    body = ((DrakeBox(x, y, z), RigidTransform()),)
+    outline = rectangle(x, y)
+    squares = ((y * y + z * z) / 12.0, (x * x + z * z) / 12.0, (x * x + y * y) / 12.0)
+    return Solid(outline=outline, underside=outline, height=z, gyration=squares, rolling_radius=None,
+                 faces=body, visual=body)  # fmt: skip
+
+
+def _standing_cylinder(shape: Cylinder) -> Solid:
+    r, length = shape.radius, shape.length
+    body = ((DrakeCylinder(r, length), RigidTransform()),)
+    outline = Disc(radius=r)
+    across = (3.0 * r * r + length * length) / 12.0
+    return Solid(outline=outline, underside=outline, height=length, gyration=(across, across, 0.5 * r * r),
+                 rolling_radius=None, faces=body, visual=body)  # fmt: skip
+
+
+def _lying_cylinder(shape: Cylinder) -> Solid:
+    r, length = shape.radius, shape.length
+    body = ((DrakeCylinder(r, length), RigidTransform(RollPitchYaw(0.5 * math.pi, 0.0, 0.0), np.zeros(3))),)
+    outline = rectangle(2.0 * r, length)
+    across = (3.0 * r * r + length * length) / 12.0
+    return Solid(outline=outline, underside=outline, height=2.0 * r, gyration=(across, 0.5 * r * r, across),
+                 rolling_radius=r, faces=body, visual=body)  # fmt: skip
+
+
+def _prism(shape: Prism) -> Solid:
+    polygon = Polygon(shape.polygon)
+    ixx, iyy = polygon_gyration(np.array(shape.polygon))
+    z2 = shape.height**2 / 12.0
+    hull = ((_convex_prism(polygon, shape.height), RigidTransform()),)
+    return Solid(outline=polygon, underside=polygon, height=shape.height, gyration=(ixx + z2, iyy + z2, ixx + iyy),
+                 rolling_radius=None, faces=_polygon_faces(polygon, shape.height), visual=hull)  # fmt: skip
+
+
+def polygon_gyration(vertices: Array) -> tuple[float, float]:
+    """Mean of y^2 and of x^2 over a polygon's area about the origin [m^2]; vertices (n, 2) counter-clockwise.
+
+    Source: Green's theorem on the polygon, as in any table of section moduli.
+    """
+    a, b = vertices, np.roll(vertices, -1, axis=0)
+    cross = a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]
+    area = 0.5 * cross.sum()
+    mean_y2 = float((cross * (a[:, 1] ** 2 + a[:, 1] * b[:, 1] + b[:, 1] ** 2)).sum() / (12.0 * area))
+    mean_x2 = float((cross * (a[:, 0] ** 2 + a[:, 0] * b[:, 0] + b[:, 0] ** 2)).sum() / (12.0 * area))
+    return mean_y2, mean_x2
+
+
+def _polygon_faces(polygon: Polygon, height: float) -> tuple[tuple[Shape, RigidTransform], ...]:
+    """Thin boxes along the edges: Drake's sphere against a box is exact, against a Convex it is iterative."""
+    faces = []
+    count = len(polygon.vertices)
+    for i in range(count):
+        (ax, ay), (bx, by) = polygon.vertices[i], polygon.vertices[(i + 1) % count]
+        length = math.hypot(bx - ax, by - ay)
+        tx, ty = (bx - ax) / length, (by - ay) / length
+        thickness = min(FACE_THICKNESS, 0.2 * _inradius(polygon))
+        # At an acute corner the box would stick out through the next face, so it ends earlier there.
+        start = thickness * _overhang(polygon, i)
+        end = thickness * _overhang(polygon, (i + 1) % count)
+        middle = 0.5 * (start + length - end)
+        centre = np.array([ax + tx * middle - ty * 0.5 * thickness, ay + ty * middle + tx * 0.5 * thickness, 0.0])
+        box = DrakeBox(length - start - end, thickness, height)
+        faces.append((box, RigidTransform(RollPitchYaw(0.0, 0.0, math.atan2(ty, tx)), centre)))
+    return tuple(faces)
+
+
+def _overhang(polygon: Polygon, corner: int) -> float:
+    """By how much of its thickness a face must end before this corner: the cotangent of an acute angle."""
+    vertices = np.array(polygon.vertices)
+    to_previous = vertices[corner - 1] - vertices[corner]
+    to_next = vertices[(corner + 1) % len(vertices)] - vertices[corner]
+    cosine = float(to_previous @ to_next)
+    sine = abs(float(to_previous[0] * to_next[1] - to_previous[1] * to_next[0]))
+    return max(0.0, cosine / sine)
+
+
+def _inradius(polygon: Polygon) -> float:
+    return -polygon.nearest(0.0, 0.0)[0]
+
+
+def _convex_prism(polygon: Polygon, height: float) -> Convex:
+    points = [(x, y, z) for z in (-0.5 * height, 0.5 * height) for x, y in polygon.vertices]
+    return Convex(np.array(points).T, label="prism")
+
+
+def _mesh(shape: MeshShape) -> Solid:
+    vertices = shape.scale * mesh_vertices(shape.file)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    middle = 0.5 * (low + high)
+    centred = vertices - middle
+    height = float(high[2] - low[2])
+    hull = _hull(centred[:, :2], shape.file)
+    standing = centred[centred[:, 2] < -0.5 * height + max(1e-4, 0.01 * height)]
+    underside = _hull(standing[:, :2], shape.file)
+    ixx, iyy = polygon_gyration(np.array(hull.vertices))
+    z2 = height**2 / 12.0
+    visual = ((Mesh(str(shape.file), shape.scale), RigidTransform(-middle)),)
+    return Solid(outline=hull, underside=underside, height=height, gyration=(ixx + z2, iyy + z2, ixx + iyy),
+                 rolling_radius=None, faces=_polygon_faces(hull, height), visual=visual)  # fmt: skip
+
+
+def mesh_vertices(file: Path) -> Array:
+    """Vertices (n, 3) of a Wavefront OBJ file, in the file's unit.
+
+    Raises:
+        CellError: if the file is missing, not an OBJ, or holds fewer than four vertices.
+    """
+    if file.suffix.lower() != ".obj":
+        raise CellError(f"mesh '{file}': only Wavefront .obj files are read; convert it to .obj.")
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+        rows = [[float(word) for word in line.split()[1:4]] for line in lines if line.startswith("v ")]
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise CellError(f"mesh '{file}' does not load: {error}.") from error
+    if len(rows) < 4 or any(len(row) != 3 for row in rows):
+        raise CellError(
+            f"mesh '{file}' does not load: it holds {len(rows)} vertices 'v x y z'; a solid has at least 4."
+        )
+    return np.array(rows)
+
+
+def _hull(points: Array, file: Path) -> Polygon:
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError) as error:
+        raise CellError(
+            f"mesh '{file}' has no area where it stands or is touched: its vertices lie on a line."
+        ) from error
+    return Polygon([(float(x), float(y)) for x, y in points[hull.vertices]])

@@ -1,0 +1,25 @@
+"""The errors that a caller of physid_drake may catch: one per room, each also the builtin it resembles."""
+
+
+class PhysidError(Exception):
+    """Base of every error that physid_drake raises on purpose; its message is one line for a person."""
+
+
+class RecordingError(PhysidError, ValueError):
+    """A recording breaks a rule of ``physid-recording/1``; the message names file, row and column."""
+
+
+class ParameterError(PhysidError, ValueError):
+    """A parameter or a point ``theta`` is outside its bounds, unknown, or of the wrong shape."""
+
+
+class ConfigError(PhysidError, ValueError):
+    """A configuration cannot be read; the message names the file and the key."""
+
+
+class CellError(PhysidError, ValueError):
+    """A cell cannot be built as asked: a mesh that does not load, a shape Drake cannot represent."""
+
+
+class OutputError(PhysidError, OSError):
+    """A folder or file of results cannot be written."""
