@@ -1,0 +1,142 @@
+"""The command line: ``physid_drake inspect``, ``physid_drake convert``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+from rich.console import Console
+
+from physid_drake.errors import OutputError, PhysidError
+from physid_drake.recording import read_recording
+
+if TYPE_CHECKING:
+    Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
+
+NARROWEST_TABLE = 100
+"""Columns that a table is given where the output is no terminal."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one command.
+
+    Args:
+        argv: its words, without the program's name; None takes them from the command line.
+
+    Returns:
+        The exit status: 0 done, 1 an error of the input or output, 130 interrupted.
+    """
+    arguments = build_parser().parse_args(argv)
+    try:
+        with _warnings_on_stderr():
+            status = int(arguments.run(arguments))
+        sys.stdout.flush()
+    except PhysidError as error:
+        print("error: " + " ".join(str(error).split()), file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        # The reader of the output is gone (`| head`); Python would complain again when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+    return status
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The parser with every command of ``COMMANDS``."""
+    parser = argparse.ArgumentParser(
+        prog="physid_drake",
+        description="Identify an object's mass and friction from recorded pushes, and find the physics "
+        "that a simulation leaves out.",
+    )
+    subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for register in COMMANDS:
+        register(subparsers)
+    return parser
+
+
+def _register_inspect(subparsers: Subparsers) -> None:
+    parser = subparsers.add_parser("inspect", help="check a recording and show what is in it")
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the recording")
+    parser.add_argument("--out", type=Path, metavar="FILE.png", help="also draw all pushes from above into this file")
+    parser.set_defaults(run=_run_inspect)
+
+
+def _run_inspect(arguments: argparse.Namespace) -> int:
+    # Matplotlib takes half a second to import, which the other commands need not wait for.
+    from physid_drake.report.inspection import draw_pushes, inspection_table, warning_lines  # noqa: PLC0415
+
+    recording = read_recording(arguments.folder)
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=max(NARROWEST_TABLE, console.width))
+    console.print(inspection_table(recording))
+    for line in warning_lines(recording):
+        warnings.warn(line, UserWarning, stacklevel=1)
+    if arguments.out is not None:
+        out: Path = arguments.out
+        try:
+            draw_pushes(recording).savefig(out, dpi=150)
+        except (OSError, ValueError) as error:
+            raise OutputError(f"{out}: cannot be written: {error}.") from error
+        print(f"drawn: {out}")
+    return 0
+
+
+def _register_convert(subparsers: Subparsers) -> None:
+    parser = subparsers.add_parser("convert", help="turn a published data set into a recording")
+    parser.add_argument("layout", choices=["cmu", "mit"], help="whose layout SOURCE is in")
+    parser.add_argument("source", type=Path, metavar="SOURCE", help="a published file, or a folder of them")
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="where the recording goes; new or empty")
+    parser.add_argument("--limit", type=int, metavar="N", help="draw N pushes at random")
+    parser.add_argument("--seed", type=int, metavar="N", default=0, help="seed of that draw (default 0)")
+    parser.set_defaults(run=_run_convert)
+
+
+def _run_convert(arguments: argparse.Namespace) -> int:
+    from physid_drake.recording.adapters import convert_cmu, convert_mit  # noqa: PLC0415
+
+    convert = {"cmu": convert_cmu, "mit": convert_mit}[arguments.layout]
+    recording = convert(arguments.source, arguments.folder, limit=arguments.limit, seed=arguments.seed)
+    print(f"{recording.name}: {len(recording.pushes)} pushes written to {arguments.folder}")
+    return 0
+
+
+COMMANDS: list[Callable[[Subparsers], None]] = [_register_inspect, _register_convert]
+"""One function for each command; it adds its parser, which sets ``run``: arguments -> exit status."""
+
+
+@contextmanager
+def _warnings_on_stderr() -> Iterator[None]:
+    """Shows a warning meant for a person as one line, without the line of code that raised it."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("always", category=UserWarning, module=r"physid_drake\.")
+        earlier = warnings.showwarning
+
+        def show(
+            message: Warning | str,
+            category: type[Warning],
+            filename: str,
+            lineno: int,
+            file: TextIO | None = None,
+            line: str | None = None,
+        ) -> None:
+            if category is UserWarning and "physid_drake" in filename:
+                print("warning: " + " ".join(str(message).split()), file=sys.stderr)
+            else:
+                earlier(message, category, filename, lineno, file, line)
+
+        warnings.showwarning = show
+        yield
+
+
+if __name__ == "__main__":
+    sys.exit(main())

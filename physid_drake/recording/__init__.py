@@ -1,0 +1,52 @@
+"""Recordings: what was measured, how it is read and written, and what it says about its own noise."""
+
+from physid_drake.recording.outlines import outline_distance, polygon_centroid
+from physid_drake.recording.reading import read_recording
+from physid_drake.recording.statistics import (
+    NoiseEstimate,
+    PushSummary,
+    estimate_noise,
+    rest_segments,
+    summarise,
+)
+from physid_drake.recording.values import (
+    Box,
+    Cylinder,
+    ForceStream,
+    Hand,
+    MeshShape,
+    ObjectModel,
+    PoseStream,
+    Prism,
+    Push,
+    Recording,
+    Sensors,
+    Shape,
+    Table,
+)
+from physid_drake.recording.writing import write_recording
+
+__all__ = [
+    "Box",
+    "Cylinder",
+    "ForceStream",
+    "Hand",
+    "MeshShape",
+    "NoiseEstimate",
+    "ObjectModel",
+    "PoseStream",
+    "Prism",
+    "Push",
+    "PushSummary",
+    "Recording",
+    "Sensors",
+    "Shape",
+    "Table",
+    "estimate_noise",
+    "outline_distance",
+    "polygon_centroid",
+    "read_recording",
+    "rest_segments",
+    "summarise",
+    "write_recording",
+]

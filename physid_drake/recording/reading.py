@@ -1,0 +1,275 @@
+"""Reads a folder in the format ``physid-recording/1``; refuses what breaks a rule, by file and row."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from physid_drake.errors import RecordingError
+from physid_drake.recording import description
+from physid_drake.recording.screening import gap_warnings, screen_poses
+from physid_drake.recording.values import (
+    QUATERNION_TOLERANCE,
+    Array,
+    ForceStream,
+    PoseStream,
+    Push,
+    Recording,
+)
+
+TIME: Final = "time_s"
+HAND_POSITION: Final = ("hand_x_m", "hand_y_m", "hand_z_m")
+HAND_QUATERNION: Final = ("hand_qw", "hand_qx", "hand_qy", "hand_qz")
+OBJECT_POSITION: Final = ("object_x_m", "object_y_m", "object_z_m")
+OBJECT_QUATERNION: Final = ("object_qw", "object_qx", "object_qy", "object_qz")
+FORCE: Final = ("force_x_n", "force_y_n", "force_z_n")
+COLUMNS: Final = (TIME, *HAND_POSITION, *HAND_QUATERNION, *OBJECT_POSITION, *OBJECT_QUATERNION, *FORCE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _PushTable:
+    """One table: ``values`` (n, columns), NaN where a field is empty, and each row's line in the file."""
+
+    file: Path
+    columns: tuple[str, ...]
+    values: Array
+    lines: tuple[int, ...]
+
+    def has(self, columns: Sequence[str]) -> bool:
+        return all(column in self.columns for column in columns)
+
+    def group(self, columns: Sequence[str]) -> Array:
+        return self.values[:, [self.columns.index(column) for column in columns]]
+
+    def filled(self, columns: Sequence[str]) -> npt.NDArray[np.intp]:
+        """Indices of the rows where every column of a group is filled; refuses a group filled in part."""
+        present = ~np.isnan(self.group(columns))
+        partial = np.flatnonzero(present.any(axis=1) & ~present.all(axis=1))
+        if len(partial):
+            k = int(partial[0])
+            column = columns[int(np.argmin(present[k]))]
+            raise RecordingError(
+                f"{self.file}: row {self.lines[k]}: column {column}: is empty, but "
+                f"{columns[0]}..{columns[-1]} are one sample; fill all of them or none."
+            )
+        return np.flatnonzero(present.all(axis=1))
+
+
+def read_recording(folder: Path) -> Recording:
+    """Reads a recording.
+
+    Args:
+        folder: the folder with ``recording.yaml`` and its tables.
+
+    Returns:
+        The recording; each push carries the warnings about its streams.
+
+    Raises:
+        RecordingError: if a rule of ``physid-recording/1`` is broken; one line naming file, row and column.
+    """
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise RecordingError(f"{folder}: is not a folder; give the folder that holds {description.DESCRIPTION_FILE}.")
+    top = description.load_description(folder)
+    name = top.text("name")
+    hand = description.hand_from(top)
+    shape = description.object_from(top, folder)
+    table, sensors = description.table_from(top), description.sensors_from(top)
+    pushes = [
+        _read_push(file, push_name, note, with_hand=hand is not None)
+        for push_name, file, note in description.push_entries(top, folder)
+    ]
+    with top.naming():
+        return Recording(
+            name=name,
+            description=top.text("description", ""),
+            object=shape,
+            table=table,
+            hand=hand,
+            sensors=sensors,
+            pushes=tuple(pushes),
+            folder=folder,
+        )
+
+
+def _read_push(file: Path, name: str, note: str, *, with_hand: bool) -> Push:
+    table = _read_table(file, with_hand)
+    warnings: list[str] = []
+    object_stream = _pose_stream(table, "object", OBJECT_POSITION, OBJECT_QUATERNION, warnings)
+    if object_stream is None or len(object_stream) < 2:
+        got = 0 if object_stream is None else len(object_stream)
+        raise RecordingError(
+            f"{file}: column {OBJECT_POSITION[0]}: at least two object poses are needed, but got {got}; "
+            "record the pose before and after the push."
+        )
+    hand = _pose_stream(table, "hand", HAND_POSITION, HAND_QUATERNION, warnings) if with_hand else None
+    if with_hand and hand is None:
+        raise RecordingError(
+            f"{file}: column {HAND_POSITION[0]}: recording.yaml describes a hand, but no row has its "
+            "position; fill it, or remove the hand."
+        )
+    force = _force_stream(table, warnings) if table.has(FORCE) else None
+    return Push(name=name, object=object_stream, hand=hand, force=force, note=note, warnings=tuple(warnings))
+
+
+def _read_table(file: Path, with_hand: bool) -> _PushTable:
+    reader = csv.reader(io.StringIO(description.read_text(file), newline=""), strict=True)
+    header: tuple[str, ...] = ()
+    rows: list[list[float]] = []
+    lines: list[int] = []
+    try:
+        for fields in reader:
+            if not fields or fields == [""]:
+                continue
+            if not header:
+                header = _read_header(file, fields, reader.line_num)
+                _check_columns(file, header, with_hand)
+            else:
+                rows.append(_read_row(file, header, fields, reader.line_num))
+                lines.append(reader.line_num)
+    except csv.Error as error:
+        raise RecordingError(f"{file}: row {reader.line_num}: not a readable table: {error}; correct it.") from error
+    if not rows:
+        raise RecordingError(f"{file}: row 1: there are no samples under a header; a push needs at least two rows.")
+    table = _PushTable(file=file, columns=header, values=np.array(rows, dtype=np.float64), lines=tuple(lines))
+    _check_times(table)
+    return table
+
+
+def _read_header(file: Path, fields: list[str], line: int) -> tuple[str, ...]:
+    header = tuple(field.strip() for field in fields)
+    for k, column in enumerate(header):
+        if column not in COLUMNS:
+            hint = "separate columns by commas" if len(header) == 1 else "the format lists the columns it knows"
+            raise RecordingError(f"{file}: row {line}: column {column!r}: is unknown; {hint}.")
+        if column in header[:k]:
+            raise RecordingError(f"{file}: row {line}: column {column}: stands twice; remove one.")
+    if TIME not in header:
+        raise RecordingError(f"{file}: row {line}: column {TIME}: is missing; add it.")
+    return header
+
+
+def _read_row(file: Path, header: tuple[str, ...], fields: list[str], line: int) -> list[float]:
+    if len(fields) != len(header):
+        raise RecordingError(
+            f"{file}: row {line}: has {len(fields)} fields, but the header has {len(header)} columns; "
+            "an empty field still needs its comma."
+        )
+    values = []
+    for column, raw in zip(header, fields, strict=True):
+        text = raw.strip()
+        if not text:
+            values.append(math.nan)
+            continue
+        try:
+            # Python alone reads 1_000 as a number.
+            value = float(text) if "_" not in text and text.isascii() else None
+        except ValueError:
+            value = None
+        if value is None or not math.isfinite(value):
+            raise RecordingError(
+                f"{file}: row {line}: column {column}: must be a finite number, but got {text[:40]!r}; "
+                "leave the field empty if there is no sample."
+            )
+        values.append(value)
+    return values
+
+
+def _check_times(table: _PushTable) -> None:
+    times = table.group([TIME])[:, 0]
+    missing = np.flatnonzero(np.isnan(times))
+    if len(missing):
+        line = table.lines[int(missing[0])]
+        raise RecordingError(f"{table.file}: row {line}: column {TIME}: is empty; every row needs its time.")
+    late = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(late):
+        k = int(late[0]) + 1
+        raise RecordingError(
+            f"{table.file}: row {table.lines[k]}: column {TIME}: times must increase, but "
+            f"{float(times[k])!r} s follows {float(times[k - 1])!r} s; sort the rows and merge repeated times."
+        )
+
+
+def _check_columns(file: Path, header: tuple[str, ...], with_hand: bool) -> None:
+    required = (*OBJECT_POSITION, *OBJECT_QUATERNION, *(HAND_POSITION if with_hand else ()))
+    optional = [FORCE, HAND_QUATERNION] if with_hand else []
+    for group in optional:
+        if any(column in header for column in group):
+            required = (*required, *group)
+    for column in required:
+        if column not in header:
+            why = "recording.yaml describes a hand; " if column.startswith("hand") else ""
+            raise RecordingError(f"{file}: row 1: column {column}: is missing; {why}add it.")
+    if not with_hand:
+        extra = next((c for c in header if c.startswith(("hand_", "force_"))), None)
+        if extra is not None:
+            raise RecordingError(
+                f"{file}: row 1: column {extra}: recording.yaml describes no hand; add it there, or "
+                "remove the column."
+            )
+
+
+def _pose_stream(
+    table: _PushTable, what: str, position: Sequence[str], quaternion: Sequence[str], warnings: list[str]
+) -> PoseStream | None:
+    turned = table.has(quaternion)
+    rows = table.filled([*position, *quaternion] if turned else position)
+    if len(rows) == 0:
+        return None
+    times, positions = table.group([TIME])[rows, 0], table.group(position)[rows]
+    identity = np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1))
+    quaternions = table.group(quaternion)[rows] if turned else identity
+    lines = [table.lines[k] for k in rows]
+    if turned:
+        _check_norms(table.file, positions, quaternions, lines, quaternion)
+    screened = screen_poses(times, positions, quaternions, lines, what)
+    warnings.extend(screened.warnings)
+    if not screened.keep.any():
+        return None
+    return PoseStream(
+        times=times[screened.keep],
+        positions=positions[screened.keep],
+        quaternions=unit_quaternions(quaternions[screened.keep]),
+    )
+
+
+def _check_norms(file: Path, positions: Array, quaternions: Array, lines: list[int], columns: Sequence[str]) -> None:
+    norms = np.linalg.norm(quaternions, axis=1)
+    lost = (quaternions == 0.0).all(axis=1) & (positions == 0.0).all(axis=1)
+    wrong = np.flatnonzero((np.abs(norms - 1.0) > QUATERNION_TOLERANCE) & ~lost)
+    if len(wrong):
+        k = int(wrong[0])
+        raise RecordingError(
+            f"{file}: row {lines[k]}: column {columns[0]}: the quaternion's norm must be 1 within "
+            f"{QUATERNION_TOLERANCE}, but got {norms[k]:.6g}; normalise it."
+        )
+
+
+def unit_quaternions(quaternions: Array) -> Array:
+    """Quaternions (n, 4) scaled to norm 1, each with the sign that is nearest to the one before.
+
+    One that is already of norm 1 to rounding is not touched, so reading what was written changes nothing.
+    """
+    norms = np.linalg.norm(quaternions, axis=1, keepdims=True)
+    units = np.where(np.abs(norms - 1.0) > 1e-14, quaternions / norms, quaternions)
+    flips = np.where((units[1:] * units[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
+    signs = np.concatenate([[1.0], np.cumprod(flips)])
+    continuous: Array = units * signs[:, None]
+    return continuous
+
+
+def _force_stream(table: _PushTable, warnings: list[str]) -> ForceStream | None:
+    rows = table.filled(FORCE)
+    if len(rows) == 0:
+        return None
+    times = table.group([TIME])[rows, 0]
+    warnings.extend(gap_warnings(times, [table.lines[k] for k in rows], "force"))
+    return ForceStream(times=times, forces=table.group(FORCE)[rows])

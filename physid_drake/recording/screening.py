@@ -1,0 +1,164 @@
+"""Finds where a tracked stream lost track, jumped, stalled or paused; leaves out only what cannot be a pose.
+
+Left out: rows that are all zeros (a tracker's way of saying "lost"), and a single sample that leaps away and
+comes straight back. Kept and reported: gaps, stalls that the tracker caught up from, lone leaps that stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+GAP_FACTOR: Final = 5.0
+"""A pause longer than this many median sample intervals is a gap."""
+
+STALL_SAMPLES: Final = 5
+"""More samples than this with exactly the same pose can be a stall."""
+
+LEAP_FACTOR: Final = 5.0
+"""A leap is this much longer than nine tenths of the stream's steps, and than the steps beside it."""
+
+SHORTEST_SCREENED: Final = 25
+"""Streams shorter than this have too few steps to tell a leap from motion."""
+
+_ARM: Final = 0.05
+_SMALLEST_LEAP: Final = 1e-5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Screened:
+    """Which samples (n,) to keep, and one line of warning for each thing found."""
+
+    keep: Flags
+    warnings: tuple[str, ...]
+
+
+def describe_rows(rows: Sequence[int]) -> str:
+    """``"row 7"`` or ``"rows 7-9, 12"``; at most eight ranges are spelt out."""
+    ranges: list[list[int]] = []
+    for row in rows:
+        if ranges and row == ranges[-1][1] + 1:
+            ranges[-1][1] = row
+        else:
+            ranges.append([row, row])
+    texts = [f"{first}" if first == last else f"{first}-{last}" for first, last in ranges[:8]]
+    more = f" and {len(ranges) - 8} more places" if len(ranges) > 8 else ""
+    return f"{'row' if len(rows) == 1 else 'rows'} {', '.join(texts)}{more}"
+
+
+def find_gaps(times: Array) -> npt.NDArray[np.intp]:
+    """Indices k of the samples whose successor comes after a gap, for times (n,) in s."""
+    if len(times) < 4:
+        return np.zeros(0, dtype=np.intp)
+    intervals = np.diff(times)
+    return np.flatnonzero(intervals > GAP_FACTOR * np.median(intervals))
+
+
+def screen_poses(times: Array, positions: Array, quaternions: Array, rows: Sequence[int], what: str) -> Screened:
+    """Screens one stream of poses.
+
+    Args:
+        times: (n,) in s, increasing.
+        positions: (n, 3) in m.
+        quaternions: (n, 4), w first; all zeros where the tracker lost the body.
+        rows: n row numbers for the messages.
+        what: "object" or "hand", for the messages.
+
+    Returns:
+        Which of the n samples to keep, and the warnings.
+    """
+    warnings: list[str] = []
+    lost = (positions == 0.0).all(axis=1) & (quaternions == 0.0).all(axis=1)
+    if lost.any():
+        lost_rows = [rows[k] for k in np.flatnonzero(lost).tolist()]
+        warnings.append(f"{what}: {describe_rows(lost_rows)}: track lost (all zeros), left out.")
+    tracked = np.flatnonzero(~lost)
+    times, positions, quaternions = times[tracked], positions[tracked], quaternions[tracked]
+    leaps, lone = _find_leaps(times, positions, quaternions)
+    for k in leaps:
+        distance = np.linalg.norm(positions[k] - positions[k - 1])
+        row = rows[tracked[k]]
+        warnings.append(f"{what}: row {row}: jumps {distance:.3g} m away and comes straight back, left out.")
+    keep = ~lost
+    keep[tracked[leaps]] = False
+    stalls = _find_stalls(positions, quaternions)
+    for first, last in stalls:
+        span = f"rows {rows[tracked[first]]}-{rows[tracked[last]]}"
+        warnings.append(f"{what}: {span}: stalls (same pose {last - first + 1} times, then catches up), kept.")
+    ends = {last for _, last in stalls}
+    for k in lone:
+        if k not in ends:
+            distance = np.linalg.norm(positions[k + 1] - positions[k])
+            warnings.append(f"{what}: row {rows[tracked[k + 1]]}: jumps {distance:.3g} m and stays there, kept.")
+    warnings.extend(gap_warnings(times, [rows[k] for k in tracked.tolist()], what))
+    return Screened(keep=keep, warnings=tuple(warnings))
+
+
+def gap_warnings(times: Array, rows: Sequence[int], what: str) -> list[str]:
+    """One line for each gap in times (n,) in s, whose samples stand at ``rows``."""
+    gaps: list[int] = find_gaps(times).tolist()
+    return [f"{what}: rows {rows[k]}-{rows[k + 1]}: gap of {times[k + 1] - times[k]:.3g} s, kept." for k in gaps]
+
+
+def _distances(positions: Array, quaternions: Array, first: slice, second: slice) -> Array:
+    """Distance between two rows of poses; a rotation counts as the travel of a point 50 mm away."""
+    travel = np.linalg.norm(positions[second] - positions[first], axis=1)
+    cosine = np.abs((quaternions[second] * quaternions[first]).sum(axis=1))
+    angle = 2.0 * np.arccos(np.clip(cosine, 0.0, 1.0))
+    # arccos loses half the digits near 1: an angle below 1e-6 is rounding.
+    distances: Array = travel + _ARM * np.where(angle > 1e-6, angle, 0.0)
+    return distances
+
+
+def _find_leaps(times: Array, positions: Array, quaternions: Array) -> tuple[list[int], list[int]]:
+    """Samples that leap away and back, and samples before a lone leap that stays."""
+    if len(times) < SHORTEST_SCREENED:
+        return [], []
+    steps = _distances(positions, quaternions, slice(None, -1), slice(1, None))
+    intervals = np.diff(times)
+    steps = steps / np.maximum(1.0, intervals / np.median(intervals))
+    across = _distances(positions, quaternions, slice(None, -2), slice(2, None))
+    floor = max(LEAP_FACTOR * float(np.quantile(steps, 0.9)), _SMALLEST_LEAP)
+    padded = np.concatenate([[0.0], steps, [0.0]])
+    leaps = [
+        k
+        for k in range(1, len(times) - 1)
+        if min(steps[k - 1], steps[k]) > max(floor, LEAP_FACTOR * max(padded[k - 1], padded[k + 2]))
+        and across[k - 1] < 0.3 * min(steps[k - 1], steps[k])
+    ]
+    beside = {k for leap in leaps for k in (leap - 1, leap)}
+    lone = [
+        k
+        for k in range(1, len(steps) - 1)
+        if k not in beside and steps[k] > 2.0 * max(floor, LEAP_FACTOR * max(steps[k - 1], steps[k + 1]))
+    ]
+    return leaps, lone
+
+
+def _find_stalls(positions: Array, quaternions: Array) -> list[tuple[int, int]]:
+    """Runs (first, last) of one exact pose that end in a step much longer than the usual one.
+
+    A body at rest also repeats its pose where there is no noise, but it starts with a usual step.
+    """
+    poses = np.column_stack([positions, quaternions])
+    same = (poses[1:] == poses[:-1]).all(axis=1)
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    if not (steps > 0.0).any():
+        return []
+    usual = float(np.median(steps[steps > 0.0]))
+    stalls, first = [], 0
+    for k, repeats in enumerate([*same.tolist(), False]):
+        if repeats:
+            continue
+        moved_before = first > 0 and steps[first - 1] > 0.0
+        if k - first + 1 > STALL_SAMPLES and k < len(steps) and moved_before and steps[k] > 3.0 * usual:
+            stalls.append((first, k))
+        first = k + 1
+    return stalls

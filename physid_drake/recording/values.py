@@ -1,0 +1,390 @@
+"""What was measured: pushes with times, poses and forces, and the cell they were made in; all of it frozen.
+
+Frames: ``W`` world (z up, table top at z = 0), ``B`` object (geometric centre), ``P`` hand tip (centre of its
+shape). Lengths in m, times in s, forces in N, masses in kg, angles in rad, quaternions (w, x, y, z).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Final, Literal, TypeAlias, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from physid_drake.errors import RecordingError
+from physid_drake.recording.outlines import check_polygon
+
+Array: TypeAlias = npt.NDArray[np.float64]
+Tip = Literal["cylinder", "sphere", "capsule", "reflex_sf"]
+HandStream = Literal["measured", "commanded"]
+CylinderAxis = Literal["z", "y"]
+
+QUATERNION_TOLERANCE: Final = 1e-3
+"""A quaternion whose norm is further from 1 than this is refused."""
+
+REFLEX_SF_TIP_RADIUS: Final = 0.010
+"""Radius in m of the ReFlex SF fingertip's pad, used where a recording with that hand does not give one."""
+
+DEFAULT_MASS_STD_SHARE: Final = 0.01
+"""A mass given without a standard deviation is known to this share of itself."""
+
+
+def _frozen(value: npt.ArrayLike, name: str, columns: int | None) -> Array:
+    array = np.array(value, dtype=np.float64)
+    wanted = 1 if columns is None else 2
+    if array.ndim != wanted or (columns is not None and array.shape[1] != columns):
+        shape = "(n,)" if columns is None else f"(n, {columns})"
+        raise RecordingError(f"{name} must have shape {shape}, but got {array.shape}; reshape it.")
+    if not np.isfinite(array).all():
+        row = int(np.argwhere(~np.isfinite(array))[0][0])
+        raise RecordingError(f"{name} must be finite, but row {row} is {array[row]}; leave that row out.")
+    array.setflags(write=False)
+    return array
+
+
+def _check_times(times: Array) -> None:
+    if len(times) == 0:
+        raise RecordingError("a stream needs at least one sample, but got none; leave the stream out.")
+    late = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(late):
+        k = int(late[0]) + 1
+        raise RecordingError(
+            f"times must increase, but times[{k}] = {float(times[k])!r} s follows {float(times[k - 1])!r} s; "
+            "sort the samples and drop repeated times."
+        )
+
+
+def check_positive(name: str, unit: str, *values: float | None) -> None:
+    """Refuses a length, mass or standard deviation that is not a positive, finite number.
+
+    Args:
+        name: what the values are, for the message.
+        unit: their unit, for the message.
+        values: the numbers; None is passed over.
+
+    Raises:
+        RecordingError: if one of them is not positive and finite.
+    """
+    for value in values:
+        if value is not None and not (np.isfinite(value) and value > 0.0):
+            raise RecordingError(f"{name} must be positive, but got {value!r} {unit}; correct it.")
+
+
+def _check_choice(name: str, got: str, choices: tuple[str, ...]) -> None:
+    if got not in choices:
+        raise RecordingError(f"{name} must be one of {', '.join(choices)}, but got {got!r}; choose one of them.")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PoseStream:
+    """Poses of one body in W against time.
+
+    Attributes:
+        times: (n,) in s, strictly increasing.
+        positions: (n, 3) in m.
+        quaternions: (n, 4) as w, x, y, z, of norm 1 within 1e-3.
+    """
+
+    times: Array
+    positions: Array
+    quaternions: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "times", _frozen(self.times, "times", None))
+        object.__setattr__(self, "positions", _frozen(self.positions, "positions", 3))
+        object.__setattr__(self, "quaternions", _frozen(self.quaternions, "quaternions", 4))
+        _check_times(self.times)
+        if not len(self.times) == len(self.positions) == len(self.quaternions):
+            lengths = f"{len(self.times)}, {len(self.positions)} and {len(self.quaternions)}"
+            raise RecordingError(f"times, positions and quaternions must be equally long, but got {lengths} rows.")
+        norms = np.linalg.norm(self.quaternions, axis=1)
+        worst = int(np.argmax(np.abs(norms - 1.0)))
+        if abs(norms[worst] - 1.0) > QUATERNION_TOLERANCE:
+            raise RecordingError(
+                f"quaternions must have norm 1 within {QUATERNION_TOLERANCE}, but row {worst} has norm "
+                f"{norms[worst]:.6g}; normalise them."
+            )
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, PoseStream):
+            return NotImplemented
+        return (
+            np.array_equal(self.times, other.times)
+            and np.array_equal(self.positions, other.positions)
+            and np.array_equal(self.quaternions, other.quaternions)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    @property
+    def planar(self) -> Array:
+        """(n, 3): x and y in m, and the yaw in rad, unwrapped so that it has no steps of a full turn."""
+        w, x, y, z = self.quaternions.T
+        yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+        return np.column_stack([self.positions[:, :2], yaw])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ForceStream:
+    """Force of the hand ON the object, in W.
+
+    Attributes:
+        times: (n,) in s, strictly increasing.
+        forces: (n, 3) in N.
+    """
+
+    times: Array
+    forces: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "times", _frozen(self.times, "times", None))
+        object.__setattr__(self, "forces", _frozen(self.forces, "forces", 3))
+        _check_times(self.times)
+        if len(self.times) != len(self.forces):
+            raise RecordingError(
+                f"times and forces must be equally long, but got {len(self.times)} and {len(self.forces)} rows."
+            )
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, ForceStream):
+            return NotImplemented
+        return np.array_equal(self.times, other.times) and np.array_equal(self.forces, other.forces)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Push:
+    """One push; its streams may be sampled at different times.
+
+    Attributes:
+        name: the table's file within the recording's folder, such as ``pushes/003.csv``.
+        object: poses X_WB, at least two.
+        hand: poses X_WP of the tip, or None where nothing pushes.
+        force: force of the hand on the object, or None where it was not measured.
+        note: free text.
+        warnings: what a reader or converter left out or found odd, one line each.
+    """
+
+    name: str
+    object: PoseStream
+    hand: PoseStream | None
+    force: ForceStream | None
+    note: str = ""
+    warnings: tuple[str, ...] = field(default=(), compare=False)
+
+    def __post_init__(self) -> None:
+        if len(self.object) < 2:
+            raise RecordingError(
+                f"push {self.name!r}: at least two object poses are needed, but got {len(self.object)}; "
+                "record the pose before and after the push."
+            )
+        if self.force is not None and self.hand is None:
+            raise RecordingError(f"push {self.name!r}: a hand force needs a hand; add the hand's path.")
+
+    def _streams(self) -> list[PoseStream | ForceStream]:
+        return [stream for stream in (self.object, self.hand, self.force) if stream is not None]
+
+    @property
+    def start_time(self) -> float:
+        """First time in s over all streams."""
+        return float(min(stream.times[0] for stream in self._streams()))
+
+    @property
+    def end_time(self) -> float:
+        """Last time in s over all streams."""
+        return float(max(stream.times[-1] for stream in self._streams()))
+
+    @property
+    def duration(self) -> float:
+        """Time in s from the first sample of any stream to the last."""
+        return self.end_time - self.start_time
+
+    @property
+    def endpoint_only(self) -> bool:
+        """Whether only the object's first and last pose are known."""
+        return len(self.object) == 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box:
+    """A box; ``size`` along x, y, z of B, in m."""
+
+    size: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        check_positive("size_m", "m", *self.size)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cylinder:
+    """A cylinder, standing (axis z of B) or lying (axis y, it rolls); radius and length in m."""
+
+    radius: float
+    length: float
+    axis: CylinderAxis
+
+    def __post_init__(self) -> None:
+        check_positive("radius_m", "m", self.radius)
+        check_positive("length_m", "m", self.length)
+        _check_choice("axis", self.axis, get_args(CylinderAxis))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prism:
+    """An upright prism: convex counter-clockwise ``polygon`` about its centroid and ``height``, in m."""
+
+    polygon: tuple[tuple[float, float], ...]
+    height: float
+
+    def __post_init__(self) -> None:
+        check_positive("height_m", "m", self.height)
+        check_polygon(self.polygon)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshShape:
+    """A mesh: absolute path of its ``file``, and the ``scale`` that turns its numbers into m."""
+
+    file: Path
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_positive("scale", "", self.scale)
+        if not self.file.is_absolute():
+            raise RecordingError(f"a mesh's file must be an absolute path, but got {str(self.file)!r}; resolve it.")
+
+
+Shape: TypeAlias = Box | Cylinder | Prism | MeshShape
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObjectModel:
+    """The pushed object: its shape, and mass and standard deviation in kg where a scale said so.
+
+    A mass without a standard deviation is known to 1 %, and ``mass_std`` is filled in so.
+    """
+
+    shape: Shape
+    mass: float | None = None
+    mass_std: float | None = None
+
+    def __post_init__(self) -> None:
+        check_positive("mass_kg", "kg", self.mass)
+        check_positive("mass_std_kg", "kg", self.mass_std)
+        if self.mass is None and self.mass_std is not None:
+            raise RecordingError("mass_std_kg is given without mass_kg; give the mass too, or neither.")
+        if self.mass is not None and self.mass_std is None:
+            object.__setattr__(self, "mass_std", DEFAULT_MASS_STD_SHARE * self.mass)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """The table's top face, at z = 0: ``size`` along x and y of W, and its ``centre``, in m."""
+
+    size: tuple[float, float]
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        check_positive("size_m", "m", *self.size)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hand:
+    """The hand's tip: its shape, radius and (cylinder, capsule) length in m, and what its stream is."""
+
+    tip: Tip
+    radius: float = REFLEX_SF_TIP_RADIUS
+    length: float | None = None
+    stream: HandStream = "measured"
+
+    def __post_init__(self) -> None:
+        _check_choice("tip", self.tip, get_args(Tip))
+        _check_choice("stream", self.stream, get_args(HandStream))
+        check_positive("radius_m", "m", self.radius)
+        check_positive("length_m", "m", self.length)
+        long = self.tip in ("cylinder", "capsule")
+        if long and self.length is None:
+            raise RecordingError(f"a {self.tip} tip needs length_m, but there is none; add it.")
+        if not long and self.length is not None:
+            raise RecordingError(f"a {self.tip} tip has no length_m, but got {self.length!r} m; remove it.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensors:
+    """One standard deviation of each sensor, in m, rad, m and N; None is unknown."""
+
+    object_position_std: float | None = None
+    object_rotation_std: float | None = None
+    hand_position_std: float | None = None
+    force_std: float | None = None
+
+    def __post_init__(self) -> None:
+        check_positive("object_position_std_m", "m", self.object_position_std)
+        check_positive("object_rotation_std_rad", "rad", self.object_rotation_std)
+        check_positive("hand_position_std_m", "m", self.hand_position_std)
+        check_positive("force_std_n", "N", self.force_std)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """Pushes of one object on one table with one hand, in the order in which they were made.
+
+    ``folder`` is where it was read from, or None; two recordings are equal whatever their folders.
+    """
+
+    name: str
+    description: str
+    object: ObjectModel
+    table: Table
+    hand: Hand | None
+    sensors: Sensors
+    pushes: tuple[Push, ...]
+    folder: Path | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        if not self.pushes:
+            raise RecordingError(f"recording {self.name!r}: pushes must not be empty; add at least one push.")
+        names = [push.name for push in self.pushes]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise RecordingError(f"recording {self.name!r}: two pushes are named {twice!r}; rename one.")
+        for push in self.pushes:
+            if (push.hand is None) != (self.hand is None):
+                what = "has no hand path" if push.hand is None else "has a hand path"
+                rule = "describes no hand" if self.hand is None else "describes one"
+                raise RecordingError(
+                    f"push {push.name!r} {what} but recording {self.name!r} {rule}; give both or neither."
+                )
+
+    def subset(self, names_or_indices: Iterable[str | int]) -> Recording:
+        """The same recording with only some of its pushes, in the order asked for.
+
+        Args:
+            names_or_indices: names of pushes, or their indices in ``pushes`` (negative counts from the end).
+
+        Raises:
+            RecordingError: if there is no such push, or none is asked for, or one twice.
+        """
+        by_name = {push.name: push for push in self.pushes}
+        chosen: list[Push] = []
+        for key in names_or_indices:
+            if isinstance(key, str) and key in by_name:
+                chosen.append(by_name[key])
+            elif not isinstance(key, str) and -len(self.pushes) <= key < len(self.pushes):
+                chosen.append(self.pushes[key])
+            else:
+                raise RecordingError(
+                    f"recording {self.name!r} has no push {key!r}; it has {len(self.pushes)}, "
+                    f"from {self.pushes[0].name!r} to {self.pushes[-1].name!r}."
+                )
+        return replace(self, pushes=tuple(chosen))

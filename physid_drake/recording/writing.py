@@ -1,0 +1,184 @@
+"""Writes a recording as a folder in the format ``physid-recording/1``, whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+import tempfile
+from pathlib import Path, PurePosixPath
+
+import yaml
+
+from physid_drake.errors import OutputError
+from physid_drake.recording.description import DESCRIPTION_FILE, FORMAT
+from physid_drake.recording.reading import (
+    FORCE,
+    HAND_POSITION,
+    HAND_QUATERNION,
+    OBJECT_POSITION,
+    OBJECT_QUATERNION,
+    TIME,
+)
+from physid_drake.recording.values import (
+    Box,
+    Cylinder,
+    Hand,
+    MeshShape,
+    ObjectModel,
+    Prism,
+    Push,
+    Recording,
+    Sensors,
+)
+
+
+def write_recording(recording: Recording, folder: Path) -> None:
+    """Writes a recording; reading the folder again gives an equal recording.
+
+    A push whose name is not a ``.csv`` path goes to ``pushes/<name>.csv``. A mesh is copied into the folder
+    as the one file it is; materials and textures it refers to are not.
+
+    Args:
+        recording: what to write.
+        folder: a folder that does not exist yet, or is empty.
+
+    Raises:
+        OutputError: if the folder holds something, cannot be written, or a push's name is no path within it.
+    """
+    folder = Path(folder)
+    try:
+        if folder.is_symlink() or (folder.exists() and not (folder.is_dir() and not any(folder.iterdir()))):
+            raise OutputError(f"{folder}: exists and is not an empty folder; choose another or remove it.")
+        files = _push_files(recording)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        staging = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
+        try:
+            _write_into(recording, files, staging)
+            staging.chmod(0o755)
+            # Renaming onto an empty folder is atomic; onto one that was filled meanwhile it fails.
+            staging.rename(folder)
+        finally:
+            if staging.exists():
+                shutil.rmtree(staging, ignore_errors=True)
+    except OutputError:
+        raise
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written: {error.strerror or error}.") from error
+
+
+def _write_into(recording: Recording, files: list[str], staging: Path) -> None:
+    for push, file in zip(recording.pushes, files, strict=True):
+        path = staging / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _write_push(push, path)
+    description = _describe(recording, files, staging)
+    text = yaml.safe_dump(description, sort_keys=False, allow_unicode=True, default_flow_style=None, width=100)
+    (staging / DESCRIPTION_FILE).write_text(text, encoding="utf-8")
+
+
+def _push_files(recording: Recording) -> list[str]:
+    files = []
+    for push in recording.pushes:
+        name = push.name if push.name.endswith(".csv") else f"pushes/{push.name}.csv"
+        path = PurePosixPath(name)
+        if path.is_absolute() or ".." in path.parts or "\\" in name or "\0" in name or str(path) in files:
+            raise OutputError(f"push {push.name!r}: cannot be a file of its own within a folder; rename the push.")
+        files.append(name)
+    return files
+
+
+def _write_push(push: Push, path: Path) -> None:
+    columns: list[str] = [TIME]
+    rows: dict[float, dict[str, float]] = {}
+    if push.hand is not None:
+        columns += [*HAND_POSITION, *HAND_QUATERNION]
+        for time, position, quaternion in zip(
+            push.hand.times, push.hand.positions, push.hand.quaternions, strict=True
+        ):
+            row = rows.setdefault(float(time), {})
+            row.update(zip((*HAND_POSITION, *HAND_QUATERNION), (*position, *quaternion), strict=True))
+    columns += [*OBJECT_POSITION, *OBJECT_QUATERNION]
+    for time, position, quaternion in zip(
+        push.object.times, push.object.positions, push.object.quaternions, strict=True
+    ):
+        row = rows.setdefault(float(time), {})
+        row.update(zip((*OBJECT_POSITION, *OBJECT_QUATERNION), (*position, *quaternion), strict=True))
+    if push.force is not None:
+        columns += FORCE
+        for time, force in zip(push.force.times, push.force.forces, strict=True):
+            rows.setdefault(float(time), {}).update(zip(FORCE, force, strict=True))
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns)
+        for time in sorted(rows):
+            row = rows[time]
+            writer.writerow([repr(time), *(repr(float(row[c])) if c in row else "" for c in columns[1:])])
+
+
+def _describe(recording: Recording, files: list[str], staging: Path) -> dict[str, object]:
+    described: dict[str, object] = {
+        "format": FORMAT,
+        "name": recording.name,
+        "description": recording.description,
+        "object": _describe_object(recording.object, recording.folder, staging),
+        "table": {"size_m": _floats(recording.table.size), "centre_m": _floats(recording.table.centre)},
+    }
+    if recording.hand is not None:
+        described["hand"] = _describe_hand(recording.hand)
+    sensors = _describe_sensors(recording.sensors)
+    if sensors:
+        described["sensors"] = sensors
+    described["pushes"] = [
+        {"file": file, "note": push.note} if push.note else {"file": file}
+        for push, file in zip(recording.pushes, files, strict=True)
+    ]
+    return described
+
+
+def _describe_object(model: ObjectModel, folder: Path | None, staging: Path) -> dict[str, object]:
+    described: dict[str, object] = {}
+    shape = model.shape
+    if isinstance(shape, Box):
+        described = {"shape": "box", "size_m": _floats(shape.size)}
+    elif isinstance(shape, Cylinder):
+        radius, length = float(shape.radius), float(shape.length)
+        described = {"shape": "cylinder", "radius_m": radius, "length_m": length, "axis": shape.axis}
+    elif isinstance(shape, Prism):
+        polygon = [_floats(vertex) for vertex in shape.polygon]
+        described = {"shape": "prism", "polygon_m": polygon, "height_m": float(shape.height)}
+    else:
+        described = {"shape": "mesh", "file": _copy_mesh(shape, folder, staging), "scale": float(shape.scale)}
+    if model.mass is not None and model.mass_std is not None:
+        described |= {"mass_kg": float(model.mass), "mass_std_kg": float(model.mass_std)}
+    return described
+
+
+def _copy_mesh(shape: MeshShape, folder: Path | None, staging: Path) -> str:
+    root = folder.resolve() if folder is not None else None
+    within = root is not None and shape.file.is_relative_to(root)
+    relative = shape.file.relative_to(root) if within and root is not None else Path("meshes") / shape.file.name
+    target = staging / relative
+    target.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(shape.file, target)
+    return relative.as_posix()
+
+
+def _describe_hand(hand: Hand) -> dict[str, object]:
+    described: dict[str, object] = {"tip": hand.tip, "radius_m": float(hand.radius)}
+    if hand.length is not None:
+        described["length_m"] = float(hand.length)
+    return described | {"stream": hand.stream}
+
+
+def _describe_sensors(sensors: Sensors) -> dict[str, float]:
+    described = {
+        "object_position_std_m": sensors.object_position_std,
+        "object_rotation_std_rad": sensors.object_rotation_std,
+        "hand_position_std_m": sensors.hand_position_std,
+        "force_std_n": sensors.force_std,
+    }
+    return {key: float(value) for key, value in described.items() if value is not None}
+
+
+def _floats(values: tuple[float, ...]) -> list[float]:
+    return [float(value) for value in values]

@@ -1,0 +1,151 @@
+"""What a recording holds, as a table in the terminal and as a plot of all pushes from above."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from rich.table import Table
+from rich.text import Text
+
+from physid_drake.recording.statistics import NoiseEstimate, PushSummary, estimate_noise, summarise
+from physid_drake.recording.values import Array, Box, Cylinder, Prism, Recording, Shape
+
+_MANY_PUSHES = 12
+
+
+def inspection_table(recording: Recording) -> Table:
+    """One row for each push, speeds at their largest, and the noise of all in the caption."""
+    table = Table(
+        title=Text(recording.name),
+        caption=Text(_noise_line(estimate_noise(recording))),
+        caption_justify="left",
+    )
+    table.add_column("push", no_wrap=True)
+    for heading in (
+        "poses",
+        "time\n[s]",
+        "hand\n[mm/s]",
+        "object\n[mm/s]",
+        "moved\n[mm]",
+        "turned\n[deg]",
+        "gaps",
+        "noise\n[mm]",
+        "noise\n[deg]",
+        "warn",
+    ):
+        # As Text, since [s] would be read as a style.
+        table.add_column(Text(heading), justify="right")
+    for push in recording.pushes:
+        table.add_row(Text(push.name), *_cells(summarise(push)))
+    return table
+
+
+def warning_lines(recording: Recording) -> list[str]:
+    """Every warning of every push, one line each."""
+    return [f"{push.name}: {warning}" for push in recording.pushes for warning in push.warnings]
+
+
+def draw_pushes(recording: Recording) -> Figure:
+    """All pushes from above, in m: outline at start (faint) and end, path of object and hand.
+
+    Args:
+        recording: what to draw.
+
+    Returns:
+        A figure that belongs to no window; save it with ``savefig``.
+    """
+    figure = Figure(figsize=(8.0, 8.0), layout="constrained")
+    axes = figure.add_subplot()
+    outline = _outline(recording.object.shape)
+    many = len(recording.pushes) > _MANY_PUSHES
+    width = 0.5 if many else 1.2
+    for push in recording.pushes:
+        planar = push.object.planar
+        if outline is not None:
+            _draw_outline(axes, outline, planar[0], 0.08 if many else 0.35, width)
+            _draw_outline(axes, outline, planar[-1], 0.3 if many else 1.0, width)
+        axes.plot(planar[:, 0], planar[:, 1], color="tab:blue", linewidth=1.5 * width)
+        axes.plot(*planar[-1, :2], ".", color="tab:blue", markersize=3 if many else 6)
+    paths = [push.hand.positions[:, :2] for push in recording.pushes if push.hand is not None]
+    axes.add_collection(LineCollection(paths, colors="tab:orange", linewidths=2.0 * width, zorder=3))
+    for path in paths:
+        axes.plot(*path[-1], ".", color="tab:orange", markersize=3 if many else 6, zorder=3)
+    _finish(axes, recording)
+    return figure
+
+
+def _draw_outline(axes: Axes, outline: Array, pose: Array, alpha: float, width: float) -> None:
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    corners = outline @ np.array([[c, s], [-s, c]]) + pose[:2]
+    closed = np.vstack([corners, corners[:1]])
+    axes.plot(closed[:, 0], closed[:, 1], color="tab:blue", alpha=alpha, linewidth=width)
+
+
+def _finish(axes: Axes, recording: Recording) -> None:
+    axes.autoscale_view()
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    count = len(recording.pushes)
+    # A name with a $ would be read as mathematics.
+    axes.set_title(f"{recording.name}: {count} push{'es' if count != 1 else ''} from above", parse_math=False)
+    handles = [
+        Line2D([], [], color="tab:blue", alpha=0.3, label="object at start"),
+        Line2D([], [], color="tab:blue", label="object at end, and its path"),
+    ]
+    if recording.hand is not None:
+        handles.append(Line2D([], [], color="tab:orange", label="hand path (dot: end)"))
+    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.07), ncols=3, frameon=False)
+    axes.grid(linewidth=0.3)
+
+
+def _outline(shape: Shape) -> Array | None:
+    """Corners (n, 2) in m of the shape seen from above; None for a mesh, whose file is not read here."""
+    if isinstance(shape, Prism):
+        return np.array(shape.polygon)
+    if isinstance(shape, Cylinder) and shape.axis == "z":
+        angles = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+        return shape.radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    if isinstance(shape, Cylinder):
+        x, y = shape.radius, 0.5 * shape.length
+    elif isinstance(shape, Box):
+        x, y = 0.5 * shape.size[0], 0.5 * shape.size[1]
+    else:
+        return None
+    return np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
+
+
+def _cells(summary: PushSummary) -> list[str]:
+    return [
+        str(summary.samples),
+        f"{summary.duration:.2f}",
+        _scaled(summary.hand_speed, 1e3, ".1f"),
+        _scaled(summary.object_speed, 1e3, ".1f"),
+        f"{summary.displacement * 1e3:.1f}",
+        f"{np.rad2deg(summary.turn):.1f}",
+        str(summary.gaps),
+        _scaled(summary.position_noise, 1e3, ".3f"),
+        _scaled(summary.rotation_noise, 180.0 / np.pi, ".3f"),
+        str(summary.warnings),
+    ]
+
+
+def _scaled(value: float | None, factor: float, form: str) -> str:
+    return "-" if value is None else format(value * factor, form)
+
+
+def _noise_line(noise: NoiseEstimate) -> str:
+    if noise.object_position_std is None or noise.object_rotation_std is None:
+        return "noise: unknown, the object is nowhere recorded at rest"
+    parts = [
+        f"noise at rest: object {noise.object_position_std * 1e3:.3f} mm, "
+        f"{np.rad2deg(noise.object_rotation_std):.3f} deg (one standard deviation, {noise.samples} samples)"
+    ]
+    if noise.position_autocorrelation is not None:
+        parts.append(f"correlation to the next sample {noise.position_autocorrelation:.2f}")
+    if noise.force_std is not None:
+        parts.append(f"force {noise.force_std:.3f} N")
+    return "; ".join(parts)

@@ -1,0 +1,18 @@
+"""Choosers of the next trial, and the loop that runs one of them to its end."""
+
+from physid_drake.search.candidates import initial_design, refine_candidates
+from physid_drake.search.greedy_entropy import GreedyEntropySearch
+from physid_drake.search.loop import SearchResult, StopReason, search_minimum
+from physid_drake.search.protocol import Search
+from physid_drake.search.random_search import RandomSearch
+
+__all__ = [
+    "GreedyEntropySearch",
+    "RandomSearch",
+    "Search",
+    "SearchResult",
+    "StopReason",
+    "initial_design",
+    "refine_candidates",
+    "search_minimum",
+]

@@ -1,0 +1,121 @@
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from physid_drake import cli
+from physid_drake.errors import RecordingError
+from physid_drake.recording import (
+    Box,
+    Hand,
+    ObjectModel,
+    PoseStream,
+    Push,
+    Recording,
+    Sensors,
+    Table,
+    write_recording,
+)
+from physid_drake.report.inspection import draw_pushes
+
+COLUMNS = (
+    "start_object_x_m,start_object_y_m,start_object_yaw_rad,end_object_x_m,end_object_y_m,end_object_yaw_rad,"
+    "start_tip_x_m,start_tip_y_m,end_tip_x_m,end_tip_y_m"
+)
+
+
+def some_recording(count=3):
+    times = np.arange(40) * 0.05
+    path = np.column_stack([0.1 * times, 0 * times, 0 * times + 0.02])
+    quaternions = np.tile([1.0, 0, 0, 0], (40, 1))
+    stream = PoseStream(times=times, positions=path, quaternions=quaternions)
+    gap = np.delete(np.arange(40), slice(20, 30))
+    lossy = PoseStream(times=times[gap], positions=path[gap], quaternions=quaternions[gap])
+    pushes = tuple(Push(name=f"p{k}", object=lossy, hand=stream, force=None) for k in range(count))
+    return Recording(
+        name="some_$pushes",
+        description="",
+        object=ObjectModel(shape=Box(size=(0.1, 0.05, 0.04))),
+        table=Table(size=(1.0, 1.0)),
+        hand=Hand(tip="sphere", radius=0.01),
+        sensors=Sensors(),
+        pushes=pushes,
+    )
+
+
+def test_inspect_shows_every_push_and_warns_on_stderr(tmp_path, capsys):
+    write_recording(some_recording(), tmp_path / "r")
+    assert cli.main(["inspect", str(tmp_path / "r"), "--out", str(tmp_path / "top.png")]) == 0
+    shown = capsys.readouterr()
+    assert "some_$pushes" in shown.out and "pushes/p2.csv" in shown.out and "[mm/s]" in shown.out
+    assert "warning: pushes/p0.csv: object: rows 21-32: gap" in shown.err
+    assert (tmp_path / "top.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_broken_recording_is_one_line_and_status_one(tmp_path, capsys):
+    (tmp_path / "recording.yaml").write_text("format: [\n")
+    assert cli.main(["inspect", str(tmp_path)]) == 1
+    shown = capsys.readouterr()
+    assert shown.out == "" and shown.err.startswith("error: ") and shown.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("out", ["nowhere/top.png", "top.nonsense"])
+def test_a_plot_that_cannot_be_written_is_an_error(tmp_path, capsys, out):
+    write_recording(some_recording(), tmp_path / "r")
+    assert cli.main(["inspect", str(tmp_path / "r"), "--out", str(tmp_path / out)]) == 1
+    assert "cannot be written" in capsys.readouterr().err
+
+
+def test_convert_writes_a_recording_that_inspect_reads(tmp_path, capsys):
+    table = tmp_path / "abs_tri2_v10.csv"
+    table.write_text(COLUMNS + "\n" + "0.3,0,3.1,0.33,0,-3.1,0.2,0,0.25,0\n" * 5)
+    assert cli.main(["convert", "mit", str(table), str(tmp_path / "r"), "--limit", "2"]) == 0
+    assert "mit_tri2_abs: 2 pushes written" in capsys.readouterr().out
+    assert cli.main(["inspect", str(tmp_path / "r")]) == 0
+    assert cli.main(["convert", "mit", str(table), str(tmp_path / "r")]) == 1
+    assert "not an empty folder" in capsys.readouterr().err
+
+
+def test_an_interrupt_is_status_130(monkeypatch, capsys):
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "read_recording", interrupt)
+    assert cli.main(["inspect", "anywhere"]) == 130
+    assert capsys.readouterr().err == "interrupted\n"
+
+
+def test_a_message_of_several_lines_is_shown_as_one(monkeypatch, capsys):
+    def refuse(_):
+        raise RecordingError("first\nsecond")
+
+    monkeypatch.setattr(cli, "read_recording", refuse)
+    assert cli.main(["inspect", "anywhere"]) == 1
+    assert capsys.readouterr().err == "error: first second\n"
+
+
+@pytest.mark.parametrize("argv", [[], ["inspect"], ["convert", "other", "a", "b"]])
+def test_wrong_usage_is_status_two(argv, capsys):
+    with pytest.raises(SystemExit) as caught:
+        cli.main(argv)
+    assert caught.value.code == 2
+    capsys.readouterr()
+
+
+def test_the_module_runs_as_a_program_without_importing_drake(tmp_path):
+    write_recording(some_recording(1), tmp_path / "r")
+    code = (
+        "import sys; from physid_drake.cli import main; s = main(sys.argv[1:]); "
+        "sys.exit(s or ('pydrake' in sys.modules))"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code, "inspect", str(tmp_path / "r")], capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+
+
+def test_axes_are_equal_and_in_metres():
+    axes = draw_pushes(some_recording(20)).axes[0]
+    assert axes.get_aspect() == 1.0
+    assert axes.get_xlabel() == "x [m]" and axes.get_ylabel() == "y [m]"

@@ -1,0 +1,107 @@
+import numpy as np
+import pytest
+
+from physid_drake.recording import (
+    Box,
+    ForceStream,
+    Hand,
+    ObjectModel,
+    PoseStream,
+    Push,
+    Recording,
+    Sensors,
+    Table,
+    estimate_noise,
+    rest_segments,
+    summarise,
+)
+
+RATE = 100.0
+
+
+def planar_stream(times, x, y, yaw):
+    zeros = np.zeros(len(times))
+    return PoseStream(
+        times=times,
+        positions=np.column_stack([x, y, zeros]),
+        quaternions=np.column_stack([np.cos(yaw / 2), zeros, zeros, np.sin(yaw / 2)]),
+    )
+
+
+def rest_move_rest(rng, position_std, rotation_std, correlation=0.0):
+    """2 s at rest, 1 s at 0.1 m/s, 2 s at rest."""
+    times = np.arange(500) / RATE
+    x = 0.1 * np.clip(times - 2.0, 0.0, 1.0)
+
+    def noise(std):
+        white = rng.standard_normal(500) * std * np.sqrt(1 - correlation**2)
+        out = np.zeros(500)
+        for k in range(500):
+            out[k] = correlation * out[k - 1] + white[k]
+        return out
+
+    motion = planar_stream(times, x + noise(position_std), noise(position_std), 0.5 * x / 0.1 + noise(rotation_std))
+    hand = planar_stream(times, x - 0.05, 0 * x, 0 * x)
+    force = ForceStream(times=times, forces=rng.normal(scale=0.05, size=(500, 3)))
+    return Push(name="a", object=motion, hand=hand, force=force)
+
+
+def recording_of(*pushes):
+    return Recording(
+        name="r",
+        description="",
+        object=ObjectModel(shape=Box(size=(0.1, 0.1, 0.1))),
+        table=Table(size=(1.0, 1.0)),
+        hand=Hand(tip="sphere", radius=0.01),
+        sensors=Sensors(),
+        pushes=pushes,
+    )
+
+
+@pytest.mark.parametrize("std", [0.0, 3e-4])
+def test_rest_is_found_before_and_after_the_motion(std):
+    push = rest_move_rest(np.random.default_rng(1), std, 10 * std)
+    times = push.object.times
+    rests = rest_segments(push)
+    assert all(times[rest][-1] < 2.1 or times[rest][0] > 2.9 for rest in rests)
+    assert sum(len(times[rest]) for rest in rests) > 250
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.6])
+def test_noise_at_rest_is_recovered(correlation):
+    rng = np.random.default_rng(2)
+    pushes = [rest_move_rest(rng, 3e-4, 3e-3, correlation) for _ in range(8)]
+    named = [Push(name=str(k), object=p.object, hand=p.hand, force=p.force) for k, p in enumerate(pushes)]
+    noise = estimate_noise(recording_of(*named))
+    assert noise.object_position_std == pytest.approx(3e-4, rel=0.1)
+    assert noise.object_rotation_std == pytest.approx(3e-3, rel=0.1)
+    assert noise.position_autocorrelation == pytest.approx(correlation, abs=0.08)
+    assert noise.force_std == pytest.approx(0.05, rel=0.1)
+
+
+def test_a_push_without_rest_has_no_noise():
+    times = np.arange(200) / RATE
+    push = Push(name="a", object=planar_stream(times, 0.1 * times, 0 * times, 0 * times), hand=None, force=None)
+    summary = summarise(push)
+    assert rest_segments(push) == []
+    assert summary.position_noise is None and summary.rotation_noise is None
+
+
+def test_end_points_alone_have_displacement_but_neither_speed_nor_noise():
+    stream = planar_stream(np.array([0.0, 2.0]), np.array([0.0, 0.3]), np.array([0.0, 0.4]), np.array([0.0, 1.0]))
+    summary = summarise(Push(name="a", object=stream, hand=None, force=None))
+    assert summary.displacement == pytest.approx(0.5) and summary.turn == pytest.approx(1.0)
+    assert summary.object_speed is None and summary.position_noise is None and summary.gaps == 0
+
+
+def test_a_summary_reports_speed_and_gaps():
+    push = rest_move_rest(np.random.default_rng(3), 0.0, 0.0)
+    keep = np.delete(np.arange(500), slice(240, 260))
+    stream = push.object
+    thinned = PoseStream(
+        times=stream.times[keep], positions=stream.positions[keep], quaternions=stream.quaternions[keep]
+    )
+    summary = summarise(Push(name="a", object=thinned, hand=push.hand, force=None))
+    assert summary.gaps == 1
+    assert summary.object_speed == pytest.approx(0.1, rel=1e-6)
+    assert summary.hand_speed == pytest.approx(0.1, rel=1e-6)

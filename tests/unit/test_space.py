@@ -1,0 +1,143 @@
+import numpy as np
+import pytest
+from scipy.stats import kstest, lognorm, norm
+
+from physid_drake.errors import ParameterError
+from physid_drake.space import Parameter, ParameterSpace
+
+
+def pushed_box() -> ParameterSpace:
+    return ParameterSpace(
+        parameters=(
+            Parameter(name="mass", unit="kg", lower=0.01, upper=10.0, prior_mean=0.5, prior_std=0.4, scale="log"),
+            Parameter(name="support_friction", unit="-", lower=0.05, upper=1.2, prior_mean=0.3, prior_std=0.1),
+            Parameter(name="com_offset", unit="m", lower=-0.02, upper=0.03, prior_mean=0.0),
+        )
+    )
+
+
+def test_unit_cube_corners_are_the_bounds():
+    space = pushed_box()
+    np.testing.assert_allclose(space.from_unit(np.zeros(3)), [0.01, 0.05, -0.02])
+    np.testing.assert_allclose(space.from_unit(np.ones(3)), [10.0, 1.2, 0.03])
+
+
+def test_unit_cube_corners_are_never_outside_by_round_off():
+    for lower in np.linspace(0.001, 0.1, 50):
+        p = Parameter(name="a", unit="-", lower=lower, upper=7 * lower, prior_mean=lower, scale="log")
+        space = ParameterSpace(parameters=(p,))
+        space.check(space.from_unit([[0.0], [1.0]]))
+
+
+def test_middle_of_a_log_scale_is_the_geometric_mean():
+    np.testing.assert_allclose(pushed_box().from_unit(np.full(3, 0.5)), [np.sqrt(0.1), 0.625, 0.005])
+
+
+def test_unit_cube_there_and_back_is_the_same_point():
+    space = pushed_box()
+    thetas = space.sample(np.random.default_rng(0), 100, from_prior=False)
+    np.testing.assert_allclose(space.from_unit(space.to_unit(thetas)), thetas, rtol=1e-12)
+
+
+def test_a_point_outside_is_refused_by_name_bounds_value_and_unit():
+    with pytest.raises(ParameterError, match=r"'mass'.*\[0.01, 10\] kg.*20 kg.*widen"):
+        pushed_box().check([20.0, 0.3, 0.0])
+
+
+def test_nan_is_outside_every_bound():
+    with pytest.raises(ParameterError, match="support_friction"):
+        pushed_box().check([1.0, np.nan, 0.0])
+
+
+def test_a_point_of_wrong_length_is_refused():
+    with pytest.raises(ParameterError, match="3 entries"):
+        pushed_box().check([1.0, 0.3])
+
+
+def test_a_name_that_occurs_twice_is_refused():
+    p = Parameter(name="mass", unit="kg", lower=0.1, upper=1.0, prior_mean=0.5)
+    with pytest.raises(ParameterError, match="unique"):
+        ParameterSpace(parameters=(p, p))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"lower": 2.0},
+        {"lower": 0.0, "scale": "log"},
+        {"prior_mean": 3.0},
+        {"prior_std": 0.0},
+        {"upper": np.inf},
+        {"scale": "cubic"},
+        {"name": "my mass"},
+    ],
+)
+def test_a_parameter_that_breaks_a_rule_is_refused(wrong):
+    right = {"name": "mass", "unit": "kg", "lower": 0.1, "upper": 1.0, "prior_mean": 0.5}
+    Parameter(**right)
+    with pytest.raises(ParameterError):
+        Parameter(**{**right, **wrong})
+
+
+def test_uniform_samples_are_uniform_on_the_scale_and_prior_samples_follow_the_prior():
+    space = pushed_box()
+    flat = space.to_unit(space.sample(np.random.default_rng(1), 1024, from_prior=False))
+    assert max(kstest(flat[:, i], "uniform").statistic for i in range(3)) < 0.01
+    drawn = space.sample(np.random.default_rng(1), 1024, from_prior=True)
+    assert kstest(drawn[:, 0], lognorm(s=0.4, scale=0.5).cdf).statistic < 0.01
+    assert kstest(drawn[:, 1], norm(0.3, 0.1).cdf).statistic < 0.02
+    space.check(drawn)
+
+
+def test_the_same_seed_samples_the_same_points_and_a_second_call_others():
+    space = pushed_box()
+    rng = np.random.default_rng(2)
+    first, second = (space.sample(rng, 10, from_prior=True) for _ in range(2))
+    np.testing.assert_array_equal(first, space.sample(np.random.default_rng(2), 10, from_prior=True))
+    assert not np.any(first == second)
+
+
+def test_prior_density_integrates_to_one_over_the_unit_cube():
+    space = pushed_box()
+    thetas = space.sample(np.random.default_rng(3), 2**14, from_prior=False)
+    assert np.exp(space.log_prior(thetas)).mean() == pytest.approx(1.0, abs=0.01)
+
+
+def test_log_prior_is_half_the_squared_whitened_residuals_up_to_a_constant():
+    space = pushed_box()
+    thetas = space.sample(np.random.default_rng(4), 16, from_prior=False)
+    sums = space.log_prior(thetas) + 0.5 * np.sum(space.prior_whitened(thetas) ** 2, axis=1)
+    np.testing.assert_allclose(sums, sums[0])
+
+
+def test_whitened_prior_counts_standard_deviations_and_leaves_uniform_parameters_alone():
+    theta = [0.5 * np.exp(0.8), 0.2, 0.03]
+    np.testing.assert_allclose(pushed_box().prior_whitened(theta), [2.0, -1.0, 0.0], atol=1e-12)
+
+
+def test_a_uniform_space_has_log_prior_zero():
+    space = pushed_box().subspace(["com_offset"])
+    assert space.log_prior([0.01]) == 0.0
+
+
+def test_dict_there_and_back_and_missing_or_unknown_names_are_refused():
+    space = pushed_box()
+    mapping = {"com_offset": 0.01, "mass": 1.0, "support_friction": 0.4}
+    np.testing.assert_array_equal(space.from_dict(mapping), [1.0, 0.4, 0.01])
+    assert space.as_dict(space.from_dict(mapping)) == mapping
+    with pytest.raises(ParameterError, match="missing"):
+        space.from_dict({"mass": 1.0})
+    with pytest.raises(ParameterError, match="unknown"):
+        space.from_dict({**mapping, "colour": 1.0})
+
+
+def test_a_subspace_keeps_the_order_asked_for():
+    space = pushed_box().subspace(["com_offset", "mass"])
+    assert space.names == ("com_offset", "mass")
+    assert space.index("mass") == 1
+    np.testing.assert_array_equal(space.nominal, [0.0, 0.5])
+
+
+def test_the_nominal_point_cannot_be_written_to():
+    with pytest.raises(ValueError, match="read-only"):
+        pushed_box().nominal[0] = 1.0
