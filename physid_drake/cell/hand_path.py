@@ -202,7 +202,9 @@ class _Fit:
                 break
             knots = np.sort(np.append(knots, candidates[best]))
             if len(knots) % 2 == 0:
-                knots = self._place(knots, evaluations=8)
+                placed = self._place(knots, evaluations=8)
+                # Two knots that merged would be added and merged again without end.
+                knots = placed if len(placed) == len(knots) else knots
         return knots
 
     def _place(self, knots: Array, evaluations: int = 40) -> Array:

@@ -97,9 +97,7 @@ def test_published_inertias_are_met():
         plant, _, model = parsed(url=f"package://physid_drake_models/objects/{name}.sdf")
         return plant.GetBodyByName("object", model).default_spatial_inertia().CalcRotationalInertia().get_moments()[2]
 
-    assert about_z("mit_rect1") == pytest.approx(
-        0.001131, rel=1e-3
-    )  # Yu and others 2016; the uniform plate is 0.045 % below
+    assert about_z("mit_rect1") == pytest.approx(0.001131, rel=1e-3)  # Yu and others 2016; ours is 0.045 % below
     assert math.sqrt(about_z("cmu_triangle") / 1.518) == pytest.approx(0.050, abs=1e-9)  # Zhou and others 2016
 
 
@@ -166,7 +164,7 @@ def test_a_reach_region_lies_on_the_table_within_the_robots_reach(name):
 
 @pytest.mark.parametrize("name", REACH["robots"])
 def test_a_robot_is_only_seen(name):
-    plant, inspector, model = parsed(url=f"package://physid_drake_models/robots/{name}.sdf")
+    plant, _, model = parsed(url=f"package://physid_drake_models/robots/{name}.sdf")
     assert plant.num_collision_geometries() == 0
     figure = plant.GetBodyByName("figure", model)
     x, y, _ = plant.EvalBodyPoseInWorld(plant.CreateDefaultContext(), figure).translation()
@@ -269,7 +267,7 @@ def test_a_hands_looks_add_nothing_but_looks(tip, length, preshape):
 
 
 def test_the_looks_stand_as_in_the_parsed_model():
-    plant, inspector, looks = seen_on_a_link("reflex_sf", preshape=PRESHAPES["bent"], height=0.02)
+    _, inspector, looks = seen_on_a_link("reflex_sf", preshape=PRESHAPES["bent"], height=0.02)
     other, other_inspector, model = parsed(text=hand_model_sdf("reflex_sf", 0.01, preshape=PRESHAPES["bent"]))
     context = other.CreateDefaultContext()
     count = 0
