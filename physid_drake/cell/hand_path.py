@@ -107,13 +107,13 @@ def fit_hand_path(times: Array, positions: Array, std: float | None) -> HandPath
     """
     if len(times) < 6:
         return _polygon_path(times, positions)
-    sigma = max(std if std is not None else _difference_std(positions), SMALLEST_STD)
+    sigma = max(std if std is not None else stream_std(positions), SMALLEST_STD)
     fit = _Fit(times - times[0], positions, sigma)
     return fit.path(float(times[0]))
 
 
-def _difference_std(positions: Array) -> float:
-    """Noise from third differences, which a smooth path hardly has: their variance is 20 sigma^2."""
+def stream_std(positions: Array) -> float:
+    """Noise of a stream (n, 2) [m] from its third differences, which a path hardly has: variance 20 sigma^2."""
     third = np.diff(positions, 3, axis=0)
     return float(1.4826 * np.median(np.abs(third)) / np.sqrt(20.0))
 

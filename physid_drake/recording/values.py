@@ -124,9 +124,12 @@ class PoseStream:
 
     @property
     def planar(self) -> Array:
-        """(n, 3): x and y in m, and the yaw in rad, unwrapped so that it has no steps of a full turn."""
+        """(n, 3): x and y in m, and the yaw in rad, unwrapped so that it has no steps of a full turn.
+
+        Yaw is the heading of the object's y axis, which a cylinder that rolls about it keeps.
+        """
         w, x, y, z = self.quaternions.T
-        yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+        yaw = np.unwrap(np.arctan2(2.0 * (w * z - x * y), 1.0 - 2.0 * (x * x + z * z)))
         return np.column_stack([self.positions[:, :2], yaw])
 
 

@@ -1,0 +1,328 @@
+"""The story: a recording in, an identified model out."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from physid_drake.belief import Belief
+from physid_drake.cell import CellConfig
+from physid_drake.cell.solid import solid_of
+from physid_drake.errors import ConfigError
+from physid_drake.identify.misfit import whitened_residual
+from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
+from physid_drake.identify.polish import Polished, Polisher
+from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems_of, spec_of
+from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
+from physid_drake.identify.theta import ThetaConfig, ThetaMap, theta_map
+from physid_drake.recording import Recording
+from physid_drake.search import GreedyEntropySearch, SearchResult, search_minimum
+
+Array = NDArray[np.float64]
+
+IDENTIFIABLE = 0.5  # a parameter counts as told if the pushes halve its prior's standard deviation
+
+
+@dc.dataclass
+class SearchConfig:
+    """Greedy entropy search.
+
+    Attributes:
+        candidates: number of thetas in the candidate set.
+        budget: thetas tried.
+        batch: thetas per update of the belief.
+        entropy_tolerance_nats: the search stops when the entropy of P_min moves less than this.
+        patience: over so many updates.
+        jobs: processes; 0 takes the machine's cores.
+    """
+
+    candidates: int = 1000
+    budget: int = 40
+    batch: int = 1
+    entropy_tolerance_nats: float = 0.1
+    patience: int = 5
+    jobs: int = 0
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """One parameter, as these pushes tell it.
+
+    Attributes:
+        name, unit: which.
+        value: best estimate.
+        ci90: 90 % interval.
+        identifiable: whether the pushes say more than the prior did.
+        prior: its value before.
+    """
+
+    name: str
+    unit: str
+    value: float
+    ci90: tuple[float, float]
+    identifiable: bool
+    prior: float
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Accuracy:
+    """How well pushes are predicted: root mean squares over samples, and over pushes at their end.
+
+    Attributes:
+        position, rotation: along the path [m, rad].
+        end_position, end_rotation: at the last sample [m, rad].
+        force: of the hand's force [N]; None where none was recorded.
+        sigmas: everything in standard deviations of the sensors.
+        diverged: rollouts that diverged and are left out.
+    """
+
+    position: float
+    rotation: float
+    end_position: float
+    end_rotation: float
+    force: float | None
+    sigmas: float
+    diverged: int
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Identification:
+    """What was identified.
+
+    Attributes:
+        thetas: the parameter space and what is fixed.
+        theta: (d,) the polished estimate.
+        estimates: one per parameter.
+        noise: the recording's.
+        search: the search's result; its belief holds P_min.
+        polished: the least-squares fit.
+        reduced_chi2: cost per residual; 1 means that the plain cell explains the pushes to their noise.
+        training, held_out: names of the pushes.
+        before, after: accuracy on held-out pushes with the prior's theta and with the estimate.
+        fitted: accuracy on the training pushes.
+    """
+
+    thetas: ThetaMap
+    theta: Array
+    estimates: tuple[Estimate, ...]
+    noise: Noise
+    search: SearchResult
+    polished: Polished
+    reduced_chi2: float
+    training: tuple[str, ...]
+    held_out: tuple[str, ...]
+    before: Accuracy | None
+    after: Accuracy | None
+    fitted: Accuracy
+
+
+Progress = Callable[[str, int, int], None]
+
+
+def split_pushes(count: int, share: float, rng: np.random.Generator) -> tuple[list[int], list[int]]:
+    """Indices of training and held-out pushes; at least two stay for training, one push is not split.
+
+    Raises:
+        ConfigError: if ``share`` is not in [0, 1).
+    """
+    if not 0.0 <= share < 1.0:
+        raise ConfigError(f"held_out_share must be in [0, 1), but is {share:g}.")
+    number = min(max(0, count - 2), round(share * count)) if share > 0.0 else 0
+    chosen = set(rng.permutation(count)[:number].tolist())
+    return [i for i in range(count) if i not in chosen], sorted(chosen)
+
+
+class Identifier:
+    """Identifies theta from a recording: search, polish, intervals, held-out accuracy."""
+
+    def __init__(
+        self,
+        recording: Recording,
+        *,
+        cell: CellConfig,
+        theta: ThetaConfig,
+        search: SearchConfig,
+        held_out_share: float,
+        seed: int,
+        state: Path | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            recording: the pushes.
+            cell: how the pushes are simulated.
+            theta: what is unknown.
+            search: how it is searched for.
+            held_out_share: of the pushes that are not fitted.
+            seed: of everything random.
+            state: a file in which the search's belief is kept, to go on from.
+            progress: told stage, steps done, steps in all.
+        """
+        solid = solid_of(recording.object.shape)
+        self.recording = recording
+        self.noise = noise_of(recording)
+        self.problems = problems_of(recording, self.noise, solid.height)
+        self.thetas = theta_map(
+            recording.object, solid.outline, (cell.friction_cells[0], cell.friction_cells[1]), theta,
+            cell.default_mass_kg,
+        )  # fmt: skip
+        self._config = search
+        self.pool = RolloutPool(spec_of(recording, cell), self.thetas, jobs=search.jobs)
+        self._streams = np.random.SeedSequence(seed).spawn(2)
+        train, held = split_pushes(len(self.problems), held_out_share, np.random.default_rng(self._streams[0]))
+        self.training = [self.problems[i] for i in train]
+        self.held_out = [self.problems[i] for i in held]
+        self._state = state
+        self._progress = progress or (lambda stage, done, total: None)
+
+    def run(self) -> Identification:
+        """Search, polish, score."""
+        found = self.search()
+        start = found.theta_best if np.isfinite(found.error_best) else self.thetas.space.nominal
+        polisher = Polisher(
+            self.pool, self.training, self.noise, FIRST_SCATTER, tick=lambda what: self._progress(what, 0, 0)
+        )
+        return self._identification(found, polisher.run(start))
+
+    def search(self) -> SearchResult:
+        """Greedy entropy search over a candidate set."""
+        rng = np.random.default_rng(self._streams[1])
+        space, config = self.thetas.space, self._config
+        candidates = space.sample(rng, config.candidates, from_prior=True)
+        resume = self._saved_belief(candidates)
+
+        def keep(belief: Belief) -> None:
+            if self._state is not None:
+                # Written beside and renamed, so that an interrupt leaves the last whole one.
+                part = self._state.with_suffix(".part")
+                belief.to_npz(part)
+                part.replace(self._state)
+            self._progress("greedy entropy search", belief.n_trials, config.budget)
+
+        return search_minimum(
+            self._objective, space, candidates, GreedyEntropySearch(), budget=config.budget, rng=rng,
+            batch=config.batch, entropy_tolerance=config.entropy_tolerance_nats, patience=config.patience,
+            on_trial=keep, resume_from=resume,
+        )  # fmt: skip
+
+    def _saved_belief(self, candidates: Array) -> Belief | None:
+        """The belief of an interrupted run of the same search; another one's is not taken."""
+        if self._state is None or not self._state.exists():
+            return None
+        belief = Belief.from_npz(self._state)
+        same = belief.candidates.shape == candidates.shape and np.array_equal(belief.candidates, candidates)
+        return belief if same else None
+
+    def _objective(self, thetas: Array) -> Array:
+        """Log of the rms misfit in standard deviations (k,): its minimum is the misfit's, and it spans decades."""
+        tasks = [self._task(problem, theta) for theta in thetas for problem in self.training]
+        predictions = self.pool.run(tasks)
+        count = len(self.training)
+        errors = []
+        for k in range(len(thetas)):
+            part = predictions[k * count : (k + 1) * count]
+            errors.append(self._error(part))
+        return np.array(errors)
+
+    def _error(self, predictions: Sequence[Prediction | None]) -> float:
+        if any(p is None for p in predictions):
+            return float("inf")
+        squares = [
+            whitened_residual(problem, self.noise, p) ** 2
+            for problem, p in zip(self.training, predictions, strict=True)
+            if p is not None
+        ]
+        return float(0.5 * np.log(np.mean(np.concatenate(squares))))
+
+    def _task(self, problem: PushProblem, theta: Array) -> Task:
+        nuisance = nuisance_of(problem, FIRST_SCATTER)
+        return Task(problem=problem, theta=theta, nuisance=nuisance, values=np.zeros(len(nuisance.names)))
+
+    def accuracy(self, problems: Sequence[PushProblem], theta: Array) -> Accuracy:
+        """How well theta (d,) predicts some pushes."""
+        predictions = self.pool.run([self._task(problem, theta) for problem in problems])
+        pairs = [(p, r) for p, r in zip(problems, predictions, strict=True) if r is not None]
+        return _accuracy(pairs, self.noise, len(problems) - len(pairs))
+
+    def _identification(self, found: SearchResult, polished: Polished) -> Identification:
+        theta = polished.theta
+        self._progress("held-out pushes", 0, 0)
+        held = self.held_out
+        degrees = max(1, polished.samples - self.thetas.space.dimension)
+        return Identification(
+            thetas=self.thetas,
+            theta=theta,
+            estimates=estimates_of(self.thetas, polished, degrees),
+            noise=self.noise,
+            search=found,
+            polished=polished,
+            reduced_chi2=polished.chi2 / degrees,
+            training=tuple(p.name for p in self.training),
+            held_out=tuple(p.name for p in held),
+            before=self.accuracy(held, self.thetas.space.nominal) if held else None,
+            after=self.accuracy(held, theta) if held else None,
+            fitted=self.accuracy(self.training, theta),
+        )
+
+
+def estimates_of(thetas: ThetaMap, polished: Polished, degrees: int) -> tuple[Estimate, ...]:
+    """Intervals from the curvature of the cost; widened where the fit is worse than the noise.
+
+    Source: G. A. F. Seber and C. J. Wild, Nonlinear Regression, 1989, section 5.1 (linearised intervals).
+    """
+    space = thetas.space
+    d = space.dimension
+    # Parameters without a prior of their own count as uniform over their bounds: 1/12 of the cube's side squared.
+    flat = np.array([0.0 if p.prior_std is not None else 12.0 for p in space.parameters])
+    information = polished.jacobian.T @ polished.jacobian + np.diag(flat)
+    inflation = max(1.0, polished.chi2 / degrees)
+    prior_rows = polished.jacobian[-d:]
+    prior_information = prior_rows.T @ prior_rows + np.diag(flat)
+    spread = np.sqrt(np.diag(np.linalg.inv(information)) * inflation)
+    prior_spread = np.sqrt(np.diag(np.linalg.inv(prior_information)))
+    u = np.asarray(space.to_unit(polished.theta))
+    z = float(stats.norm.ppf(0.95))
+    result = []
+    for j, parameter in enumerate(space.parameters):
+        ends = []
+        for sign in (-1.0, 1.0):
+            point = u.copy()
+            point[j] = np.clip(u[j] + sign * z * min(spread[j], prior_spread[j]), 0.0, 1.0)
+            ends.append(float(space.from_unit(point)[j]))
+        result.append(
+            Estimate(
+                name=parameter.name,
+                unit=parameter.unit,
+                value=float(polished.theta[j]),
+                ci90=(ends[0], ends[1]),
+                identifiable=bool(spread[j] < IDENTIFIABLE * prior_spread[j]),
+                prior=parameter.prior_mean,
+            )  # fmt: skip
+        )
+    return tuple(result)
+
+
+def _accuracy(pairs: list[tuple[PushProblem, Prediction]], noise: Noise, diverged: int) -> Accuracy:
+    errors = [r.poses - p.poses for p, r in pairs]
+    every, last = np.concatenate(errors), np.array([e[-1] for e in errors])
+    forces = np.concatenate([r.forces - p.forces for p, r in pairs])
+    whitened = np.concatenate([whitened_residual(p, noise, r) for p, r in pairs])
+    return Accuracy(
+        position=_rms(every[:, :2]) * np.sqrt(2.0),
+        rotation=_rms(every[:, 2]),
+        end_position=_rms(last[:, :2]) * np.sqrt(2.0),
+        end_rotation=_rms(last[:, 2]),
+        force=_rms(forces) * np.sqrt(2.0) if len(forces) else None,
+        sigmas=_rms(whitened),
+        diverged=diverged,
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")

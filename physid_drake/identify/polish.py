@@ -1,0 +1,196 @@
+"""Least squares on the whitened residuals: what the candidate grid of the search leaves over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from physid_drake.identify.misfit import Whitener, model_error_columns, whitened_residual
+from physid_drake.identify.nuisance import Nuisance, nuisance_of
+from physid_drake.identify.problem import Noise, PushProblem
+from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
+
+Array = NDArray[np.float64]
+
+THETA_STEP = 0.004  # of the unit cube, for differences; rollouts are repeatable to the bit, so small is safe
+NUISANCE_STEP = 0.5  # of the prior standard deviation
+ROUNDS = 2  # of linearising the pushes' own unknowns
+LARGEST_SCATTER = 0.2
+SMALLEST_SCATTER = 2e-3
+FAILED = 1e3  # standard deviations: residual of a rollout that diverged
+SCATTER_PUSHES = 4  # fewer pushes than this do not tell their scatter
+
+
+@dataclass(frozen=True, kw_only=True)
+class Polished:
+    """The fit.
+
+    Attributes:
+        theta: (d,).
+        jacobian: (m, d) of all whitened residuals and priors with respect to the unit cube.
+        chi2: cost of the residuals and the pushes' unknowns, without theta's prior.
+        samples: number of residuals.
+        friction_scatter: from push to push [-].
+        residuals: one per push, marginal (m_i,).
+        unknowns: per push, name to value in its unit.
+        rollouts: made.
+    """
+
+    theta: Array
+    jacobian: Array
+    chi2: float
+    samples: int
+    friction_scatter: float
+    residuals: tuple[Array, ...]
+    unknowns: tuple[dict[str, float], ...]
+    rollouts: int
+
+
+class Polisher:
+    """Alternates: linearise the pushes' own unknowns, then fit theta with them marginalised."""
+
+    def __init__(
+        self,
+        pool: RolloutPool,
+        problems: Sequence[PushProblem],
+        noise: Noise,
+        scatter: float,
+        tick: Callable[[str], None] | None = None,
+    ) -> None:
+        self._pool, self._problems, self._noise = pool, problems, noise
+        self._scatter = scatter
+        self._tick = tick or (lambda _: None)
+        self._space = pool.thetas.space
+
+    def run(self, theta: Array) -> Polished:
+        """Fit from a start theta (d,)."""
+        before = self._pool.count
+        self._tick("the pushes' own unknowns")
+        whiteners = self._linearise(theta)
+        for round_ in range(ROUNDS):
+            self._tick(f"least squares, round {round_ + 1} of {ROUNDS}")
+            theta = self._fit(theta, whiteners)
+            whiteners = self._linearise(theta)
+            self._scatter = self._new_scatter(theta, whiteners)
+        return self._result(theta, whiteners, self._pool.count - before)
+
+    def _nuisances(self) -> list[Nuisance]:
+        return [nuisance_of(problem, self._scatter) for problem in self._problems]
+
+    def _residual_of(self, problem: PushProblem, prediction: Prediction | None) -> Array:
+        if prediction is None:
+            return np.full(3 * len(problem.times) + 2 * len(problem.force_times), FAILED)
+        return whitened_residual(problem, self._noise, prediction)
+
+    def _residuals(self, theta: Array) -> list[Array]:
+        tasks = [
+            Task(problem=p, theta=theta, nuisance=n, values=np.zeros(len(n.names)))
+            for p, n in zip(self._problems, self._nuisances(), strict=True)
+        ]
+        return [self._residual_of(t.problem, r) for t, r in zip(tasks, self._pool.run(tasks), strict=True)]
+
+    def _linearise(self, theta: Array) -> list[Whitener]:
+        """Jacobians of each push with respect to its own unknowns, by one extra rollout per unknown."""
+        nuisances = self._nuisances()
+        tasks, owners = [], []
+        for i, (problem, nuisance) in enumerate(zip(self._problems, nuisances, strict=True)):
+            steps = [np.zeros(len(nuisance.names)), *(NUISANCE_STEP * np.diag(nuisance.stds))]
+            tasks += [Task(problem=problem, theta=theta, nuisance=nuisance, values=step) for step in steps]
+            owners += [i] * len(steps)
+        rows: list[list[Array]] = [[] for _ in self._problems]
+        for i, task, prediction in zip(owners, tasks, self._pool.run(tasks), strict=True):
+            rows[i].append(self._residual_of(task.problem, prediction))
+        return [self._whitener(problem, stack) for problem, stack in zip(self._problems, rows, strict=True)]
+
+    def _whitener(self, problem: PushProblem, stack: list[Array]) -> Whitener:
+        columns = (np.array(stack[1:]) - stack[0]).T / NUISANCE_STEP
+        touched = _first_motion(problem)
+        return Whitener.of(np.column_stack([columns, model_error_columns(problem, self._noise, touched)]))
+
+    def _fit(self, theta: Array, whiteners: list[Whitener]) -> Array:
+        space = self._space
+
+        def cost(u: Array) -> Array:
+            point = space.from_unit(u)
+            marginal = [w.apply(r) for w, r in zip(whiteners, self._residuals(point), strict=True)]
+            return np.concatenate([*marginal, np.asarray(space.prior_whitened(point))])
+
+        def slope(u: Array) -> Array:
+            return self._jacobian(u, whiteners)
+
+        found = least_squares(
+            cost, np.clip(space.to_unit(theta), 1e-6, 1.0 - 1e-6),
+            jac=slope, bounds=(0.0, 1.0), x_scale=0.1,
+            max_nfev=12, xtol=1e-5, ftol=1e-6,
+        )  # fmt: skip
+        theta_hat: Array = space.from_unit(found.x)
+        return theta_hat
+
+    def _jacobian(self, u: Array, whiteners: list[Whitener]) -> Array:
+        """Central differences of all marginal residuals with respect to the unit cube."""
+        nuisances = self._nuisances()
+        points = []
+        for j in range(len(u)):
+            low, high = u.copy(), u.copy()
+            low[j], high[j] = max(0.0, u[j] - THETA_STEP), min(1.0, u[j] + THETA_STEP)
+            points += [low, high]
+        tasks = [
+            Task(problem=p, theta=self._space.from_unit(point), nuisance=n, values=np.zeros(len(n.names)))
+            for point in points
+            for p, n in zip(self._problems, nuisances, strict=True)
+        ]
+        predictions = self._pool.run(tasks)
+        count = len(self._problems)
+        rows = []
+        for k, point in enumerate(points):
+            part = predictions[k * count : (k + 1) * count]
+            marginal = [
+                w.apply(self._residual_of(p, r)) for w, p, r in zip(whiteners, self._problems, part, strict=True)
+            ]
+            rows.append(
+                np.concatenate([*marginal, np.asarray(self._space.prior_whitened(self._space.from_unit(point)))])
+            )
+        columns = [(rows[2 * j + 1] - rows[2 * j]) / (points[2 * j + 1][j] - points[2 * j][j]) for j in range(len(u))]
+        return np.column_stack(columns)
+
+    def _new_scatter(self, theta: Array, whiteners: list[Whitener]) -> float:
+        """One step of expectation-maximisation for the scatter of friction from push to push."""
+        if len(self._problems) < SCATTER_PUSHES:
+            return self._scatter
+        second = []
+        for nuisance, whitener, residual in zip(self._nuisances(), whiteners, self._residuals(theta), strict=True):
+            k = nuisance.index("friction")
+            second.append(whitener.unknowns(residual)[k] ** 2 + whitener.variances()[k])
+        scatter = self._scatter * float(np.sqrt(np.mean(second)))
+        return float(np.clip(scatter, SMALLEST_SCATTER, LARGEST_SCATTER))
+
+    def _result(self, theta: Array, whiteners: list[Whitener], rollouts: int) -> Polished:
+        residuals = self._residuals(theta)
+        marginal = [w.apply(r) for w, r in zip(whiteners, residuals, strict=True)]
+        unknowns = []
+        for nuisance, whitener, residual in zip(self._nuisances(), whiteners, residuals, strict=True):
+            values = whitener.unknowns(residual)[: len(nuisance.names)] * nuisance.stds
+            unknowns.append(dict(zip(nuisance.names, values.tolist(), strict=True)))
+        return Polished(
+            theta=theta,
+            jacobian=self._jacobian(np.asarray(self._space.to_unit(theta)), whiteners),
+            chi2=float(sum((m**2).sum() for m in marginal)),
+            samples=sum(len(r) for r in residuals),
+            friction_scatter=self._scatter,
+            residuals=tuple(marginal),
+            unknowns=tuple(unknowns),
+            rollouts=rollouts,
+        )
+
+
+def _first_motion(problem: PushProblem) -> float:
+    """Roughly when the object starts to move: the model error begins there [s]."""
+    if len(problem.times) < 3:
+        return problem.begin
+    moved = np.linalg.norm(problem.poses[:, :2] - problem.poses[0, :2], axis=1)
+    beyond = np.flatnonzero(moved > 0.05 * float(moved.max(initial=0.0)))
+    return float(problem.times[max(0, beyond[0] - 1)]) if len(beyond) else problem.begin

@@ -1,0 +1,246 @@
+"""A recorded push as the fit sees it: what is simulated, what it is compared with, how well it was measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.cell import CellConfig, HandPath, Start
+from physid_drake.cell.hand_path import fit_hand_path, stream_std
+from physid_drake.errors import RecordingError
+from physid_drake.recording import Cylinder as CylinderShape
+from physid_drake.recording import Hand, NoiseEstimate, Push, Recording, Shape, estimate_noise, rest_segments
+
+Array = NDArray[np.float64]
+
+FORCE_BIN = 0.1  # s: forces are compared as means over such windows; single samples of a stiff contact chatter
+FORCE_SHARE = 0.05  # of the force: how well a rigid-body contact force is expected to be predicted
+DEFAULT_POSITION_STD = 5e-4  # m, where neither stated nor seen
+DEFAULT_ROTATION_STD = 5e-3  # rad
+DEFAULT_HAND_STD = 1e-4  # m
+DEFAULT_FORCE_STD = 0.05  # N
+LARGEST_CORRELATION = 0.98
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """Noise of one sample: standard deviations and correlation from sample to sample.
+
+    Attributes:
+        position: of the object's x and y [m].
+        rotation: of its yaw [rad].
+        hand: of the hand's x and y [m].
+        force: of a force component [N].
+        correlation: of position and rotation noise between neighbouring samples [-].
+        source: where each figure comes from: ``stated``, ``seen`` or ``assumed``.
+    """
+
+    position: float
+    rotation: float
+    hand: float
+    force: float
+    correlation: float
+    source: dict[str, str]
+
+    @property
+    def sigmas(self) -> Array:
+        """Standard deviations (3,) of x, y, yaw [m, m, rad]."""
+        return np.array([self.position, self.position, self.rotation])
+
+
+def noise_of(recording: Recording) -> Noise:
+    """The recording's noise: what its sensors state, else what is seen at rest, else an assumption."""
+    seen: NoiseEstimate = estimate_noise(recording)
+    stated = recording.sensors
+    source: dict[str, str] = {}
+
+    def choose(name: str, said: float | None, estimate: float | None, assumed: float, floor: float) -> float:
+        if said is not None:
+            source[name] = "stated"
+            return said
+        if estimate is not None and estimate > floor:
+            source[name] = "seen"
+            return estimate
+        source[name] = "assumed"
+        return assumed
+
+    correlations = [c for c in (seen.position_autocorrelation, seen.rotation_autocorrelation) if c is not None]
+    return Noise(
+        position=choose("position", stated.object_position_std, seen.object_position_std, DEFAULT_POSITION_STD, 1e-6),
+        rotation=choose("rotation", stated.object_rotation_std, seen.object_rotation_std, DEFAULT_ROTATION_STD, 1e-6),
+        hand=choose("hand", stated.hand_position_std, _hand_std(recording), DEFAULT_HAND_STD, 1e-7),
+        force=choose("force", stated.force_std, seen.force_std, DEFAULT_FORCE_STD, 1e-4),
+        correlation=float(np.clip(np.mean(correlations), 0.0, LARGEST_CORRELATION)) if correlations else 0.0,
+        source=source,
+    )
+
+
+def _hand_std(recording: Recording) -> float | None:
+    """Noise of the hand's stream, also where it creeps so slowly that it looks at rest [m]."""
+    streams = [
+        push.hand.positions[:, :2] for push in recording.pushes if push.hand is not None and len(push.hand) > 6
+    ]
+    return float(np.median([stream_std(positions) for positions in streams])) if streams else None
+
+
+@dataclass(frozen=True, kw_only=True)
+class PushProblem:
+    """One push, ready to be simulated and compared.
+
+    Attributes:
+        name: the push's.
+        begin, end: times [s].
+        start: state at ``begin``.
+        start_std: (3,) of the start pose [m, m, rad]; (6,) with the velocity where nothing pushes.
+        path: the hand's; None without a hand.
+        hand_height: of the contact above the table [m].
+        times: (n,) of the compared poses [s].
+        poses: (n, 3) recorded x, y, yaw.
+        force_times: (k,) middles of the force windows [s].
+        forces: (k, 2) recorded mean forces on the object, x and y of W [N].
+        force_std: (k,) of each [N].
+    """
+
+    name: str
+    begin: float
+    end: float
+    start: Start
+    start_std: Array
+    path: HandPath | None
+    hand_height: float
+    times: Array
+    poses: Array
+    force_times: Array
+    forces: Array
+    force_std: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class CellSpec:
+    """What a worker needs to build the cell."""
+
+    shape: Shape
+    hand_radius: float | None
+    config: CellConfig
+
+
+def spec_of(recording: Recording, config: CellConfig) -> CellSpec:
+    """The cell of a recording."""
+    return CellSpec(
+        shape=recording.object.shape,
+        hand_radius=None if recording.hand is None else recording.hand.radius,
+        config=config,
+    )
+
+
+def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[PushProblem, ...]:
+    """All pushes of a recording.
+
+    Args:
+        recording: the recording.
+        noise: its noise.
+        height: of the object [m].
+
+    Raises:
+        RecordingError: if the hand passes above the object or an object cannot be compared.
+    """
+    return tuple(_problem(recording, push, noise, height) for push in recording.pushes)
+
+
+def _problem(recording: Recording, push: Push, noise: Noise, height: float) -> PushProblem:
+    planar = push.object.planar
+    path = None
+    if push.hand is not None:
+        path = fit_hand_path(push.hand.times, push.hand.positions[:, :2], noise.hand)
+    start, start_std, first = _start_of(push, planar, noise, free=path is None)
+    begin = float(push.object.times[0] if first == 0 else push.object.times[first])
+    compared = (
+        np.arange(len(planar)) > first if push.endpoint_only or path is None else np.ones(len(planar), dtype=bool)
+    )
+    force_times, forces, force_std = _force_windows(push, noise)
+    return PushProblem(
+        name=push.name,
+        begin=begin,
+        end=push.end_time,
+        start=start,
+        start_std=start_std,
+        path=path,
+        hand_height=_contact_height(recording, push, height),
+        times=push.object.times[compared].copy(),
+        poses=planar[compared].copy(),
+        force_times=force_times,
+        forces=forces,
+        force_std=force_std,
+    )
+
+
+def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[Start, Array, int]:
+    """Start pose from the rest before the motion, or pose and velocity of a free motion from its first samples."""
+    sigmas = noise.sigmas
+    if free:
+        return _moving_start(push, planar, sigmas)
+    rests = rest_segments(push)
+    if rests and rests[0].start == 0:
+        still = planar[rests[0]]
+        independent = max(1.0, len(still) * (1.0 - noise.correlation) / (1.0 + noise.correlation))
+        pose = still.mean(axis=0)
+        return Start(pose=_triple(pose)), sigmas / np.sqrt(independent), 0
+    return Start(pose=_triple(planar[0])), sigmas.copy(), 0
+
+
+def _moving_start(push: Push, planar: Array, sigmas: Array) -> tuple[Start, Array, int]:
+    times = push.object.times
+    n = int(min(len(times), max(3, np.searchsorted(times, times[0] + 0.08))))
+    if n < 3:
+        raise RecordingError(
+            f"push '{push.name}': without a hand, at least 3 poses are needed to know the start velocity, but got {n}."
+        )
+    t = times[:n] - times[0]
+    design = np.column_stack([np.ones(n), t, 0.5 * t**2])
+    coefficients, *_ = np.linalg.lstsq(design, planar[:n], rcond=None)
+    spread = np.sqrt(np.diag(np.linalg.pinv(design.T @ design)))
+    std = np.concatenate([spread[0] * sigmas, spread[1] * sigmas])
+    return Start(pose=_triple(coefficients[0]), velocity=_triple(coefficients[1])), std, 0
+
+
+def _triple(values: Array) -> tuple[float, float, float]:
+    return float(values[0]), float(values[1]), float(values[2])
+
+
+def _contact_height(recording: Recording, push: Push, height: float) -> float:
+    """Middle of the heights that tip and object share: there a sphere is an upright tip without ambiguity."""
+    hand = recording.hand
+    if hand is None or push.hand is None:
+        return 0.5 * height
+    shape = recording.object.shape
+    if isinstance(shape, CylinderShape) and shape.axis == "y":
+        return shape.radius
+    centre = float(np.median(push.hand.positions[:, 2]))
+    reach = _vertical_reach(hand)
+    low, high = max(0.0, centre - reach), min(height, centre + reach)
+    if low >= height or high <= 0.0:
+        raise RecordingError(
+            f"push '{push.name}': the hand at z = {centre:.3f} m passes the object, which is {height:.3f} m high;"
+            " correct hand_z_m or the object's size."
+        )
+    return 0.5 * (low + high)
+
+
+def _vertical_reach(hand: Hand) -> float:
+    """Half the height over which the tip is as wide as its radius [m]."""
+    return 0.5 * hand.length if hand.length is not None else 0.0
+
+
+def _force_windows(push: Push, noise: Noise) -> tuple[Array, Array, Array]:
+    if push.force is None:
+        return np.zeros(0), np.zeros((0, 2)), np.zeros(0)
+    times, forces = push.force.times, push.force.forces[:, :2]
+    index = np.floor((times - times[0]) / FORCE_BIN).astype(np.intp)
+    kept = [k for k in np.unique(index) if np.count_nonzero(index == k) >= 2]
+    middle = np.array([times[index == k].mean() for k in kept])
+    mean = np.array([forces[index == k].mean(axis=0) for k in kept]).reshape(-1, 2)
+    count = np.array([np.count_nonzero(index == k) for k in kept])
+    largest = float(np.linalg.norm(mean, axis=1).max(initial=0.0))
+    return middle, mean, np.sqrt(noise.force**2 / count + (FORCE_SHARE * largest) ** 2)

@@ -1,0 +1,165 @@
+"""Theta: the cell's unknowns as a parameter space, and the way from a point in it to a physical body."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.cell import Body
+from physid_drake.cell.outline import Outline
+from physid_drake.errors import ConfigError
+from physid_drake.recording import ObjectModel
+from physid_drake.space import Parameter, ParameterSpace
+
+Array = NDArray[np.float64]
+
+PLAIN = ("mass", "hand_friction", "support_friction")
+OPTIONAL = ("com_x", "com_y", "inertia_ratio", "static_ratio", "restitution")
+
+
+@dc.dataclass
+class ThetaConfig:
+    """Which parameters are unknown, and their bounds.
+
+    Attributes:
+        parameters: names out of ``mass``, ``hand_friction``, ``support_friction``, ``com_x``, ``com_y``,
+            ``inertia_ratio``, ``static_ratio``, ``restitution``.
+        bounds: ``[lower, upper]`` per name, in SI units, instead of the defaults.
+        nominal: start values per name, instead of the defaults.
+    """
+
+    parameters: list[str] = dc.field(default_factory=lambda: list(PLAIN))
+    bounds: dict[str, list[float]] = dc.field(default_factory=dict)
+    nominal: dict[str, float] = dc.field(default_factory=dict)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class ThetaMap:
+    """A parameter space with the values of what is not in it.
+
+    Attributes:
+        space: the unknowns.
+        nominal: every physical parameter's value where the space does not hold it.
+        cells: ``(nx, ny)`` friction cells.
+    """
+
+    space: ParameterSpace
+    nominal: dict[str, float]
+    cells: tuple[int, int]
+
+    def body(self, theta: Array, *, friction_scale: float = 1.0, restitution: float = 0.0) -> Body:
+        """The body that theta (d,) describes.
+
+        Args:
+            theta: a point of the space.
+            friction_scale: this push's support friction over that of theta [-].
+            restitution: added to theta's [-].
+        """
+        values = {**self.nominal, **self.space.as_dict(theta)}
+        frictions = np.array([values[name] for name in friction_names(self.cells)])
+        return Body(
+            mass=values["mass"],
+            p_BBcm=np.array([values["com_x"], values["com_y"]]),
+            inertia_ratio=values["inertia_ratio"],
+            hand_friction=values["hand_friction"],
+            support_friction=frictions * friction_scale,
+            static_ratio=values["static_ratio"],
+            restitution=min(1.0, max(0.0, values["restitution"] + restitution)),
+        )
+
+
+def friction_names(cells: tuple[int, int]) -> list[str]:
+    """Parameter names of the friction cells: ``support_friction``, or ``support_friction_i_j`` on a grid."""
+    if cells == (1, 1):
+        return ["support_friction"]
+    return [f"support_friction_{i}_{j}" for i in range(cells[0]) for j in range(cells[1])]
+
+
+def theta_map(
+    model: ObjectModel, outline: Outline, cells: tuple[int, int], config: ThetaConfig, default_mass: float
+) -> ThetaMap:
+    """The parameter space of a recording's object.
+
+    Args:
+        model: the recorded object; a mass that a scale gave is its prior.
+        outline: of the object, which bounds its centre of mass.
+        cells: friction cells.
+        config: the choice of parameters.
+        default_mass: nominal mass where the recording gives none [kg].
+
+    Raises:
+        ConfigError: if a name is unknown or bounds are not a pair.
+    """
+    known = _catalogue(model, outline, cells, default_mass)
+    for name in [*config.parameters, *config.bounds, *config.nominal]:
+        if name not in known and name != "support_friction":
+            raise ConfigError(f"theta: there is no parameter '{name}'; known are {', '.join(known)}.")
+    wanted = [
+        n for name in config.parameters for n in (friction_names(cells) if name == "support_friction" else [name])
+    ]
+    chosen = tuple(_adjusted(known[name], config) for name in dict.fromkeys(wanted))
+    nominal = {name: _adjusted(parameter, config).prior_mean for name, parameter in known.items()}
+    return ThetaMap(space=ParameterSpace(parameters=chosen), nominal=nominal, cells=cells)
+
+
+def _adjusted(parameter: Parameter, config: ThetaConfig) -> Parameter:
+    family = "support_friction" if parameter.name.startswith("support_friction") else parameter.name
+    bounds = config.bounds.get(parameter.name, config.bounds.get(family))
+    nominal = config.nominal.get(parameter.name, config.nominal.get(family))
+    if bounds is not None:
+        if len(bounds) != 2:
+            raise ConfigError(f"theta.bounds.{family}: needs [lower, upper], but got {bounds}.")
+        lower, upper = float(bounds[0]), float(bounds[1])
+        middle = min(max(parameter.prior_mean, lower), upper)
+        parameter = dc.replace(parameter, lower=lower, upper=upper, prior_mean=middle)
+    if nominal is not None:
+        parameter = dc.replace(parameter, prior_mean=float(nominal))
+    return parameter
+
+
+def _catalogue(
+    model: ObjectModel, outline: Outline, cells: tuple[int, int], default_mass: float
+) -> dict[str, Parameter]:
+    x0, y0, x1, y1 = outline.extent()
+    friction = [
+        Parameter(
+            name=name, unit="-", lower=0.02, upper=1.2, prior_mean=0.3, scale="log",
+            description="kinetic friction between object and table",
+        )
+        for name in friction_names(cells)
+    ]  # fmt: skip
+    hand = Parameter(
+        name="hand_friction", unit="-", lower=0.02, upper=1.2, prior_mean=0.3, scale="log",
+        description="friction between the hand's tip and the object",
+    )  # fmt: skip
+    com = [
+        Parameter(
+            name=name, unit="m", lower=0.6 * low, upper=0.6 * high, prior_mean=0.0, prior_std=0.1 * (high - low),
+            description=f"centre of mass along {name[-1]} of the object",
+        )
+        for name, low, high in (("com_x", x0, x1), ("com_y", y0, y1))
+    ]  # fmt: skip
+    rest = [
+        Parameter(name="inertia_ratio", unit="-", lower=0.3, upper=2.5, prior_mean=1.0, prior_std=0.3, scale="log",
+                  description="inertia over that of uniform density"),
+        Parameter(name="static_ratio", unit="-", lower=1.0, upper=2.0, prior_mean=1.0,
+                  description="static over kinetic friction with the table"),
+        Parameter(name="restitution", unit="-", lower=0.0, upper=0.9, prior_mean=0.0,
+                  description="restitution between hand and object"),
+    ]  # fmt: skip
+    everything = [_mass(model, default_mass), hand, *friction, *com, *rest]
+    return {parameter.name: parameter for parameter in everything}
+
+
+def _mass(model: ObjectModel, default: float) -> Parameter:
+    """A weighed mass is known to its standard deviation; else the paper's bounds of 0.1 to 0.9 kg, or around it."""
+    if model.mass is not None and model.mass_std is not None:
+        share = model.mass_std / model.mass
+        reach = max(1.1, math.exp(6.0 * share))
+        return Parameter(name="mass", unit="kg", lower=model.mass / reach, upper=model.mass * reach,
+                         prior_mean=model.mass, prior_std=share, scale="log", description="mass")  # fmt: skip
+    return Parameter(name="mass", unit="kg", lower=min(0.1, 0.5 * default), upper=max(0.9, 2.0 * default),
+                     prior_mean=default, scale="log", description="mass")  # fmt: skip

@@ -1,0 +1,141 @@
+"""The Drake cell against the independent planar reference, with the true parameters and the exact hand path.
+
+What the simulator cannot reproduce would be blamed on physics, so its error must be below half of the
+tracker's noise (0.3 mm and 3 mrad), in rms over x, y and yaw of all samples of all pushes.
+"""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from reference.scenes import OBJECTS, Theta, draw_push, draw_theta, simulate, sixty_pushes
+from twin import MODELS, body_of, cell_of, parting, path_of, rms, twin
+
+from physid_drake.cell import Outcome, Start
+
+WANTED = 0.5  # sigma
+REFERENCE_STEP = 5e-5  # s; 2e-5 differs by 0.004 sigma
+
+both_models = pytest.mark.parametrize("model", MODELS)
+
+
+@cache
+def drawn(kind, seed):
+    """Pushes and their reference motions."""
+    pushes = {"sixty": sixty, "triangle": triangles, "uneven": uneven}[kind](seed)
+    return [(*push, simulate(*push, time_step=REFERENCE_STEP)) for push in pushes]
+
+
+def sixty(seed):
+    return sixty_pushes(seed)
+
+
+def triangles(seed):
+    rngs = [np.random.default_rng([seed, 1000 + k]) for k in range(16)]
+    body = OBJECTS["triangle"]
+    return [(body, draw_theta(rng, body), draw_push(rng, body)) for rng in rngs]
+
+
+def uneven(seed):
+    """Low objects with a centre of mass up to a fifth of the half width off, and inertia 0.7 to 1.3 of uniform."""
+    pushes = []
+    for k, name in enumerate(("eraser", "box", "book", "can") * 4):
+        rng, body = np.random.default_rng([seed, 2000 + k]), OBJECTS[name]
+        theta, push = draw_theta(rng, body), draw_push(rng, body)
+        reach = 0.2 * (np.full(2, body.radius) if body.polygon is None else np.ptp(body.polygon, axis=0) / 2)
+        com = tuple(float(c) for c in rng.uniform(-reach, reach))
+        pushes.append((body, replace(theta, com_offset=com, inertia_ratio=float(rng.uniform(0.7, 1.3))), push))
+    return pushes
+
+
+def errors(kind, seed, model, solver=(), pick=slice(None)):
+    """Differences in sigma, one array (n, 3) per push."""
+    series = []
+    for body, theta, push, want in drawn(kind, seed)[pick]:
+        motion = twin(body, theta, push, want.times[-1], model, solver)
+        assert motion.outcome is Outcome.COMPLETED
+        series.append(parting(motion, want.times, want.poses))
+    return series
+
+
+@both_models
+def test_sixty_pushes_are_followed_within_half_a_sigma(model):
+    series = errors("sixty", 0, model)
+    # Measured: 0.362 (point), 0.415 (hydroelastic); median push 0.25, worst 1.10 and 1.76 (a bottle).
+    assert rms(np.concatenate(series)) < WANTED
+    assert np.median([rms(s) for s in series]) < 0.35
+    assert max(rms(s) for s in series) < 2.5
+
+
+@both_models
+def test_other_pushes_are_followed_within_half_a_sigma(model):
+    # Measured on the first twenty of seed 1: SEED1 below.
+    assert rms(np.concatenate(errors("sixty", 1, model, pick=slice(20)))) < WANTED
+
+
+@both_models
+def test_pushes_that_nearly_topple_a_bottle_are_followed(model):
+    # Seed 1, push 42: friction 0.24 of a bottle that tips at 0.33; a fifth of the samples has part of the base lifted.
+    (series,) = errors("sixty", 1, model, pick=slice(42, 43))
+    assert rms(series) < 2.5
+
+
+@both_models
+def test_a_prism_is_followed_within_half_a_sigma(model):
+    assert rms(np.concatenate(errors("triangle", 0, model))) < WANTED
+
+
+@both_models
+def test_an_object_of_uneven_density_is_followed_within_half_a_sigma(model):
+    assert rms(np.concatenate(errors("uneven", 0, model))) < WANTED
+
+
+@pytest.mark.parametrize("remedy", ["impact_law", "drift_feedforward"])
+def test_each_remedy_matters(remedy):
+    pick = slice(30)
+    with_it = rms(np.concatenate(errors("sixty", 0, "point", pick=pick)))
+    without = rms(np.concatenate(errors("sixty", 0, "point", ((remedy, False),), pick=pick)))
+    # Measured on all sixty: 0.36 with both; 58.5 without the impact law, 2.79 without the feed-forward of drift.
+    assert without > 2 * with_it
+
+
+@both_models
+def test_restitution_is_the_references(model):
+    rng = np.random.default_rng(8)
+    body = OBJECTS["box"]
+    push = draw_push(rng, body, speed=0.3, offset=0.2, heading=0.1, push_time=0.02, pose=(0.0, 0.0, 0.0))
+    theta = Theta(support_friction=0.3, hand_friction=0.3, restitution=0.3)
+    want = simulate(body, theta, push, time_step=REFERENCE_STEP)
+    motion = twin(body, theta, push, want.times[-1], model)
+    flat = twin(body, replace(theta, restitution=0.0), push, want.times[-1], model)
+    assert rms(parting(flat, want.times, want.poses)) > 5  # it does matter
+    assert rms(parting(motion, want.times, want.poses)) < 1.0
+
+
+@pytest.mark.parametrize("name", ["box", "can"])
+@both_models
+def test_the_hand_follows_its_path(model, name):
+    push = draw_push(np.random.default_rng(3), OBJECTS[name], pose=(0, 0, 0), speed=0.5, offset=0.3, tip_radius=0.01)
+    path, cell = path_of(push), cell_of(name, model, push.tip_radius)
+    plant, seen = cell.scene.plant, []
+    x, y, _ = cell.scene.joints
+
+    def watch(root):
+        context = plant.GetMyContextFromRoot(root)
+        seen.append((root.get_time(), x.get_translation(context), y.get_translation(context)))
+
+    cell.simulator.set_monitor(watch)  # called after each of Drake's steps, before the rollout overwrites
+    try:
+        motion = cell.rollout(
+            body_of(OBJECTS[name].mass), start=Start(pose=push.pose), path=path, begin=0.0,
+            end=push.path.times[-1], hand_height=push.tip_height,
+        )  # fmt: skip
+    finally:
+        cell.simulator.clear_monitor()
+    times, places = np.array(seen)[:, 0], np.array(seen)[:, 1:]
+    at_tick = np.abs(times / 1e-3 - np.round(times / 1e-3)) < 1e-6  # between ticks the path is taken as straight
+    assert np.abs(motion.forces).max() > 0.5  # it pushed
+    assert at_tick.sum() > 200
+    error = np.linalg.norm(places - path.positions(times), axis=1)[at_tick].max()
+    assert error < 1e-6, f"{error * 1e3:.2e} mm"

@@ -1,0 +1,104 @@
+"""The hand's path: piecewise-linear velocity, exactly integrated."""
+
+import numpy as np
+import pytest
+from reference.planar import HandPath as ReferencePath
+from scipy.integrate import quad
+
+from physid_drake.cell import HandPath
+from physid_drake.cell.hand_path import fit_hand_path, straight_path
+
+
+def some_path(seed=0, knots=6):
+    rng = np.random.default_rng(seed)
+    velocities = rng.uniform(-0.5, 0.5, (knots, 2))
+    velocities[[0, -1]] = 0.0
+    times = np.cumsum(rng.uniform(0.03, 0.3, knots))
+    return HandPath(times=times, velocities=velocities, start=rng.uniform(-0.1, 0.1, 2))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_positions_are_the_references(seed):
+    path = some_path(seed)
+    want = ReferencePath(times=path.times, p0=path.start, velocities=path.velocities)
+    times = np.linspace(path.times[0] - 0.2, path.times[-1] + 0.2, 501)
+    np.testing.assert_allclose(path.positions(times), want.position(times), atol=1e-15)
+
+
+def test_positions_are_the_integral_of_the_velocity():
+    path = some_path(7)
+    for time in np.linspace(path.times[0], path.times[-1], 13)[1:]:
+        for axis in range(2):
+            moved, _ = quad(
+                lambda t, a=axis: np.interp(t, path.times, path.velocities[:, a]), path.times[0], time,
+                points=path.times[1:-1], limit=200,
+            )  # fmt: skip
+            assert path.positions(np.array([time]))[0, axis] - path.start[axis] == pytest.approx(moved, abs=1e-9)
+
+
+def test_position_and_velocity_have_no_jump_at_a_knot():
+    path, step = some_path(3), 1e-7
+    for time in path.times:
+        before, at, after = path.positions(np.array([time - step, time, time + step]))
+        np.testing.assert_allclose(before, after, atol=2e-7)
+        np.testing.assert_allclose((at - before) / step, (after - at) / step, atol=1e-5)
+
+
+def test_the_hand_rests_before_and_after():
+    path = some_path()
+    early, late = path.positions(np.array([path.times[0] - 5.0, path.times[-1] + 5.0]))
+    assert np.array_equal(early, path.start)
+    np.testing.assert_allclose(late, path.knot_positions()[-1], atol=1e-16)
+
+
+def test_a_straight_path_ends_where_it_should():
+    path = straight_path(np.array([0.1, 0.2]), np.array([0.4, -0.1]), 1.0, 0.5)
+    np.testing.assert_allclose(path.positions(np.array([1.0, 1.25, 1.5])), [[0.1, 0.2], [0.25, 0.05], [0.4, -0.1]])
+
+
+def test_a_faster_path_keeps_its_middle_and_its_times():
+    path = some_path(2)
+    faster = path.faster(0.01)
+    np.testing.assert_allclose(faster.velocities, 1.01 * path.velocities)
+    ends, ends_faster = path.knot_positions()[[0, -1]], faster.knot_positions()[[0, -1]]
+    np.testing.assert_allclose(ends.mean(axis=0), ends_faster.mean(axis=0), atol=1e-15)
+
+
+def trapezoid(brake=0.04):
+    times = np.cumsum([0.2, 0.05, 0.3, brake])
+    return HandPath(times=times, velocities=np.outer([0, 0.3, 0.3, 0], [0.8, 0.6]), start=np.zeros(2))
+
+
+@pytest.mark.parametrize("share", [-0.5, 0.3, 1.0])
+def test_a_longer_brake_stops_at_the_same_place(share):
+    path = trapezoid()
+    changed = path.braking(share)
+    assert changed.times[3] - changed.times[2] == pytest.approx(0.04 * (1 + share))
+    np.testing.assert_allclose(changed.knot_positions()[-1], path.knot_positions()[-1], atol=1e-15)
+
+
+def test_no_change_of_speed_or_brake_changes_no_bit():
+    path, times = some_path(4), np.linspace(0.0, 2.0, 200)
+    assert np.array_equal(path.faster(0.0).positions(times), path.positions(times))
+    # `braking(0)` may move the start by rounding: measured 0 to 1e-17 m.
+    np.testing.assert_allclose(trapezoid().braking(0.0).positions(times), trapezoid().positions(times), atol=1e-16)
+
+
+def test_the_last_brake_is_found():
+    assert trapezoid().last_brake() == (2, 3)
+    still = HandPath(times=np.array([0.0, 1.0]), velocities=np.zeros((2, 2)), start=np.zeros(2))
+    assert still.last_brake() is None
+    assert still.braking(0.5) is still
+
+
+@pytest.mark.parametrize("noise", [0.0, 5e-5])
+def test_the_fit_of_a_sampled_stream_finds_the_path(noise):
+    path = trapezoid()
+    times = np.arange(0.0, 0.9, 0.01)
+    stream = path.positions(times) + noise * np.random.default_rng(1).standard_normal((len(times), 2))
+    fit = fit_hand_path(times, stream, noise or None)
+    dense = np.arange(0.0, 0.89, 0.001)
+    error = np.linalg.norm(fit.positions(dense) - path.positions(dense), axis=1)
+    assert len(fit.times) <= 10
+    assert error.max() < (2e-5 if noise == 0.0 else 2e-4), error.max()
+    np.testing.assert_allclose(fit.velocities[[0, -1]], 0.0, atol=1e-3)

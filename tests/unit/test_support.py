@@ -1,0 +1,167 @@
+"""The quadrature under the object: moments, friction cells, torsion; and how an object sinks in at rest."""
+
+import math
+
+import numpy as np
+import pytest
+
+from physid_drake.cell.outline import Disc, Polygon, rectangle
+from physid_drake.cell.support import FrictionGrid, Support, rest_depths, support_of
+
+ELLIPSE = Polygon(
+    [(0.06 * math.cos(2 * math.pi * k / 64), 0.04 * math.sin(2 * math.pi * k / 64)) for k in range(64)]
+)
+HEXAGON = Polygon([(0.05 * math.cos(math.pi * k / 3), 0.05 * math.sin(math.pi * k / 3)) for k in range(6)])
+TRIANGLE = Polygon([(-0.05, -0.03), (0.07, -0.03), (-0.02, 0.06)])
+RECTANGLE = rectangle(0.127, 0.051)
+DISC = Disc(radius=0.033)
+OUTLINES = {"rectangle": RECTANGLE, "triangle": TRIANGLE, "hexagon": HEXAGON, "ellipse": ELLIPSE, "disc": DISC}
+GRIDS = [(1, 1), (1, 2), (2, 1), (2, 2), (4, 4)]
+
+every_outline = pytest.mark.parametrize("name", list(OUTLINES))
+every_grid = pytest.mark.parametrize("grid", GRIDS)
+
+
+def quadrature(name, grid=(1, 1), points_per_side=5):
+    return support_of(OUTLINES[name], FrictionGrid(nx=grid[0], ny=grid[1]), points_per_side)
+
+
+def fine_points(outline, n=900):
+    """Middles of small cells inside the outline: brute force for areas."""
+    x0, y0, x1, y1 = outline.extent()
+    x = x0 + (x1 - x0) * (np.arange(n) + 0.5) / n
+    y = y0 + (y1 - y0) * (np.arange(n) + 0.5) / n
+    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    if isinstance(outline, Disc):
+        return points[np.hypot(*points.T) < outline.radius]
+    corners = np.array(outline.vertices)
+    keep = np.ones(len(points), dtype=bool)
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        keep &= (b - a)[0] * (points[:, 1] - a[1]) - (b - a)[1] * (points[:, 0] - a[0]) > 0
+    return points[keep]
+
+
+def exact_moments(outline):
+    """Centroid (2,) and mean of r r^T (2, 2) over the area."""
+    if isinstance(outline, Disc):
+        return np.zeros(2), np.eye(2) * outline.radius**2 / 4
+    a = np.array(outline.vertices)
+    b = np.roll(a, -1, axis=0)
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    centre = ((a + b) * cross[:, None]).sum(axis=0) / (3 * cross.sum())
+    products = a[:, :, None] * a[:, None] + b[:, :, None] * b[:, None]
+    products = products + (a[:, :, None] * b[:, None] + b[:, :, None] * a[:, None]) / 2
+    return centre, (cross[:, None, None] * products).sum(axis=0) / (6 * cross.sum())
+
+
+@every_grid
+@every_outline
+def test_weights_are_shares_of_the_area(name, grid):
+    support = quadrature(name, grid)
+    assert support.weights.sum() == pytest.approx(1.0)
+    assert support.weights.min() > 0.0
+
+
+@every_grid
+@every_outline
+def test_first_and_second_moments_are_exact(name, grid):
+    support = quadrature(name, grid)
+    centre, second = exact_moments(OUTLINES[name])
+    size = math.sqrt(second.trace())
+    # A chord rule meets the corners of the 64-gon: measured 0.3 % of the second moments at most.
+    slack = 5e-3 if name == "ellipse" else 1e-12
+    got = np.einsum("i,ij,ik->jk", support.weights, support.points, support.points)
+    np.testing.assert_allclose(support.weights @ support.points, centre, atol=slack * size + 1e-16)
+    np.testing.assert_allclose(got, second, atol=slack * size**2)
+
+
+@every_outline
+def test_torsion_is_within_two_per_cent(name):
+    # The mean radius sets the torsional friction: what a spinning object is slowed by.
+    support = quadrature(name)
+    fine = fine_points(OUTLINES[name])
+    assert np.hypot(*support.points.T) @ support.weights == pytest.approx(np.hypot(*fine.T).mean(), rel=0.02)
+
+
+@every_grid
+@every_outline
+def test_every_point_lies_inside(name, grid):
+    for x, y in quadrature(name, grid).points:
+        assert OUTLINES[name].nearest(float(x), float(y))[0] < 0.0
+
+
+@every_grid
+@every_outline
+def test_every_friction_cell_that_the_object_covers_has_points(name, grid):
+    outline, cells = OUTLINES[name], FrictionGrid(nx=grid[0], ny=grid[1])
+    covered = np.bincount(cells.cell_of(fine_points(outline, 300), outline), minlength=cells.size)
+    got = np.bincount(quadrature(name, grid).cells, minlength=cells.size)
+    share = covered / covered.sum()
+    assert (got[share > 0.2 / cells.size] > 0).all()  # a cell that is mostly air may stay empty
+
+
+@pytest.mark.parametrize("grid", [(1, 2), (2, 1), (2, 2)])
+@every_outline
+def test_a_friction_cell_carries_its_share_of_the_area(name, grid):
+    outline, cells = OUTLINES[name], FrictionGrid(nx=grid[0], ny=grid[1])
+    area = np.bincount(cells.cell_of(fine_points(outline), outline), minlength=cells.size)
+    support = quadrature(name, grid)
+    carried = np.bincount(support.cells, weights=support.weights, minlength=cells.size)
+    np.testing.assert_allclose(carried, area / area.sum(), atol=0.02)
+
+
+@pytest.mark.parametrize("grid", [(1, 2), (2, 1), (2, 2), (4, 4)])
+@every_outline
+def test_no_point_lies_on_the_border_of_two_cells(name, grid):
+    x0, y0, x1, y1 = OUTLINES[name].extent()
+    support = quadrature(name, grid)
+    for values, low, high, count in ((support.points[:, 0], x0, x1, grid[0]), (support.points[:, 1], y0, y1, grid[1])):
+        borders = np.linspace(low, high, count + 1)[1:-1]
+        if len(borders):
+            assert np.abs(values[:, None] - borders).min() > 1e-6
+
+
+# ------------------------------------------------------------------------------------------------------- rest
+
+
+@pytest.mark.parametrize("com", [(0.0, 0.0), (0.004, -0.003)])
+@every_outline
+def test_the_loads_at_rest_balance_weight_and_moments(name, com):
+    support, offset = quadrature(name), np.array(com)
+    plane, loads = rest_depths(support, offset, 3e-6)
+    assert loads.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(loads @ support.points, offset, atol=1e-14)
+    depths = np.column_stack([np.ones(len(loads)), support.points]) @ plane
+    np.testing.assert_allclose(loads, support.weights * np.maximum(depths, 0.0) / 3e-6, atol=1e-12)
+
+
+def test_an_even_object_sinks_in_evenly():
+    plane, _ = rest_depths(quadrature("rectangle"), np.zeros(2), 3e-6)
+    np.testing.assert_allclose(plane, [3e-6, 0.0, 0.0], atol=1e-18)
+
+
+def test_it_sinks_deeper_on_the_heavy_side():
+    plane, _ = rest_depths(quadrature("rectangle"), np.array([0.01, -0.005]), 3e-6)
+    assert plane[1] > 0.0 > plane[2]
+
+
+def test_an_object_far_off_balance_lifts_the_light_side():
+    support, offset = quadrature("rectangle"), np.array([0.03, 0.0])  # outside of the middle third
+    _, loads = rest_depths(support, offset, 3e-6)
+    assert (loads == 0.0).any()
+    assert (loads >= 0.0).all()
+    np.testing.assert_allclose(loads @ support.points, offset, atol=1e-14)
+
+
+@pytest.mark.parametrize("com", [(0.08, 0.0), (0.0, 0.03), (-0.2, 0.1)])
+def test_a_centre_of_mass_beside_the_base_tips_over(com):
+    with pytest.raises(ValueError, match="tips over"):
+        rest_depths(quadrature("rectangle"), np.array(com), 3e-6)
+
+
+def test_a_line_of_points_is_no_base():
+    line = Support(
+        points=np.array([[-0.01, 0.0], [0.0, 0.0], [0.01, 0.0]]), weights=np.full(3, 1 / 3), cells=np.zeros(3, int)
+    )
+    with pytest.raises(ValueError, match="tips over"):
+        rest_depths(line, np.array([0.0, 0.005]), 3e-6)
