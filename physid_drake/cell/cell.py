@@ -21,7 +21,7 @@ from physid_drake.cell.setters import (
 )
 from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.cell.stepper import Stepper
-from physid_drake.cell.support import rest_depths
+from physid_drake.cell.support import SLENDER, rest_depths
 from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]
@@ -56,7 +56,7 @@ class Cell:
         """
         self.config = config or CellConfig()
         self.solid: Solid = solid_of(shape)
-        self.mean_depth = self.config.contact.rest_depth_m
+        self.mean_depth = self.config.contact.rest_depth_m * _stiffer(self.solid)
         builder = DiagramBuilder()
         self.scene: Scene = add_scene(builder, self.config, self.solid, hand_radius, edge=edge)
         cells = self.config.friction_cells[0] * self.config.friction_cells[1]
@@ -135,3 +135,12 @@ class Cell:
         quaternion = np.array([1.0, 0.5 * roll, 0.5 * pitch, 0.0])
         z = 0.5 * self.solid.height - float(plane[0])
         return np.array([*(quaternion / np.linalg.norm(quaternion)), 0.0, 0.0, z])
+
+
+def _stiffer(solid: Solid) -> float:
+    """Share of the rest depth that a slender object gets: it leans in proportion to depth and slenderness squared."""
+    if solid.rolling_radius is not None:
+        return 1.0
+    x0, y0, x1, y1 = solid.underside.extent()
+    radius = 0.5 * min(x1 - x0, y1 - y0)
+    return float(np.clip((SLENDER * radius / solid.height) ** 2, 1.0 / 3.0, 1.0))

@@ -173,14 +173,16 @@ class _Fit:
         free, *_ = np.linalg.lstsq(design, self._p, rcond=1e-13)
         chi2 = float(((self._p - design @ free) ** 2).sum()) / self._sigma**2
         if not ended or len(knots) < 3:
-            return free, chi2
+            return np.asarray(free, dtype=np.float64), chi2
         rows = self._ending(knots)
         _, _, vt = np.linalg.svd(rows)
         null = vt[2:].T
         inner, *_ = np.linalg.lstsq(design @ null, self._p, rcond=1e-13)
-        held = null @ inner
+        held: Array = np.asarray(null @ inner, dtype=np.float64)
         held_chi2 = float(((self._p - design @ held) ** 2).sum()) / self._sigma**2
-        return (held, held_chi2) if held_chi2 - chi2 < 4.0 + 3.0 * self._price else (free, chi2)
+        if held_chi2 - chi2 < 4.0 + 3.0 * self._price:
+            return held, held_chi2
+        return np.asarray(free, dtype=np.float64), chi2
 
     def _grow(self) -> Array:
         candidates = self._t[1:-1]

@@ -75,6 +75,12 @@ class Polygon:
         # Beyond the end of the most separated face a corner is nearest: no face can be nearer than its height.
         return min(self._corner(x, y, vertex) for vertex in self.vertices)
 
+    def reach(self, angle: float) -> float:
+        """Distance [m] from Bo, which must lie inside, to the outline in a direction [rad]."""
+        x, y = math.cos(angle), math.sin(angle)
+        ahead = [(edge, x * edge[4] + y * edge[5]) for edge in self._edges]
+        return min((edge[0] * edge[4] + edge[1] * edge[5]) / speed for edge, speed in ahead if speed > 1e-12)
+
     @staticmethod
     def _corner(x: float, y: float, vertex: Point) -> tuple[float, float, float]:
         dx, dy = x - vertex[0], y - vertex[1]

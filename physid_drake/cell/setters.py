@@ -199,12 +199,16 @@ def check_body(body: Body, cells: int) -> None:
     Raises:
         ParameterError: naming the parameter, the rule and the value.
     """
-    slippery = float(np.min(body.support_friction))
+    frictions = body.support_friction
+    bad = frictions[~np.isfinite(frictions)]
+    slippery = float(bad[0] if len(bad) else np.min(frictions))
     rules = [
         ("mass", body.mass, body.mass > 0.0, "above 0 kg"),
         ("inertia_ratio", body.inertia_ratio, body.inertia_ratio > 0.0, "above 0"),
         ("hand_friction", body.hand_friction, body.hand_friction >= 0.0, "at least 0"),
         ("support_friction", slippery, slippery >= 0.0, "at least 0"),
+        ("com_x", float(body.p_BBcm[0]), True, "finite"),
+        ("com_y", float(body.p_BBcm[1]), True, "finite"),
         ("static_ratio", body.static_ratio, body.static_ratio >= 1.0, "at least 1"),
         ("restitution", body.restitution, 0.0 <= body.restitution <= 1.0, "in [0, 1]"),
     ]  # fmt: skip

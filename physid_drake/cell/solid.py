@@ -15,12 +15,13 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from scipy.spatial import ConvexHull, QhullError
 
 from physid_drake.cell.outline import Disc, Outline, Polygon, rectangle
+from physid_drake.cell.support import second_moments
 from physid_drake.errors import CellError
 from physid_drake.recording import Box, Cylinder, MeshShape, Prism
 from physid_drake.recording import Shape as RecordedShape
 
 Array = NDArray[np.float64]
-FACE_THICKNESS = 2e-3  # m: how far the flat colliding faces of a prism reach inward
+FACE_THICKNESS = 2e-4  # m: how far a prism's colliding faces reach inward; at acute corners they end so early
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,24 +96,11 @@ def _lying_cylinder(shape: Cylinder) -> Solid:
 
 def _prism(shape: Prism) -> Solid:
     polygon = Polygon(shape.polygon)
-    ixx, iyy = polygon_gyration(np.array(shape.polygon))
+    iyy, _, ixx = second_moments(np.array(shape.polygon))
     z2 = shape.height**2 / 12.0
     hull = ((_convex_prism(polygon, shape.height), RigidTransform()),)
     return Solid(outline=polygon, underside=polygon, height=shape.height, gyration=(ixx + z2, iyy + z2, ixx + iyy),
                  rolling_radius=None, faces=_polygon_faces(polygon, shape.height), visual=hull)  # fmt: skip
-
-
-def polygon_gyration(vertices: Array) -> tuple[float, float]:
-    """Mean of y^2 and of x^2 over a polygon's area about the origin [m^2]; vertices (n, 2) counter-clockwise.
-
-    Source: Green's theorem on the polygon, as in any table of section moduli.
-    """
-    a, b = vertices, np.roll(vertices, -1, axis=0)
-    cross = a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]
-    area = 0.5 * cross.sum()
-    mean_y2 = float((cross * (a[:, 1] ** 2 + a[:, 1] * b[:, 1] + b[:, 1] ** 2)).sum() / (12.0 * area))
-    mean_x2 = float((cross * (a[:, 0] ** 2 + a[:, 0] * b[:, 0] + b[:, 0] ** 2)).sum() / (12.0 * area))
-    return mean_y2, mean_x2
 
 
 def _polygon_faces(polygon: Polygon, height: float) -> tuple[tuple[Shape, RigidTransform], ...]:
@@ -159,10 +147,12 @@ def _mesh(shape: MeshShape) -> Solid:
     middle = 0.5 * (low + high)
     centred = vertices - middle
     height = float(high[2] - low[2])
+    if height <= 0.0:
+        raise CellError(f"mesh '{shape.file}' is flat: it has no height along z.")
     hull = _hull(centred[:, :2], shape.file)
     standing = centred[centred[:, 2] < -0.5 * height + max(1e-4, 0.01 * height)]
     underside = _hull(standing[:, :2], shape.file)
-    ixx, iyy = polygon_gyration(np.array(hull.vertices))
+    iyy, _, ixx = second_moments(np.array(hull.vertices))
     z2 = height**2 / 12.0
     visual = ((Mesh(str(shape.file), shape.scale), RigidTransform(-middle)),)
     return Solid(outline=hull, underside=underside, height=height, gyration=(ixx + z2, iyy + z2, ixx + iyy),

@@ -87,19 +87,22 @@ class Stepper:
             else path.positions(np.asarray(begin + dt * np.arange(count + 1), dtype=np.float64)).tolist()
         )
         self._drift, self._log = 0.0, Log()
-        self._x = self._place(start, rest, height)
-        self._root.SetTime(0.0)
-        self._send()
-        self._simulator.Initialize()
-        self._record(0.0, (0.0, 0.0, 0.0))
         k = 0
         try:
+            self._begin_at(start, rest, height)
             while k < count:
                 k = self._skip_rest(k, count) if self._resting(k) else self._tick(k, count)
         except (RuntimeError, SystemExit, FloatingPointError):
             # Drake ends the process from a degenerate contact query; for a search it is one failed trial.
             return self._log.motion(Outcome.DIVERGED)
         return self._log.motion(Outcome.COMPLETED)
+
+    def _begin_at(self, start: Start, rest: Array, height: float) -> None:
+        self._x = self._place(start, rest, height)
+        self._root.SetTime(0.0)
+        self._send()
+        self._simulator.Initialize()
+        self._record(0.0, (0.0, 0.0, 0.0))
 
     # The object's planar state, as plain floats.
 
@@ -414,6 +417,8 @@ class Stepper:
         support = self._scene.support
         depths = (0.5 * self._scene.solid.height - z) + support.points @ np.array([pitch, -roll])
         excess = float(support.weights @ np.maximum(depths, 0.0)) * self._tilt_gain - 1.0
+        if not 0.0 < excess < 0.5:  # lighter than at rest, or a bounce: nothing of the kind
+            return after
         factor = 1.0 / (1.0 + excess)
         vx, vy, wz = (old + factor * (new - old) for old, new in zip(before, after, strict=True))
         v = self._v

@@ -7,14 +7,20 @@ systematic yaw error; Gauss-Legendre points with weights do not.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import roots_jacobi
 
 from physid_drake.cell.outline import Disc, Outline, Polygon
+from physid_drake.errors import ParameterError
 
 Array = NDArray[np.float64]
+
+FEW_CORNERS = 6  # a polygon with more is treated as a round outline
+SLENDER = 2.5  # height over radius above which load transfer may lift a part of the underside
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +58,7 @@ class Support:
     cells: NDArray[np.intp]
 
 
-def support_of(outline: Outline, grid: FrictionGrid, points_per_side: int) -> Support:
+def support_of(outline: Outline, grid: FrictionGrid, points_per_side: int, *, height: float = 0.0) -> Support:
     """Quadrature points over an outline, fine enough that every friction cell holds some.
 
     Args:
@@ -60,16 +66,21 @@ def support_of(outline: Outline, grid: FrictionGrid, points_per_side: int) -> Su
         grid: the friction cells.
         points_per_side: Gauss points along the longer side; the shorter has one less when it can (5 by 4
             equals 8 by 8 and costs a third).
+        height: of the object [m]: a slender disc stands on part of its underside while it is pushed, and
+            needs a third ring of points.
     """
     match outline:
+        case Polygon() if _is_rectangle(outline):
+            points, weights = _rectangle_points(outline, grid, points_per_side)
+        case _ if grid.size > 1:
+            points, weights = _cell_points(outline, grid, math.ceil(points_per_side / 2))
         case Disc(radius=radius):
-            points, weights = _disc_points(radius, grid, points_per_side)
-        case Polygon() as polygon if _is_rectangle(polygon):
-            points, weights = _rectangle_points(polygon, grid, points_per_side)
-        case Polygon() as polygon if len(polygon.vertices) <= 6:
-            points, weights = _polygon_points(polygon, grid, points_per_side)
-        case Polygon() as polygon:
-            points, weights = _chord_points(polygon, grid, points_per_side)
+            rings = 3 if height > SLENDER * radius else 2
+            points, weights = _star_points(lambda _: radius, max(rings, math.ceil(points_per_side / 3)), 8)
+        case Polygon(vertices=vertices) if len(vertices) <= FEW_CORNERS:
+            points, weights = _fan_points(outline, points_per_side)
+        case Polygon():
+            points, weights = _star_points(outline.reach, max(2, math.ceil(points_per_side / 3)), 16)
         case _:
             raise TypeError(f"no quadrature for an outline of type {type(outline).__name__}")
     cells = grid.cell_of(points, outline)
@@ -94,38 +105,45 @@ def _rectangle_points(polygon: Polygon, grid: FrictionGrid, per_side: int) -> tu
     x0, y0, x1, y1 = polygon.extent()
     along_x = per_side if x1 - x0 >= y1 - y0 else per_side - 1
     along_y = per_side - 1 if x1 - x0 >= y1 - y0 else per_side
-    x, wx = _composite_gauss(x0, x1, grid.nx, math.ceil(along_x / grid.nx))
-    y, wy = _composite_gauss(y0, y1, grid.ny, math.ceil(along_y / grid.ny))
+    # One point across a cell would be the midpoint rule again.
+    x, wx = _composite_gauss(x0, x1, grid.nx, max(2, math.ceil(along_x / grid.nx)))
+    y, wy = _composite_gauss(y0, y1, grid.ny, max(2, math.ceil(along_y / grid.ny)))
     points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     return points, np.outer(wx, wy).ravel()
 
 
-def _disc_points(radius: float, grid: FrictionGrid, per_side: int) -> tuple[Array, Array]:
-    """Gauss in r^2 (the weight r dr) times equal angles.
+def _radial_gauss(order: int) -> tuple[Array, Array]:
+    """Gauss nodes in [0, 1] for the weight r dr (Gauss-Jacobi), weights summing to 1: exact for torsion.
 
-    Source: A. H. Stroud, Approximate Calculation of Multiple Integrals, 1971, formulas S2.
+    Source: A. H. Stroud, Approximate Calculation of Multiple Integrals, 1971, chapter 2.
     """
-    radii = max(2, math.ceil(per_side * max(grid.nx, grid.ny) / 8))
-    angles = 8 * max(1, math.ceil(max(grid.nx, grid.ny) / 3))
-    s, ws = _composite_gauss(0.0, 1.0, 1, radii)
-    rings = []
-    for k, (ring, weight) in enumerate(zip(np.sqrt(s), ws, strict=True)):
-        phi = 2.0 * math.pi * (np.arange(angles) + 0.5 * (k % 2)) / angles
-        rings.append(np.column_stack([ring * np.cos(phi), ring * np.sin(phi), np.full(angles, weight)]))
-    table = np.concatenate(rings)
-    return radius * table[:, :2], table[:, 2]
+    x, w = roots_jacobi(order, 0.0, 1.0)
+    return np.asarray(0.5 * (x + 1.0)), np.asarray(w / w.sum())
 
 
-def _polygon_points(polygon: Polygon, grid: FrictionGrid, per_side: int) -> tuple[Array, Array]:
+def _star_points(reach: Callable[[float], float], radii: int, angles: int) -> tuple[Array, Array]:
+    """Gauss in r with weight r, times equal angles, which converge fast on a smooth outline.
+
+    Args:
+        reach: distance [m] from Bo to the outline in a direction [rad].
+        radii: number of rings.
+        angles: points per ring.
+    """
+    r, wr = _radial_gauss(radii)
+    phi = 2.0 * math.pi * (np.arange(angles) + 0.5) / angles
+    ring = np.array([reach(float(angle)) for angle in phi])[:, None] * np.column_stack([np.cos(phi), np.sin(phi)])
+    area = (ring**2).sum(axis=1)
+    return (r[:, None, None] * ring).reshape(-1, 2), np.outer(wr, area / area.sum()).ravel()
+
+
+def _fan_points(polygon: Polygon, per_side: int) -> tuple[Array, Array]:
     """A Gauss rule on each triangle of the fan about the centroid, by collapsing the square (Duffy).
 
     Source: M. G. Duffy, Quadrature over a pyramid or cube of integrands with a singularity at a vertex, 1982.
     """
     vertices = np.array(polygon.vertices)
-    order = max(2, math.ceil(per_side * max(grid.nx, grid.ny) / max(3, len(vertices))))
-    u, wu = _composite_gauss(0.0, 1.0, 1, order)
-    # The integrand u du of the collapsed square is absorbed by Gauss in u^2.
-    u = np.sqrt(u)
+    order = max(4 if len(vertices) == 3 else 3, math.ceil(per_side / len(vertices)))
+    u, wu = _radial_gauss(order)
     v, wv = _composite_gauss(0.0, 1.0, 1, order)
     centre = _centroid(vertices)
     points, weights = [], []
@@ -138,27 +156,80 @@ def _polygon_points(polygon: Polygon, grid: FrictionGrid, per_side: int) -> tupl
     return np.concatenate(points), np.concatenate(weights)
 
 
-def _chord_points(polygon: Polygon, grid: FrictionGrid, per_side: int) -> tuple[Array, Array]:
-    """Gauss in x, and Gauss along the chord at each x: for outlines of many short edges (an ellipse)."""
-    vertices = np.array(polygon.vertices)
-    x0, _, x1, _ = polygon.extent()
-    x, wx = _composite_gauss(x0, x1, grid.nx, math.ceil((per_side + 1) / grid.nx))
+def _cell_points(outline: Outline, grid: FrictionGrid, fewest: int) -> tuple[Array, Array]:
+    """Four points in each piece of the outline that a friction cell cuts out: exact to second moments.
+
+    Args:
+        outline: the underside.
+        grid: friction cells.
+        fewest: pieces along a side; coarser friction cells are cut again.
+    """
+    x0, y0, x1, y1 = outline.extent()
+    nx, ny = (n * math.ceil(fewest / n) for n in (grid.nx, grid.ny))
+    xs, ys = np.linspace(x0, x1, nx + 1), np.linspace(y0, y1, ny + 1)
+    whole = _as_polygon(outline)
     points, weights = [], []
-    for xi, wi in zip(x, wx, strict=True):
-        low, high = _chord(vertices, float(xi))
-        y, wy = _composite_gauss(low, high, grid.ny, math.ceil(per_side / grid.ny))
-        points.append(np.column_stack([np.full_like(y, xi), y]))
-        weights.append(wi * wy)
+    for i in range(nx):
+        for j in range(ny):
+            piece = _clipped(whole, (xs[i], ys[j], xs[i + 1], ys[j + 1]))
+            if len(piece) >= 3 and _area(piece) > 1e-6 * _area(whole):
+                points.append(_moment_points(piece))
+                weights.append(np.full(4, 0.25 * _area(piece)))
     return np.concatenate(points), np.concatenate(weights)
 
 
-def _chord(vertices: Array, x: float) -> tuple[float, float]:
-    """Lowest and highest y of a convex polygon at x."""
-    ys = []
-    for a, b in zip(vertices, np.roll(vertices, -1, axis=0), strict=True):
-        if min(a[0], b[0]) <= x <= max(a[0], b[0]) and a[0] != b[0]:
-            ys.append(a[1] + (x - a[0]) / (b[0] - a[0]) * (b[1] - a[1]))
-    return min(ys), max(ys)
+def _moment_points(vertices: Array) -> Array:
+    """Four points (4, 2) that share a polygon's centroid and second moments, on its principal axes."""
+    centre = _centroid(vertices)
+    xx, xy, yy = second_moments(vertices - centre)
+    values, axes = np.linalg.eigh(np.array([[xx, xy], [xy, yy]]))
+    # A hair inside: in a triangle the points would lie on its edge, where the next friction cell begins.
+    arms = (1.0 - 1e-9) * (np.sqrt(2.0 * np.maximum(values, 0.0)) * axes).T
+    return np.concatenate([centre + arms, centre - arms])
+
+
+def second_moments(vertices: Array) -> tuple[float, float, float]:
+    """Means of x^2, x y and y^2 over a polygon's area (Green's theorem); vertices (n, 2) counter-clockwise."""
+    a, b = vertices, np.roll(vertices, -1, axis=0)
+    cross = a[:, 0] * b[:, 1] - b[:, 0] * a[:, 1]
+    total = 12.0 * 0.5 * cross.sum()
+    xx = float((cross * (a[:, 0] ** 2 + a[:, 0] * b[:, 0] + b[:, 0] ** 2)).sum() / total)
+    yy = float((cross * (a[:, 1] ** 2 + a[:, 1] * b[:, 1] + b[:, 1] ** 2)).sum() / total)
+    mixed = a[:, 0] * b[:, 1] + 2.0 * a[:, 0] * a[:, 1] + 2.0 * b[:, 0] * b[:, 1] + b[:, 0] * a[:, 1]
+    return xx, float((cross * mixed).sum() / (2.0 * total)), yy
+
+
+def _as_polygon(outline: Outline) -> Array:
+    """Vertices (n, 2); a disc as 64 corners that enclose its area."""
+    if isinstance(outline, Polygon):
+        return np.array(outline.vertices)
+    assert isinstance(outline, Disc)
+    phi = 2.0 * math.pi * np.arange(64) / 64
+    radius = outline.radius * math.sqrt(2.0 * math.pi / 64 / math.sin(2.0 * math.pi / 64))
+    return radius * np.column_stack([np.cos(phi), np.sin(phi)])
+
+
+def _clipped(vertices: Array, window: tuple[float, float, float, float]) -> Array:
+    """A convex polygon cut to a window x0, y0, x1, y1 (Sutherland and Hodgman, 1974)."""
+    x0, y0, x1, y1 = window
+    for axis, limit, sign in ((0, x0, 1.0), (0, x1, -1.0), (1, y0, 1.0), (1, y1, -1.0)):
+        inside = sign * (vertices[:, axis] - limit)
+        kept = []
+        for k in range(len(vertices)):
+            a, b, da, db = vertices[k - 1], vertices[k], inside[k - 1], inside[k]
+            if da * db < 0.0:
+                kept.append(a + da / (da - db) * (b - a))
+            if db >= 0.0:
+                kept.append(b)
+        vertices = np.array(kept).reshape(-1, 2)
+        if not len(vertices):
+            break
+    return vertices
+
+
+def _area(vertices: Array) -> float:
+    following = np.roll(vertices, -1, axis=0)
+    return 0.5 * abs(float((vertices[:, 0] * following[:, 1] - vertices[:, 1] * following[:, 0]).sum()))
 
 
 def _centroid(vertices: Array) -> Array:
@@ -182,7 +253,7 @@ def rest_depths(support: Support, p_BBcm: Array, mean_depth: float) -> tuple[Arr
         the weight. Points that would pull are let go; a centre of mass outside the base tips over and raises.
 
     Raises:
-        ValueError: if the centre of mass is not above the base.
+        ParameterError: if the centre of mass is not above the base.
     """
     basis = np.column_stack([np.ones(len(support.weights)), support.points])
     target = np.array([1.0, p_BBcm[0], p_BBcm[1]]) * mean_depth
@@ -196,4 +267,6 @@ def rest_depths(support: Support, p_BBcm: Array, mean_depth: float) -> tuple[Arr
         if np.array_equal(loaded, active):
             return plane, support.weights * active * (basis @ plane) / mean_depth
         active = loaded
-    raise ValueError(f"the centre of mass at {p_BBcm} m in B is not above the base: the object tips over")
+    raise ParameterError(
+        f"the centre of mass must lie above the base, not at ({p_BBcm[0]:.4g}, {p_BBcm[1]:.4g}) m in B."
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses as dc
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -14,39 +15,19 @@ from physid_drake.belief import Belief
 from physid_drake.cell import CellConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
+from physid_drake.identify.config import SearchConfig, ThetaConfig
 from physid_drake.identify.misfit import whitened_residual
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
 from physid_drake.identify.polish import Polished, Polisher
 from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
-from physid_drake.identify.theta import ThetaConfig, ThetaMap, theta_map
+from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.recording import Recording
 from physid_drake.search import GreedyEntropySearch, SearchResult, search_minimum
 
 Array = NDArray[np.float64]
 
 IDENTIFIABLE = 0.5  # a parameter counts as told if the pushes halve its prior's standard deviation
-
-
-@dc.dataclass
-class SearchConfig:
-    """Greedy entropy search.
-
-    Attributes:
-        candidates: number of thetas in the candidate set.
-        budget: thetas tried.
-        batch: thetas per update of the belief.
-        entropy_tolerance_nats: the search stops when the entropy of P_min moves less than this.
-        patience: over so many updates.
-        jobs: processes; 0 takes the machine's cores.
-    """
-
-    candidates: int = 1000
-    budget: int = 40
-    batch: int = 1
-    entropy_tolerance_nats: float = 0.1
-    patience: int = 5
-    jobs: int = 0
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -303,7 +284,7 @@ def estimates_of(thetas: ThetaMap, polished: Polished, degrees: int) -> tuple[Es
                 ci90=(ends[0], ends[1]),
                 identifiable=bool(spread[j] < IDENTIFIABLE * prior_spread[j]),
                 prior=parameter.prior_mean,
-            )  # fmt: skip
+            )
         )
     return tuple(result)
 
@@ -314,11 +295,11 @@ def _accuracy(pairs: list[tuple[PushProblem, Prediction]], noise: Noise, diverge
     forces = np.concatenate([r.forces - p.forces for p, r in pairs])
     whitened = np.concatenate([whitened_residual(p, noise, r) for p, r in pairs])
     return Accuracy(
-        position=_rms(every[:, :2]) * np.sqrt(2.0),
+        position=_rms(every[:, :2]) * math.sqrt(2.0),
         rotation=_rms(every[:, 2]),
-        end_position=_rms(last[:, :2]) * np.sqrt(2.0),
+        end_position=_rms(last[:, :2]) * math.sqrt(2.0),
         end_rotation=_rms(last[:, 2]),
-        force=_rms(forces) * np.sqrt(2.0) if len(forces) else None,
+        force=_rms(forces) * math.sqrt(2.0) if len(forces) else None,
         sigmas=_rms(whitened),
         diverged=diverged,
     )

@@ -195,7 +195,7 @@ def _moving_start(push: Push, planar: Array, sigmas: Array) -> tuple[Start, Arra
     n = int(min(len(times), max(3, np.searchsorted(times, times[0] + 0.08))))
     if n < 3:
         raise RecordingError(
-            f"push '{push.name}': without a hand, at least 3 poses are needed to know the start velocity, but got {n}."
+            f"push '{push.name}': without a hand, at least 3 poses are needed for the start velocity, but got {n}."
         )
     t = times[:n] - times[0]
     design = np.column_stack([np.ones(n), t, 0.5 * t**2])

@@ -11,29 +11,11 @@ from numpy.typing import NDArray
 from physid_drake.cell import Body
 from physid_drake.cell.outline import Outline
 from physid_drake.errors import ConfigError
+from physid_drake.identify.config import ThetaConfig
 from physid_drake.recording import ObjectModel
 from physid_drake.space import Parameter, ParameterSpace
 
 Array = NDArray[np.float64]
-
-PLAIN = ("mass", "hand_friction", "support_friction")
-OPTIONAL = ("com_x", "com_y", "inertia_ratio", "static_ratio", "restitution")
-
-
-@dc.dataclass
-class ThetaConfig:
-    """Which parameters are unknown, and their bounds.
-
-    Attributes:
-        parameters: names out of ``mass``, ``hand_friction``, ``support_friction``, ``com_x``, ``com_y``,
-            ``inertia_ratio``, ``static_ratio``, ``restitution``.
-        bounds: ``[lower, upper]`` per name, in SI units, instead of the defaults.
-        nominal: start values per name, instead of the defaults.
-    """
-
-    parameters: list[str] = dc.field(default_factory=lambda: list(PLAIN))
-    bounds: dict[str, list[float]] = dc.field(default_factory=dict)
-    nominal: dict[str, float] = dc.field(default_factory=dict)
 
 
 @dc.dataclass(frozen=True, kw_only=True)

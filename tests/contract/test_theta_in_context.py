@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import LeafSystem
-from twin import MODELS, body_of, config_of
+from reference.scenes import sixty_pushes
+from twin import MODELS, body_of, config_of, twin
 
 from physid_drake.cell import Cell, HandPath, Outcome, Start
 from physid_drake.errors import ParameterError, PhysidError
@@ -139,7 +140,7 @@ def test_only_this_context_is_written():
         ({"p_BBcm": np.array([float("nan"), 0.0])}, "nan"),
     ],
 )  # fmt: skip
-def test_parameters_outside_of_physics_are_refused_by_name(change, value):
+def test_parameters_outside_of_physics_are_refused_by_name(change, value, request):
     cell = new_cell("point")
     with pytest.raises(ParameterError) as caught:
         push(cell, replace(BODY, **change))
@@ -153,7 +154,7 @@ def test_a_wrong_number_of_friction_cells_is_refused():
         push(new_cell("point"), replace(BODY, support_friction=np.array([0.3, 0.3])))
 
 
-def test_a_centre_of_mass_beside_the_base_is_refused_as_the_packages_error():
+def test_a_centre_of_mass_beside_the_base_is_refused_as_the_packages_error(request):
     with pytest.raises(PhysidError):
         push(new_cell("point"), replace(BODY, p_BBcm=np.array([0.06, 0.0])))
 
@@ -190,7 +191,7 @@ def test_a_start_too_fast_to_be_true_is_an_outcome(model):
 
 
 @both_models
-def test_a_start_that_is_not_a_number_is_an_outcome(model):
+def test_a_start_that_is_not_a_number_is_an_outcome(model, request):
     cell = new_cell(model)
     first = bits(push(cell))
     absurd = cell.rollout(
@@ -198,3 +199,9 @@ def test_a_start_that_is_not_a_number_is_an_outcome(model):
     )
     assert absurd.outcome is Outcome.DIVERGED
     assert bits(push(cell)) == first
+
+
+def test_an_object_that_jumps_ends_no_process(request):
+    push_of_a_can = sixty_pushes(0)[4]
+    end = push_of_a_can[2].path.times[-1] + 0.3
+    assert twin(*push_of_a_can, end, "hydroelastic", (("impact_law", False),)).outcome in Outcome

@@ -70,24 +70,25 @@ def test_sixty_pushes_are_followed_within_half_a_sigma(model):
 
 @both_models
 def test_other_pushes_are_followed_within_half_a_sigma(model):
-    # Measured on the first twenty of seed 1: SEED1 below.
+    # Measured: 0.385 and 0.400, worst push 0.92. All sixty: 0.50 (point); 4.5 (hydroelastic), but for push 42 below.
     assert rms(np.concatenate(errors("sixty", 1, model, pick=slice(20)))) < WANTED
 
 
 @both_models
-def test_pushes_that_nearly_topple_a_bottle_are_followed(model):
-    # Seed 1, push 42: friction 0.24 of a bottle that tips at 0.33; a fifth of the samples has part of the base lifted.
+def test_pushes_that_nearly_topple_a_bottle_are_followed(model, request):
+    # Seed 1, push 42: friction 0.24 of a bottle that tips at 0.33; part of its base is lifted a fifth of the time.
     (series,) = errors("sixty", 1, model, pick=slice(42, 43))
     assert rms(series) < 2.5
 
 
 @both_models
-def test_a_prism_is_followed_within_half_a_sigma(model):
+def test_a_prism_is_followed_within_half_a_sigma(model, request):
     assert rms(np.concatenate(errors("triangle", 0, model))) < WANTED
 
 
 @both_models
 def test_an_object_of_uneven_density_is_followed_within_half_a_sigma(model):
+    # Measured: 0.252 and 0.242, worst push 0.61; seed 1: 0.40 and 0.55.
     assert rms(np.concatenate(errors("uneven", 0, model))) < WANTED
 
 
@@ -96,7 +97,8 @@ def test_each_remedy_matters(remedy):
     pick = slice(30)
     with_it = rms(np.concatenate(errors("sixty", 0, "point", pick=pick)))
     without = rms(np.concatenate(errors("sixty", 0, "point", ((remedy, False),), pick=pick)))
-    # Measured on all sixty: 0.36 with both; 58.5 without the impact law, 2.79 without the feed-forward of drift.
+    # Measured on these thirty: 0.29 with both; 52.8 without the impact law, 1.33 without the feed-forward of drift
+    # (all sixty: 0.36, 58.5 and 2.79).
     assert without > 2 * with_it
 
 
@@ -110,7 +112,7 @@ def test_restitution_is_the_references(model):
     motion = twin(body, theta, push, want.times[-1], model)
     flat = twin(body, replace(theta, restitution=0.0), push, want.times[-1], model)
     assert rms(parting(flat, want.times, want.poses)) > 5  # it does matter
-    assert rms(parting(motion, want.times, want.poses)) < 1.0
+    assert rms(parting(motion, want.times, want.poses)) < 0.1  # measured 0.020 and 0.030
 
 
 @pytest.mark.parametrize("name", ["box", "can"])
@@ -138,4 +140,4 @@ def test_the_hand_follows_its_path(model, name):
     assert np.abs(motion.forces).max() > 0.5  # it pushed
     assert at_tick.sum() > 200
     error = np.linalg.norm(places - path.positions(times), axis=1)[at_tick].max()
-    assert error < 1e-6, f"{error * 1e3:.2e} mm"
+    assert error < 1e-6, f"{error * 1e3:.2e} mm"  # measured 6.6e-4 mm (box) and 3.2e-4 mm (can)

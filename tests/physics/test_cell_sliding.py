@@ -21,9 +21,7 @@ box_and_can = pytest.mark.parametrize("name", NAMES)
 
 
 def slide(cell, body, velocity=(0.0, 0.0, 0.0), *, pose=(0.0, 0.0, 0.0), end=1.0):
-    return cell.rollout(
-        body, start=Start(pose=pose, velocity=velocity), path=None, begin=0.0, end=end
-    )
+    return cell.rollout(body, start=Start(pose=pose, velocity=velocity), path=None, begin=0.0, end=end)
 
 
 def final(motion):
@@ -115,7 +113,7 @@ def test_a_spinning_object_turns_as_far_as_torsional_friction_lets_it(model, nam
 
 
 @both_models
-def test_a_spinning_triangle_turns_as_the_reference_does(model):
+def test_a_spinning_triangle_turns_as_the_reference_does(model, request):
     body = OBJECTS["triangle"]
     want = simulate_planar(body, 0.3, np.array([0.0, 1.0]), velocity=(0, 0, 10.0)).poses[-1]
     motion = slide(cell_of("triangle", model), body_of(body.mass, 0.3), (0.0, 0.0, 10.0))
@@ -150,7 +148,7 @@ def test_a_half_slippery_box_turns_to_its_rough_side(model, cells):
 
 @pytest.mark.parametrize("cells", [(1, 2), (2, 2), (4, 4)])
 @both_models
-def test_a_half_slippery_disc_turns_to_its_rough_side(model, cells):
+def test_a_half_slippery_disc_turns_to_its_rough_side(model, cells, request):
     got, want = half_slippery(model, OBJECTS["can"], cells)
     assert want[2] < math.radians(-25)
     assert abs(got[2] - want[2]) < math.radians(2)
@@ -163,7 +161,9 @@ def test_equal_friction_in_every_cell_is_plain_friction(model, name):
     cell = Cell(shape_of(body), hand_radius=None, config=config_of(model, cells=(2, 2)))
     many = final(slide(cell, body_of(body.mass, np.full(4, 0.3)), (0.4, 0.2, 2.0)))
     one = final(slide(cell_of(name, model), body_of(body.mass, 0.3), (0.4, 0.2, 2.0)))
-    np.testing.assert_allclose(many / SIGMA, one / SIGMA, atol=0.6)  # measured 0.5 sigma (box: 4 x 4 points, not 5 x 4)
+    # A box has the same points either way: measured 0.007 sigma. A disc cut by cells has other points than
+    # whole: 0.58 sigma of yaw, 0.7 % of the turn.
+    np.testing.assert_allclose(many / SIGMA, one / SIGMA, atol=0.02 if name == "box" else 0.8)
 
 
 # --------------------------------------------------------------------------------------------- static friction
@@ -291,7 +291,7 @@ def test_energy_never_grows_after_the_push(model, name):
     after = energy[released:]
     assert after[0] > 1e-3  # J/kg: it still slides
     assert after[-1] == 0.0
-    # Measured: at most 2.8e-6 of it, in the last step of the can, which then rights itself from its lean.
+    # Measured: at most 1.6e-6 of it, in the last step of the can, which then rights itself from its lean.
     assert np.diff(after).max() < 1e-5 * after[0]
 
 
@@ -313,7 +313,7 @@ def test_hydroelastic_and_point_contact_agree():
             times, point = pushed(name, push, "point")
             motion = twin(OBJECTS[name], THETA, push, push.path.times[-1] + 0.6, "hydroelastic")
             differences.append((motion.planar_at(times) - point) / SIGMA)
-    # Measured: 0.002 to 0.06 sigma, the can at 0.5 m/s 0.30; all together 0.10 (see below).
+    # Measured: 0.002 to 0.06 sigma, the can at 0.5 m/s 0.30; all together 0.079.
     assert rms(np.concatenate(differences)) < 0.2
     assert max(rms(d) for d in differences) < 0.5
 

@@ -46,7 +46,7 @@ def test_the_impulse_is_the_references():
 
 def test_energy_is_never_made():
     for touch in touches(1, 4000):
-        mass, inertia, lever_n, lever_t, approach, slip, *_ = touch
+        mass, _, _, _, approach, slip, *_ = touch
         got = impulse(touch)
         # Work of an impulse on a body against an unmoving wall: J . (u + u') / 2.
         normal_rate, slip_after = after(touch, got.normal, got.tangent)

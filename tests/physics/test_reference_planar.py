@@ -31,9 +31,7 @@ BOX = OBJECTS["box"]
 
 def straight_path(start, speed, *, direction=(1.0, 0.0), ramp=0.05, cruise=0.3, brake=0.04):
     times = np.cumsum([0.0, ramp, cruise, brake])
-    return HandPath(
-        times=times, p0=np.array(start, float), velocities=np.outer([0, speed, speed, 0], direction)
-    )
+    return HandPath(times=times, p0=np.array(start, float), velocities=np.outer([0, speed, speed, 0], direction))
 
 
 def end_pose(body, mu, *, seconds=1.0, **more):
@@ -212,9 +210,7 @@ def test_a_slow_push_approaches_the_quasi_static_limit():
         ends.append(motion.poses[-1] / travel)
     np.testing.assert_allclose(ends[0], ends[1], rtol=2e-3, atol=2e-3)
     # A sticking tip: twist and force are normal to each other on the limit surface; first instant
-    motion = simulate_planar(
-        BOX, 0.3, np.array([0.0, 0.3, 0.35]), hand=Hand(path=path, friction=2.0), time_step=2e-5
-    )
+    motion = simulate_planar(BOX, 0.3, np.array([0.0, 0.3, 0.35]), hand=Hand(path=path, friction=2.0), time_step=2e-5)
     twist, force = motion.velocities[1], motion.forces[1]
     points, weights = BOX.support(9600)
     slip = twist[:2] + twist[2] * np.column_stack([-points[:, 1], points[:, 0]])
@@ -237,9 +233,7 @@ def test_a_sticking_tip_does_not_slip_and_a_pushed_face_stays_on_the_tip():
     assert np.abs(x[touching] + 0.06).max() < 2e-8  # gap, m
     # the tip does not turn: while it sticks, the touched point rolls by the tip's radius times the yaw
     rolled = 0.010 * (motion.poses[touching, 2] - motion.poses[touching[0], 2])
-    drift = np.minimum(
-        np.abs(y[touching] - y[touching[0]] - rolled), np.abs(y[touching] - y[touching[0]] + rolled)
-    )
+    drift = np.minimum(np.abs(y[touching] - y[touching[0]] - rolled), np.abs(y[touching] - y[touching[0]] + rolled))
     assert drift.max() < 2e-6
 
 
@@ -257,7 +251,7 @@ def test_halving_the_time_step_changes_a_push_by_less_than_five_micrometres():
 # ----------------------------------------------------------------------------------------------------- impact
 
 
-def impact_in_closed_form(mass, inertia, rn, rt, un, ut, mu, e):  # noqa: PLR0917
+def impact_in_closed_form(mass, inertia, rn, rt, un, ut, mu, e):
     """Wang and Mason (1992), table 1: impulses of Routh's method with Poisson's e, by the cases."""
     sign = 1.0 if ut > 0 else -1.0
     rt, ut = sign * rt, sign * ut  # mirrored so that the slip is positive
@@ -300,9 +294,7 @@ def test_impacts_agree_with_the_closed_form_in_every_case():
 @pytest.mark.parametrize("e", [0.0, 0.4])
 def test_a_fast_oblique_off_centre_touch_leaves_with_the_velocities_of_the_closed_form(mu_hand, e):
     direction, offset = (math.cos(0.4), math.sin(0.4)), 0.02
-    path = straight_path(
-        (-0.0635 - 0.010 - 0.02, offset - 0.02 * math.tan(0.4)), 0.6, direction=direction, ramp=0.01
-    )
+    path = straight_path((-0.0635 - 0.010 - 0.02, offset - 0.02 * math.tan(0.4)), 0.6, direction=direction, ramp=0.01)
     motion = simulate_planar(
         ERASER, 0.3, np.linspace(0, 0.06, 60001), hand=Hand(path=path, friction=mu_hand, restitution=e)
     )

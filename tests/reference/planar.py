@@ -11,7 +11,7 @@ in an impact, the hand no vertical force.
 """
 
 # Compiled loops take plain numbers by position and stay in one piece.
-# ruff: noqa: PLR0912, PLR0915, PLR0917
+# ruff: noqa: PLR0912, PLR0915
 
 import math
 from dataclasses import dataclass, field
@@ -197,10 +197,7 @@ def simulate_planar(
     frame = np.array([body.mass, body.inertia, body.height_of_com, body.radius, *body.com_offset, *force])
     polygon = np.zeros((0, 2)) if body.polygon is None else body.polygon
     out, impacts, rest_time, tipped, steps, unconverged = _integrate(
-        *(
-            np.ascontiguousarray(a, dtype=float)
-            for a in (local[:, 0], local[:, 1], weights / weights.sum(), mu)
-        ),
+        *(np.ascontiguousarray(a, dtype=float) for a in (local[:, 0], local[:, 1], weights / weights.sum(), mu)),
         frame,
         *(np.ascontiguousarray(a, dtype=float) for a in (polygon, *knots, tip, pose, velocity, times)),
         float(time_step),
@@ -437,9 +434,7 @@ def _contact(free, yn, yt, jn, jt, want_n, want_t, mu):
 
 
 @njit(cache=True)
-def _step(
-    px, py, w, mu, m, inertia, hc, start, pull, h, eps, touch, jn, jt, want, arm, mu_hand, loaded, work, out
-):
+def _step(px, py, w, mu, m, inertia, hc, start, pull, h, eps, touch, jn, jt, want, arm, mu_hand, loaded, work, out):
     """One implicit step in the frame of B; out = new velocity (3), force of the hand (2), lifted, tipped.
 
     Newton on the friction; where Newton turns in circles (the step in which sliding ends) one pass with the
@@ -597,9 +592,7 @@ def _integrate(px, py, w, mu, frame, polygon, kt, kp, kv, tip, pose, velocity, t
                     mid = (low + high) / 2
                     for i in range(3):
                         new_q[i] = q[i] + mid * h * mean[i]
-                    gap, _, _, _, _ = _gap_at(
-                        new_q, t + mid * h, com, polygon, radius, tip_radius, kt, kp, kv
-                    )
+                    gap, _, _, _, _ = _gap_at(new_q, t + mid * h, com, polygon, radius, tip_radius, kt, kp, kv)
                     low, high = (mid, high) if gap > 0 else (low, mid)
                 h = max(low * h, 1e-12)
             tipped = tipped or solved[6] > 0

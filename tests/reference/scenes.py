@@ -276,7 +276,7 @@ def _shape(body: PlanarObject) -> dict:
     return {"shape": "prism", "polygon_m": corners, "height_m": body.height}
 
 
-def _write_push(  # noqa: PLR0917
+def _write_push(
     file: Path, body: PlanarObject, push: PlanarPush, motion: Motion, noise: Noise, rng: np.random.Generator
 ) -> None:
     n = len(motion.times)

@@ -9,7 +9,8 @@ from twin import body_of, config_of
 
 from physid_drake.cell import Cell, Start
 from physid_drake.cell.outline import Disc
-from physid_drake.cell.solid import polygon_gyration, solid_of
+from physid_drake.cell.solid import solid_of
+from physid_drake.cell.support import second_moments
 from physid_drake.errors import CellError
 from physid_drake.recording import Box, Cylinder, MeshShape, Prism
 
@@ -42,9 +43,7 @@ def test_inertia_of_a_box_and_of_a_cylinder_are_the_textbooks():
     x, y, z = solid_of(Box(size=(0.1, 0.08, 0.06))).gyration
     assert (x, y, z) == pytest.approx(((0.0064 + 0.0036) / 12, (0.01 + 0.0036) / 12, (0.01 + 0.0064) / 12))
     standing = solid_of(Cylinder(radius=0.03, length=0.2, axis="z"))
-    assert standing.gyration == pytest.approx(
-        (0.0009 / 4 + 0.04 / 12, 0.0009 / 4 + 0.04 / 12, 0.0009 / 2)
-    )
+    assert standing.gyration == pytest.approx((0.0009 / 4 + 0.04 / 12, 0.0009 / 4 + 0.04 / 12, 0.0009 / 2))
     assert isinstance(standing.outline, Disc)
     lying = solid_of(Cylinder(radius=0.03, length=0.2, axis="y"))
     assert lying.gyration == pytest.approx((standing.gyration[0], standing.gyration[2], standing.gyration[0]))
@@ -61,7 +60,8 @@ def test_gyration_of_a_polygon_is_that_of_its_points(name):
     for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
         points = points[(b - a)[0] * (points[:, 1] - a[1]) - (b - a)[1] * (points[:, 0] - a[0]) > 0]
     want = (points[:, 1] ** 2).mean(), (points[:, 0] ** 2).mean()
-    assert polygon_gyration(polygon) == pytest.approx(want, rel=0.01)  # Monte Carlo of 2e5 points: 0.3 %
+    xx, _, yy = second_moments(np.asarray(polygon))
+    assert (yy, xx) == pytest.approx(want, rel=0.01)  # Monte Carlo of 2e5 points: 0.3 %
 
 
 def test_a_square_prism_is_a_box():
@@ -92,10 +92,11 @@ def along(polygon, n=41):
 
 
 @pytest.mark.parametrize("name", list(PRISMS))
-def test_the_faces_of_a_prism_cover_its_outline(name):
+def test_the_faces_of_a_prism_cover_its_outline(name, request):
     solid = solid_of(Prism(polygon=PRISMS[name], height=0.04))
     gaps = [distance_to_faces(solid, point) for point in along(PRISMS[name])]
-    assert max(gaps) < 1e-9, f"{max(gaps) * 1e3:.3f} mm of the outline are bare"
+    # At acute corners the faces, 0.2 mm thick, end early: by 0.2 mm (45 degrees), 0.4 mm (27 degrees).
+    assert max(gaps) < 5e-4, f"{max(gaps) * 1e3:.3f} mm of the outline are bare"
 
 
 @pytest.mark.parametrize("name", list(PRISMS))
@@ -151,7 +152,7 @@ def test_a_mesh_of_a_box_slides_like_the_box(box_mesh):
         ("line.obj", "v 0 0 0\nv 1 0 0\nv 2 0 1\nv 3 0 1\n"),
     ],
 )
-def test_a_mesh_that_is_no_solid_is_refused_by_name(tmp_path, name, text):
+def test_a_mesh_that_is_no_solid_is_refused_by_name(tmp_path, name, text, request):
     file = tmp_path / name
     if text is not None:
         file.write_text(text, encoding="utf-8")

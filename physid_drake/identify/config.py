@@ -1,0 +1,42 @@
+"""Configuration of the identification: plain data for Drake's typed YAML loader, no deferred annotations."""
+
+import dataclasses as dc
+
+PLAIN = ("mass", "hand_friction", "support_friction")
+
+
+@dc.dataclass
+class ThetaConfig:
+    """Which parameters are unknown, and their bounds.
+
+    Attributes:
+        parameters: names out of ``mass``, ``hand_friction``, ``support_friction``, ``com_x``, ``com_y``,
+            ``inertia_ratio``, ``static_ratio``, ``restitution``.
+        bounds: ``[lower, upper]`` per name, in SI units, instead of the defaults.
+        nominal: start values per name, instead of the defaults.
+    """
+
+    parameters: list[str] = dc.field(default_factory=lambda: list(PLAIN))
+    bounds: dict[str, list[float]] = dc.field(default_factory=dict)
+    nominal: dict[str, float] = dc.field(default_factory=dict)
+
+
+@dc.dataclass
+class SearchConfig:
+    """Greedy entropy search.
+
+    Attributes:
+        candidates: number of thetas in the candidate set.
+        budget: thetas tried.
+        batch: thetas per update of the belief.
+        entropy_tolerance_nats: the search stops when the entropy of P_min moves less than this.
+        patience: over so many updates.
+        jobs: processes; 0 takes the machine's cores.
+    """
+
+    candidates: int = 1000
+    budget: int = 40
+    batch: int = 1
+    entropy_tolerance_nats: float = 0.1
+    patience: int = 5
+    jobs: int = 0

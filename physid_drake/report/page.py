@@ -1,0 +1,71 @@
+"""``page.html``: Meshcat's static page with the results beside it; it opens without a network."""
+
+from __future__ import annotations
+
+from jinja2 import Environment, StrictUndefined
+
+from physid_drake.identify import Identification
+from physid_drake.report.tables import accuracy_cells, verdict
+
+_PANEL = """
+<style>
+  #physid { position: fixed; top: 0; left: 0; max-width: 33em; margin: 10px; padding: 10px 14px; max-height: 94vh;
+    overflow: auto; font: 13px/1.45 system-ui, sans-serif; background: rgba(255, 255, 255, .92); color: #222;
+    border-radius: 6px; box-shadow: 0 1px 6px rgba(0, 0, 0, .3); z-index: 10; }
+  #physid h1 { font-size: 16px; margin: 0 0 4px; } #physid h2 { font-size: 13px; margin: 10px 0 2px; }
+  #physid table { border-collapse: collapse; } #physid td, #physid th { padding: 1px 8px 1px 0; text-align: right;
+    font-weight: normal; } #physid th { color: #666; } #physid td:first-child, #physid th:first-child { text-align: left; }
+  #physid .dot { display: inline-block; width: 10px; height: 10px; border-radius: 5px; margin: 0 4px 0 10px; }
+  #physid summary { cursor: pointer; } #physid select { max-width: 100%; }
+</style>
+<div id="physid"><details open><summary><b>{{ name }}</b></summary>
+  <p>{{ verdict }}</p>
+  <h2>theta</h2>
+  <table><tr><th>parameter</th><th>estimate</th><th>90 % interval</th><th>told</th></tr>
+  {% for e in estimates %}<tr><td>{{ e.name }}</td><td>{{ "%.4g" % e.value }} {{ "" if e.unit == "-" else e.unit }}</td>
+    <td>{{ "%.4g" % e.ci90[0] }} to {{ "%.4g" % e.ci90[1] }}</td>
+    <td>{{ "yes" if e.identifiable else "no (prior)" }}</td></tr>{% endfor %}
+  </table>
+  <h2>error of prediction (root mean square)</h2>
+  <table><tr><th></th><th>mm</th><th>deg</th><th>end mm</th><th>end deg</th><th>N</th><th>std</th></tr>
+  {% for label, cells in accuracy %}<tr><td>{{ label }}</td>{% for c in cells %}<td>{{ c }}</td>{% endfor %}</tr>{% endfor %}
+  </table>
+  <p><span class="dot" style="background:#f28c26"></span>recorded<span class="dot" style="background:#3373cc"></span>
+    simulated &nbsp; push: <select id="physid-push">{% for push, start in marks %}
+    <option value="{{ start }}">{{ push }}</option>{% endfor %}</select></p>
+  <p>{{ note }}</p>
+</details></div>
+<script>
+  document.getElementById("physid-push").addEventListener("change", function (event) {
+    viewer.animator.seek(parseFloat(event.target.value)); viewer.animator.play();
+  });
+</script>
+"""
+
+
+def result_page(html: str, result: Identification, *, name: str, marks: list[tuple[str, float]], note: str) -> str:
+    """Meshcat's static page with a panel of results.
+
+    Args:
+        html: what Meshcat wrote.
+        result: the identification.
+        name: of the recording.
+        marks: name and start in the animation [s] of every push shown.
+        note: one line on how it was made.
+    """
+    rows = [
+        ("held out, before", result.before),
+        ("held out, after", result.after),
+        ("fitted, after", result.fitted),
+    ]
+    environment = Environment(undefined=StrictUndefined, autoescape=True)
+    panel = environment.from_string(_PANEL).render(
+        name=name,
+        verdict=verdict(result),
+        estimates=result.estimates,
+        accuracy=[(label, accuracy_cells(a)) for label, a in rows if a is not None],
+        marks=marks,
+        note=note,
+    )
+    body_end = html.rindex("</body>")
+    return html[:body_end] + panel + html[body_end:]

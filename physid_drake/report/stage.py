@@ -1,0 +1,212 @@
+"""The cell as a person sees it: Meshcat with the recorded pushes as ghosts beside the simulated ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import (
+    Box,
+    Cylinder,
+    Meshcat,
+    MeshcatParams,
+    MeshcatVisualizer,
+    MeshcatVisualizerParams,
+    Rgba,
+    Shape,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.multibody.tree import SpatialInertia, default_model_instance
+from pydrake.systems.framework import DiagramBuilder
+
+from physid_drake.cell.hand_model import add_hand_visual
+from physid_drake.cell.motion import Motion
+from physid_drake.cell.solid import Solid, solid_of
+from physid_drake.recording import Push, Recording
+from physid_drake.resources import shipped
+
+Array = NDArray[np.float64]
+
+RECORDED = np.array([0.95, 0.55, 0.15, 0.45])  # the ghost
+SIMULATED = np.array([0.20, 0.45, 0.80, 1.0])
+FRAMES_PER_SECOND = 32.0
+PAUSE = 0.4  # s between two pushes
+LONGEST = 60.0  # s of the whole animation; longer recordings are shown faster
+PLAIN_TABLE = (1.20, 0.80)  # m: the shipped model with its legs and robots
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """One push to be shown: what was recorded and what was simulated."""
+
+    push: Push
+    motion: Motion
+
+
+class Stage:
+    """Meshcat with table, hand, object and ghost."""
+
+    def __init__(self, recording: Recording, meshcat: Meshcat | None = None) -> None:
+        """Put the scene on the stage.
+
+        Args:
+            recording: whose table, object and hand are shown.
+            meshcat: a running one; None starts one that serves on a free port.
+        """
+        self.meshcat = meshcat or Meshcat(MeshcatParams(show_stats_plot=False))
+        self._recording = recording
+        self._solid: Solid = solid_of(recording.object.shape)
+        builder = DiagramBuilder()
+        plant, _ = AddMultibodyPlantSceneGraph(builder, 0.0)
+        _add_surroundings(plant, recording)
+        simulated = _add_look(plant, self._solid, "simulated", SIMULATED)
+        recorded = _add_look(plant, self._solid, "recorded", RECORDED)
+        hand = None
+        if recording.hand is not None:
+            hand = plant.AddRigidBody("hand", default_model_instance(), SpatialInertia.SolidSphereWithMass(1.0, 0.01))
+            tip = recording.hand
+            lift = max(0.0, 0.5 * (tip.length or 0.0) - 0.5 * self._solid.height)
+            add_hand_visual(plant, hand, tip.tip, tip.radius, tip.length, height=lift)
+        plant.Finalize()
+        self._plant, self._bodies = plant, (simulated, recorded, hand)
+        MeshcatVisualizer.AddToBuilder(
+            builder,
+            _scene_graph(builder),
+            self.meshcat,
+            MeshcatVisualizerParams(publish_period=1.0 / FRAMES_PER_SECOND),
+        )
+        self._diagram = builder.Build()
+        self._root = self._diagram.CreateDefaultContext()
+        self._context = plant.GetMyMutableContextFromRoot(self._root)
+        centre = np.array([*recording.pushes[0].object.positions[0][:2], 0.0])
+        self.meshcat.SetCameraPose(centre + np.array([-0.10, -0.45, 0.32]), centre)
+
+    def show_start(self) -> None:
+        """Show the first push's first moment, before anything is known."""
+        push = self._recording.pushes[0]
+        self._pose(_pose_at(push, push.start_time), _pose_at(push, push.start_time), _hand_at(push, push.start_time))
+        self._root.SetTime(0.0)
+        self._diagram.ForcedPublish(self._root)
+
+    def play(self, scenes: Sequence[Scene]) -> list[tuple[str, float]]:
+        """Record all pushes one after the other as an animation.
+
+        Returns:
+            Name and start [s of the animation] of every push.
+        """
+        total = sum(scene.push.duration + PAUSE for scene in scenes)
+        speed = max(1.0, total / LONGEST)
+        self.meshcat.DeleteRecording()
+        self.meshcat.StartRecording(frames_per_second=FRAMES_PER_SECOND, set_visualizations_while_recording=False)
+        clock, marks = 0.0, []
+        for scene in scenes:
+            marks.append((scene.push.name, clock))
+            self._trace(scene)
+            clock = self._play_one(scene, clock, speed)
+        self.meshcat.StopRecording()
+        self.meshcat.PublishRecording()
+        return marks
+
+    def _play_one(self, scene: Scene, clock: float, speed: float) -> float:
+        push = scene.push
+        span = push.duration + PAUSE
+        for k in range(max(2, round(span / speed * FRAMES_PER_SECOND))):
+            time = push.start_time + k * speed / FRAMES_PER_SECOND
+            self._pose(_motion_at(scene.motion, time), _pose_at(push, time), _hand_at(push, time))
+            self._root.SetTime(clock + k / FRAMES_PER_SECOND)
+            self._diagram.ForcedPublish(self._root)
+        return clock + span / speed
+
+    def _trace(self, scene: Scene) -> None:
+        """Paths on the table: recorded and simulated."""
+        name = scene.push.name.replace("/", "_")
+        lift = np.array([[0.0], [0.0], [2e-3]])
+        recorded = scene.push.object.positions.T * [[1.0], [1.0], [0.0]] + lift
+        simulated = scene.motion.poses[:, 4:7].T * [[1.0], [1.0], [0.0]] + lift
+        self.meshcat.SetLine(f"paths/recorded/{name}", recorded, 3.0, Rgba(*RECORDED[:3], 1.0))
+        self.meshcat.SetLine(
+            f"paths/simulated/{name}", simulated[:, :: max(1, simulated.shape[1] // 300)], 2.0, Rgba(*SIMULATED)
+        )
+
+    def _pose(self, simulated: RigidTransform, recorded: RigidTransform, hand: RigidTransform | None) -> None:
+        for body, pose in zip(self._bodies, (simulated, recorded, hand), strict=True):
+            if body is not None and pose is not None:
+                self._plant.SetFreeBodyPose(self._context, body, pose)
+
+
+def _scene_graph(builder: DiagramBuilder) -> object:
+    return builder.GetSubsystemByName("scene_graph")
+
+
+def _add_surroundings(plant: object, recording: Recording) -> None:
+    """The shipped table with the two robots where it is that table; else a plain top of the recorded size."""
+    table = recording.table
+    if np.allclose(table.size, PLAIN_TABLE) and np.allclose(table.centre, 0.0):
+        models = shipped("models")
+        parser = Parser(plant)
+        parser.package_map().AddPackageXml(str(models / "package.xml"))
+        for file in (
+            "table/table.sdf",
+            *(f"robots/{path.name}" for path in sorted((models / "robots").glob("*.sdf"))),
+        ):
+            parser.AddModels(str(models / file))
+        return
+    top = Box(table.size[0], table.size[1], 0.02)
+    X_WT = RigidTransform([table.centre[0], table.centre[1], -0.0101])
+    plant.RegisterVisualGeometry(plant.world_body(), X_WT, top, "table_top", np.array([0.75, 0.68, 0.58, 1.0]))  # type: ignore[attr-defined]
+
+
+def _add_look(plant: object, solid: Solid, name: str, colour: Array) -> object:
+    body = plant.AddRigidBody(name, default_model_instance(), SpatialInertia.SolidSphereWithMass(1.0, 0.01))  # type: ignore[attr-defined]
+    for i, (shape, X_BG) in enumerate(solid.visual):
+        plant.RegisterVisualGeometry(body, X_BG, shape, f"{name}_{i}", colour)  # type: ignore[attr-defined]
+    front = _mark(solid)
+    if front is not None:
+        shape, X_BG = front
+        plant.RegisterVisualGeometry(body, X_BG, shape, f"{name}_front", np.array([0.1, 0.1, 0.1, float(colour[3])]))  # type: ignore[attr-defined]
+    return body
+
+
+def _mark(solid: Solid) -> tuple[Shape, RigidTransform] | None:
+    """A dot on the top, so that a round object's turning is seen; None on one that rolls."""
+    if solid.rolling_radius is not None:
+        return None
+    x0, _, x1, _ = solid.outline.extent()
+    reach = 0.15 * (x1 - x0)
+    return Cylinder(0.3 * reach, 1e-3), RigidTransform([0.5 * x1, 0.0, 0.5 * solid.height])
+
+
+def _motion_at(motion: Motion, time: float) -> RigidTransform:
+    k = int(np.clip(np.searchsorted(motion.times, time), 0, len(motion.times) - 1))
+    return _transform(motion.poses[k, :4], motion.poses[k, 4:7])
+
+
+def _pose_at(push: Push, time: float) -> RigidTransform:
+    stream = push.object
+    k = int(np.clip(np.searchsorted(stream.times, time, side="right") - 1, 0, len(stream) - 1))
+    return _transform(stream.quaternions[k], stream.positions[k])
+
+
+def _hand_at(push: Push, time: float) -> RigidTransform | None:
+    if push.hand is None:
+        return None
+    position = [float(np.interp(time, push.hand.times, column)) for column in push.hand.positions.T]
+    return RigidTransform(np.array(position))
+
+
+def _transform(quaternion: Array, position: Array) -> RigidTransform:
+    w, x, y, z = quaternion / np.linalg.norm(quaternion)
+    R = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    X = np.eye(4)
+    X[:3, :3], X[:3, 3] = R, position
+    return RigidTransform(X)

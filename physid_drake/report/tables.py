@@ -1,0 +1,70 @@
+"""Results as tables for a terminal."""
+
+from __future__ import annotations
+
+import math
+
+from rich.table import Table
+
+from physid_drake.identify import Accuracy, Identification
+
+
+def estimates_table(result: Identification, title: str) -> Table:
+    """Theta with intervals, and whether these pushes tell it."""
+    table = Table(title=title, title_justify="left")
+    for header, justify in (("parameter", "left"), ("estimate", "right"), ("90 % interval", "right"),
+                            ("told by these pushes", "left"), ("before", "right")):  # fmt: skip
+        table.add_column(header, justify=justify)  # type: ignore[arg-type]
+    for e in result.estimates:
+        unit = "" if e.unit == "-" else f" {e.unit}"
+        told = "yes" if e.identifiable else "no: it keeps its prior"
+        table.add_row(
+            e.name, f"{e.value:.4g}{unit}", f"{e.ci90[0]:.4g} to {e.ci90[1]:.4g}", told, f"{e.prior:.4g}{unit}"
+        )
+    return table
+
+
+def accuracy_table(result: Identification) -> Table:
+    """How well pushes are predicted, before and after."""
+    table = Table(title="error of prediction (root mean square)", title_justify="left")
+    for header in (
+        "pushes",
+        "theta",
+        "path [mm]",
+        "path [deg]",
+        "end [mm]",
+        "end [deg]",
+        "force [N]",
+        "std of sensors",
+    ):
+        table.add_column(header, justify="left" if header in ("pushes", "theta") else "right")
+    held, fitted = f"{len(result.held_out)} held out", f"{len(result.training)} fitted"
+    for pushes, theta, accuracy in ((held, "before", result.before), (held, "after", result.after),
+                                    (fitted, "after", result.fitted)):  # fmt: skip
+        if accuracy is not None:
+            table.add_row(pushes, theta, *accuracy_cells(accuracy))
+    return table
+
+
+def accuracy_cells(accuracy: Accuracy) -> list[str]:
+    """The numbers of an accuracy as text: mm, degrees, mm, degrees, N, standard deviations."""
+    force = "-" if accuracy.force is None else f"{accuracy.force:.3f}"
+    return [
+        f"{1e3 * accuracy.position:.2f}",
+        f"{math.degrees(accuracy.rotation):.2f}",
+        f"{1e3 * accuracy.end_position:.2f}",
+        f"{math.degrees(accuracy.end_rotation):.2f}",
+        force,
+        f"{accuracy.sigmas:.2f}",
+    ]
+
+
+def verdict(result: Identification) -> str:
+    """In one sentence, how well the plain cell explains the pushes."""
+    chi2 = result.reduced_chi2
+    if chi2 < 1.5:
+        return f"The plain cell explains these pushes to their noise (reduced chi-square {chi2:.2f})."
+    return (
+        f"The plain cell does not explain these pushes to their noise (reduced chi-square {chi2:.2f}, 1 expected): "
+        "the intervals are widened for it, and some physics or a sensor's figure is missing."
+    )

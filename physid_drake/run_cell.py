@@ -1,0 +1,226 @@
+"""The main job: build the cell, read a recording, identify, show. ``python -m physid_drake.run_cell --help``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from physid_drake.errors import OutputError, PhysidError
+from physid_drake.identify import Identification, Identifier
+from physid_drake.identify.nuisance import nuisance_of
+from physid_drake.identify.rollouts import Task, simulate
+from physid_drake.identify.system import PUSH_PERIOD, IdentificationSystem, RecordingPlayer
+from physid_drake.recording import Recording, read_recording
+from physid_drake.report.page import result_page
+from physid_drake.report.result import result_json
+from physid_drake.report.stage import Scene, Stage
+from physid_drake.report.tables import accuracy_table, estimates_table, verdict
+from physid_drake.resources import shipped
+from physid_drake.scenario import dump_scenario, load_scenario
+from physid_drake.scenario_schema import Scenario
+
+SHOWN = 12  # pushes in the animation, held-out ones first
+PACKAGES = ("physid_drake", "drake", "numpy", "scipy", "scikit-learn")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the main job; returns the exit status: 0 done, 1 an error of the input or output, 130 interrupted."""
+    arguments = _parser().parse_args(argv)
+    console = Console()
+    try:
+        run(arguments, console)
+    except PhysidError as error:
+        print("error: " + " ".join(str(error).split()), file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("interrupted; what was found is kept, and the same command goes on from there", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m physid_drake.run_cell", description=__doc__)
+    parser.add_argument(
+        "config", nargs="?", metavar="CONFIG", help="FILE or FILE:SCENARIO (default: the shipped eraser)"
+    )
+    parser.add_argument("--recording", metavar="FOLDER", help="the pushes, instead of the scenario's")
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where results go (default: runs/<scenario>)")
+    parser.add_argument("--seed", type=int, metavar="N", help="of everything random, instead of the scenario's")
+    parser.add_argument("--set", dest="override", metavar="YAML", help="such as '{search: {budget: 20}}'")
+    parser.add_argument("--no-view", action="store_true", help="serve no live Meshcat while working")
+    return parser
+
+
+def run(arguments: argparse.Namespace, console: Console) -> None:
+    """The whole job.
+
+    Raises:
+        PhysidError: one line that says what is wrong.
+    """
+    name, scenario = load_scenario(arguments.config, arguments.override)
+    if arguments.recording is not None:
+        scenario.recording = arguments.recording
+    if arguments.seed is not None:
+        scenario.seed = arguments.seed
+    recording = read_recording(_recording_folder(scenario.recording))
+    folder = RunFolder.open(arguments.out or Path("runs") / name, dump_scenario(name, scenario))
+    stage = None if arguments.no_view else _live(recording, console)
+    result, identifier = _identify(scenario, recording, folder, console)
+    console.print()
+    console.print(estimates_table(result, recording.name))
+    console.print(accuracy_table(result))
+    console.print(verdict(result))
+    if identifier.pool.diverged:
+        console.print(f"{identifier.pool.diverged} of {identifier.pool.count} rollouts diverged and count as failed.")
+    stage = stage or Stage(recording)
+    marks = stage.play(_scenes(result, identifier, recording))
+    note = f"{recording.description} Seed {scenario.seed}; {identifier.pool.count} rollouts."
+    page = result_page(stage.meshcat.StaticHtml(), result, name=recording.name, marks=marks, note=note)
+    folder.write("page.html", page)
+    folder.write("result.json", result_json(result, recording, scenario.seed, versions()))
+    folder.forget_state()
+    console.print(f"written: {folder.path / 'result.json'}, {folder.path / 'page.html'}")
+    _keep_serving(arguments.no_view, stage, console)
+
+
+def _recording_folder(text: str) -> Path:
+    """A folder, or a recording that ships with the project."""
+    path = Path(text)
+    if not path.exists() and path.parent == Path() and (shipped("recordings") / text).is_dir():
+        return shipped("recordings") / text
+    return path
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything that the numbers depend on."""
+    return {"python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
+
+
+def _live(recording: Recording, console: Console) -> Stage:
+    stage = Stage(recording)
+    stage.show_start()
+    console.print(f"Meshcat: {stage.meshcat.web_url()}")
+    return stage
+
+
+def _identify(
+    scenario: Scenario, recording: Recording, folder: RunFolder, console: Console
+) -> tuple[Identification, Identifier]:
+    """Wire and run the diagram: the recording's player, and the system that learns from its pushes."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        identifier = Identifier(
+            recording,
+            cell=scenario.cell,
+            theta=scenario.theta,
+            search=scenario.search,
+            held_out_share=scenario.held_out_share,
+            seed=scenario.seed,
+            state=folder.path / "belief.npz",
+            progress=_bar(progress),
+        )
+        builder = DiagramBuilder()
+        player = builder.AddSystem(RecordingPlayer(recording.pushes))
+        system = builder.AddSystem(
+            IdentificationSystem(
+                lambda _: identifier.run(),
+                after=len(recording.pushes),
+                dimension=identifier.thetas.space.dimension,
+                nominal=identifier.thetas.space.nominal,
+            )
+        )
+        builder.Connect(player.GetOutputPort("push.measured"), system.GetInputPort("push.measured"))
+        diagram = builder.Build()
+        simulator = Simulator(diagram)
+        simulator.AdvanceTo(len(recording.pushes) * PUSH_PERIOD)
+        result = system.identification(system.GetMyContextFromRoot(simulator.get_context()))
+    assert result is not None
+    return result, identifier
+
+
+def _bar(progress: Progress) -> Callable[[str, int, int], None]:
+    task = progress.add_task("starting", total=None)
+
+    def show(stage: str, done: int, total: int) -> None:
+        progress.update(task, description=stage, completed=done, total=total or None)
+
+    return show
+
+
+def _scenes(result: Identification, identifier: Identifier, recording: Recording) -> list[Scene]:
+    """Held-out pushes first, as the model predicts them: with nothing of their own fitted."""
+    by_name = {problem.name: problem for problem in identifier.problems}
+    names = [*result.held_out, *result.training][:SHOWN]
+    scenes = []
+    for push in recording.subset(names).pushes:
+        problem = by_name[push.name]
+        nuisance = nuisance_of(problem, 0.01)
+        task = Task(problem=problem, theta=result.theta, nuisance=nuisance, values=0.0 * nuisance.stds)
+        scenes.append(Scene(push=push, motion=simulate(identifier.pool.spec, identifier.thetas, task)))
+    return scenes
+
+
+def _keep_serving(no_view: bool, stage: Stage, console: Console) -> None:
+    if no_view or not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return
+    console.print(f"The animation plays at {stage.meshcat.web_url()}; press Enter to end.")
+    sys.stdin.readline()
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunFolder:
+    """A run's folder: its configuration, the state to go on from, the results."""
+
+    path: Path
+
+    @classmethod
+    def open(cls, path: Path, scenario: str) -> RunFolder:
+        """Make the folder, or go on in one; the state of a run with another configuration is dropped.
+
+        Raises:
+            OutputError: if it cannot be written.
+        """
+        folder = cls(path=path)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            config = path / "config.yaml"
+            if config.exists() and config.read_text(encoding="utf-8") != scenario:
+                folder.forget_state()
+        except (OSError, UnicodeDecodeError) as error:
+            raise OutputError(f"output folder '{path}': cannot be written: {error}.") from error
+        folder.write("config.yaml", scenario)
+        return folder
+
+    def write(self, name: str, text: str) -> None:
+        """Write a file whole or not at all.
+
+        Raises:
+            OutputError: if it cannot be written.
+        """
+        try:
+            with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=self.path, delete=False) as part:
+                part.write(text)
+            Path(part.name).chmod(0o644)
+            os.replace(part.name, self.path / name)  # noqa: PTH105
+        except OSError as error:
+            raise OutputError(f"'{self.path / name}': cannot be written: {error}.") from error
+
+    def forget_state(self) -> None:
+        """Drop the search's state: the run is done, or it was another run's."""
+        (self.path / "belief.npz").unlink(missing_ok=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,138 @@
+"""A run's configuration: one YAML file with named scenarios, read by Drake's typed loader."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import re
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
+
+from physid_drake.errors import ConfigError
+from physid_drake.resources import shipped
+from physid_drake.scenario_schema import Scenario
+
+DEFAULT = "eraser.yaml"
+SCHEMES = ("cenic", "lagged", "similar", "sap", "tamsi")
+
+
+def load_scenario(config: str | None, override: str | None) -> tuple[str, Scenario]:
+    """Read a scenario.
+
+    Args:
+        config: ``FILE`` or ``FILE:NAME``; a bare name is looked up among the shipped ones. None is the default.
+        override: one line of YAML laid over it, such as ``{search: {budget: 20}}``.
+
+    Returns:
+        The scenario's name and its values.
+
+    Raises:
+        ConfigError: naming the file and the key.
+    """
+    path, name = _locate(config or DEFAULT)
+    scenarios = _read_yaml(path)
+    if name is None:
+        name = next(iter(scenarios))
+    if name not in scenarios:
+        raise ConfigError(f"config '{path}': there is no scenario '{name}'; it holds {', '.join(scenarios)}.")
+    scenario = _typed(scenarios[name], Scenario(), f"config '{path}', scenario '{name}'")
+    if override is not None:
+        try:
+            extra = yaml.safe_load(override)
+        except yaml.YAMLError as error:
+            raise ConfigError(f"--set: is no YAML: {_one_line(error)}.") from error
+        scenario = _typed(extra, scenario, "--set")
+    return name, _checked(scenario, f"config '{path}', scenario '{name}'")
+
+
+def dump_scenario(name: str, scenario: Scenario) -> str:
+    """The scenario as YAML that ``load_scenario`` reads."""
+    return str(yaml_dump_typed({name: scenario}, schema=dict[str, Scenario]))
+
+
+def _locate(config: str) -> tuple[Path, str | None]:
+    file, _, name = config.partition(":")
+    path = Path(file)
+    if not path.exists() and path.parent == Path():
+        for candidate in (shipped("configs") / file, shipped("configs") / f"{file}.yaml"):
+            if candidate.exists():
+                path = candidate
+                break
+    return path, name or None
+
+
+def _read_yaml(path: Path) -> dict[str, Any]:
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise ConfigError(f"config '{path}': there is no such file.") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"config '{path}': cannot be read: {error}.") from error
+    except yaml.YAMLError as error:
+        raise ConfigError(f"config '{path}': is no YAML: {_one_line(error)}.") from error
+    if not isinstance(content, dict) or not content:
+        raise ConfigError(f"config '{path}': needs named scenarios at the top level, 'name: {{...}}'.")
+    # Keys that start with an underscore are for anchors and templates.
+    return {str(key): value for key, value in content.items() if not str(key).startswith("_")}
+
+
+def _typed(content: Any, defaults: Scenario, where: str) -> Scenario:
+    if content is None:
+        return defaults
+    if not isinstance(content, dict):
+        raise ConfigError(f"{where}: needs keys and values, but got {content!r}.")
+    _refuse_unknown(content, Scenario, where)
+    try:
+        loaded: Scenario = yaml_load_typed(schema=Scenario, data=yaml.safe_dump(content), defaults=defaults)
+    except (RuntimeError, ValueError, TypeError, KeyError, AssertionError) as error:
+        raise ConfigError(f"{where}: {_one_line(error)}.") from error
+    return loaded
+
+
+def _refuse_unknown(content: dict[str, Any], schema: type, where: str) -> None:
+    """Drake's loader names neither the file nor the path of an unknown key."""
+    fields = {field.name: field.type for field in dc.fields(schema)}
+    for key, value in content.items():
+        if key not in fields:
+            raise ConfigError(f"{where}: the key '{key}' is unknown; known are {', '.join(fields)}.")
+        inner = fields[key]
+        if isinstance(inner, type) and dc.is_dataclass(inner):
+            if not isinstance(value, dict):
+                raise ConfigError(f"{where}, key '{key}': needs keys and values, but got {value!r}.")
+            _refuse_unknown(value, inner, f"{where}, key '{key}'")
+
+
+def _checked(scenario: Scenario, where: str) -> Scenario:
+    """Refuse values that no run can use."""
+    cell, search = scenario.cell, scenario.search
+    rules: list[tuple[str, object, bool, str]] = [
+        ("cell.contact.model", cell.contact.model, cell.contact.model in ("hydroelastic", "point"),
+         "'hydroelastic' or 'point'"),
+        ("cell.solver.scheme", cell.solver.scheme,
+         cell.solver.scheme in SCHEMES, f"one of {', '.join(SCHEMES)}"),
+        ("cell.solver.time_step_s", cell.solver.time_step_s, 0.0 < cell.solver.time_step_s <= 0.05, "in (0, 0.05] s"),
+        ("cell.solver.slide_time_step_s", cell.solver.slide_time_step_s,
+         cell.solver.time_step_s <= cell.solver.slide_time_step_s <= 0.05, "between time_step_s and 0.05 s"),
+        ("cell.contact.points_per_side", cell.contact.points_per_side, 2 <= cell.contact.points_per_side <= 20,
+         "from 2 to 20"),
+        ("cell.contact.rest_depth_m", cell.contact.rest_depth_m, 1e-8 <= cell.contact.rest_depth_m <= 1e-2,
+         "from 1e-8 to 1e-2 m"),
+        ("cell.friction_cells", cell.friction_cells,
+         len(cell.friction_cells) == 2 and all(1 <= n <= 10 for n in cell.friction_cells), "[nx, ny] from 1 to 10"),
+        ("cell.default_mass_kg", cell.default_mass_kg, cell.default_mass_kg > 0.0, "above 0 kg"),
+        ("search.candidates", search.candidates, search.candidates >= 2, "at least 2"),
+        ("search.budget", search.budget, search.budget >= 1, "at least 1"),
+        ("search.batch", search.batch, search.batch >= 1, "at least 1"),
+        ("search.patience", search.patience, search.patience >= 1, "at least 1"),
+        ("held_out_share", scenario.held_out_share, 0.0 <= scenario.held_out_share < 1.0, "in [0, 1)"),
+    ]  # fmt: skip
+    for key, value, fine, rule in rules:
+        if not fine:
+            raise ConfigError(f"{where}, key '{key}': must be {rule}, but is {value!r}.")
+    return scenario
+
+
+def _one_line(error: BaseException) -> str:
+    return re.sub(r"\s+", " ", str(error)).strip().rstrip(".")

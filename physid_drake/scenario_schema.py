@@ -1,0 +1,27 @@
+"""What a scenario may say. Plain data: Drake's loader cannot read deferred annotations or frozen classes."""
+
+import dataclasses as dc
+
+from physid_drake.cell.config import CellConfig
+from physid_drake.identify import SearchConfig, ThetaConfig
+
+
+@dc.dataclass
+class Scenario:
+    """One run.
+
+    Attributes:
+        recording: a folder, or the name of a recording that ships with the project.
+        held_out_share: of the pushes, not fitted but predicted.
+        seed: of everything random.
+        cell: contact, solver, friction cells.
+        theta: the unknowns.
+        search: greedy entropy search.
+    """
+
+    recording: str = "eraser_reference"
+    held_out_share: float = 0.25
+    seed: int = 0
+    cell: CellConfig = dc.field(default_factory=CellConfig)
+    theta: ThetaConfig = dc.field(default_factory=ThetaConfig)
+    search: SearchConfig = dc.field(default_factory=SearchConfig)
