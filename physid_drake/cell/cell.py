@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses as dc
+
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
@@ -26,6 +28,8 @@ from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]
 
+EDGE_POINTS = 14  # along the longer side, where the table's edge cuts the underside
+
 
 class Cell:
     """Table, object and hand in Drake. Built once per process; theta goes into the Context.
@@ -41,7 +45,8 @@ class Cell:
         *,
         hand_radius: float | None,
         config: CellConfig | None = None,
-        edge: Array | None = None,
+        table: Array | None = None,
+        with_edge: bool = False,
     ) -> None:
         """Build the diagram.
 
@@ -49,12 +54,18 @@ class Cell:
             shape: the object's.
             hand_radius: of the hand's tip [m]; None without a hand.
             config: contact, solver, friction cells.
-            edge: (2, 2) lower and upper corner of the table top [m], for a table to fall from.
+            table: (2, 2) lower and upper corner of the table top [m]; None for an endless one. An object that
+                comes to its edge is simulated again in a cell with that edge, from which it can fall.
+            with_edge: model the edge from the start: point contact on a box, slower than the endless table.
 
         Raises:
             CellError: if the shape cannot be built.
         """
         self.config = config or CellConfig()
+        self._build = (shape, hand_radius, table)
+        self._table = None if table is None or with_edge else np.asarray(table, dtype=np.float64)
+        self._at_edge: Cell | None = None
+        edge = np.asarray(table, dtype=np.float64) if table is not None and with_edge else None
         self.solid: Solid = solid_of(shape)
         self.mean_depth = self.config.contact.rest_depth_m * _stiffer(self.solid)
         builder = DiagramBuilder()
@@ -86,7 +97,6 @@ class Cell:
             self.scene, self.simulator, solver, hand_radius,
             tilt_depth=self.mean_depth if hydroelastic and edge is None else None,
         )  # fmt: skip
-        self._applied: tuple[float, ...] | None = None
 
     def set_body(self, body: Body) -> None:
         """Write the parameters into the Context.
@@ -120,10 +130,37 @@ class Cell:
             hand_height: of the tip's contact above the table [m]; half the object's height if None.
         """
         self.set_body(body)
-        return self._stepper.run(
-            body=body, start=start, rest=self.rest_pose(body), path=path,
-            height=0.5 * self.solid.height if hand_height is None else hand_height, begin=begin, end=end,
-        )  # fmt: skip
+        motion = self._stepper.run(
+            body=body,
+            start=start,
+            rest=self.rest_pose(body),
+            path=path,
+            height=0.5 * self.solid.height if hand_height is None else hand_height,
+            begin=begin,
+            end=end,
+        )
+        if self._table is None or not self._overhangs(motion):
+            return motion
+        return self._cell_with_edge().rollout(
+            body, start=start, path=path, begin=begin, end=end, hand_height=hand_height
+        )
+
+    def _overhangs(self, motion: Motion) -> bool:
+        """Whether the object's circle was beyond the table's edge anywhere on its way."""
+        assert self._table is not None
+        x0, y0, x1, y1 = self.solid.underside.extent()
+        reach = max(np.hypot(x, y) for x in (x0, x1) for y in (y0, y1))
+        places = motion.poses[:, 4:6]
+        return bool((places - reach < self._table[0]).any() or (places + reach > self._table[1]).any())
+
+    def _cell_with_edge(self) -> Cell:
+        if self._at_edge is None:
+            shape, hand_radius, table = self._build
+            # Few Gauss points would let an object tip over the innermost one that has left the table.
+            contact = dc.replace(self.config.contact, model="point", points_per_side=EDGE_POINTS)
+            config = dc.replace(self.config, contact=contact)
+            self._at_edge = Cell(shape, hand_radius=hand_radius, config=config, table=table, with_edge=True)
+        return self._at_edge
 
     def rest_pose(self, body: Body) -> Array:
         """Settled pose (7,) of B, quaternion wxyz and position, at the origin with yaw 0."""

@@ -21,6 +21,7 @@ REST_SPEED = 2e-4  # m/s of any point: Drake's regularised friction lets a stopp
 NEAR = 3  # ticks: the hand is near when it could arrive within so many
 SMALLEST_STEP = 1e-7  # s
 GENTLE = 1e-3  # m/s: below this closing speed a touch needs no impact law
+FALLEN = 0.05  # m below the table top: it does not come back
 PARKED = (0.0, 0.0, 10.0)  # m: a hand that takes no part
 FASTEST = 50.0  # m/s: beyond it a rollout has diverged
 
@@ -92,6 +93,8 @@ class Stepper:
             self._begin_at(start, rest, height)
             while k < count:
                 k = self._skip_rest(k, count) if self._resting(k) else self._tick(k, count)
+                if self._x[self._q + 6] < -FALLEN:
+                    return self._log.motion(Outcome.FELL)
         except (RuntimeError, SystemExit, FloatingPointError):
             # Drake ends the process from a degenerate contact query; for a search it is one failed trial.
             return self._log.motion(Outcome.DIVERGED)

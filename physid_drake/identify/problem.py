@@ -124,14 +124,17 @@ class CellSpec:
     shape: Shape
     hand_radius: float | None
     config: CellConfig
+    table: tuple[tuple[float, float], tuple[float, float]]
 
 
 def spec_of(recording: Recording, config: CellConfig) -> CellSpec:
     """The cell of a recording."""
+    (cx, cy), (sx, sy) = recording.table.centre, recording.table.size
     return CellSpec(
         shape=recording.object.shape,
         hand_radius=None if recording.hand is None else recording.hand.radius,
         config=config,
+        table=((cx - 0.5 * sx, cy - 0.5 * sy), (cx + 0.5 * sx, cy + 0.5 * sy)),
     )
 
 

@@ -24,7 +24,7 @@ def cell_of(spec: CellSpec) -> Cell:
     """This process's cell for a spec, built at the first call."""
     key = repr(spec)
     if key not in _cells:
-        _cells[key] = Cell(spec.shape, hand_radius=spec.hand_radius, config=spec.config)
+        _cells[key] = Cell(spec.shape, hand_radius=spec.hand_radius, config=spec.config, table=np.array(spec.table))
     return _cells[key]
 
 

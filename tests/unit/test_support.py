@@ -66,7 +66,7 @@ def test_first_and_second_moments_are_exact(name, grid, request):
     support = quadrature(name, grid)
     centre, second = exact_moments(OUTLINES[name])
     size = math.sqrt(second.trace())
-    # A 64-gon's equal angles: measured 1.3e-3; a disc cut by cells is a 64-gon: 2e-5; cells' points lie a hair inside.
+    # A 64-gon's equal angles: measured 1.3e-3; a disc cut by cells is a 64-gon: 2e-5; cells' points lie inside.
     slack = {"ellipse": 2e-3, "disc": 5e-5}.get(name, 1e-8)
     got = np.einsum("i,ij,ik->jk", support.weights, support.points, support.points)
     np.testing.assert_allclose(support.weights @ support.points, centre, atol=slack * size + 1e-16)
