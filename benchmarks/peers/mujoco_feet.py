@@ -15,10 +15,8 @@ import numpy as np
 from peers.push import FRICTION, GRAVITY, MASS, SIZE, TIP_HEIGHT, TIP_RADIUS, Array, Push
 
 FOOT_RADIUS = 0.003  # m
-REST_DEPTH = 5e-5  # m
 IMPEDANCE = 1e-4  # MuJoCo's smallest
 SCALE = 1e3  # takes the normals' impedance lower still, by the body's inverse weight
-TIP_STIFFNESS = 1e4  # N/m
 TIP_DAMPING = 0.7  # of critical
 _LENGTH, _WIDTH, _HEIGHT = SIZE
 
@@ -85,26 +83,27 @@ class NaiveBox(_Prescribed):
 class SoftFeet(_Prescribed):
     """Small spheres under the box with the soft-impedance settings, and a tip that is free to move up and down."""
 
-    def __init__(self, points: Array, weights: Array, time_step: float) -> None:
-        self._feet = len(points)
-        model = mujoco.MjModel.from_xml_string(_soft_xml(points, weights, time_step))
+    def __init__(self, points: Array, weights: Array, time_step: float, *, soft: bool = False) -> None:
+        """Take support ``points`` (n, 2) [m] and ``weights`` (n,); ``soft`` contacts are for steps of 2 ms."""
+        depth, stiffness = (2e-4, 2e3) if soft else (5e-5, 1e4)  # m at rest; N/m of the tip
+        model = mujoco.MjModel.from_xml_string(_soft_xml(points, weights, time_step, depth, stiffness))
         # The contacts' stiffness is in units of the pair's inverse weight: the object's alone, and scaled.
         model.body_invweight0[model.body("object").id] *= SCALE
         for link in ("tip", "finger"):
             model.body_invweight0[model.body(link).id] = 0.0
         model.stat.meaninertia = MASS  # the solver's tolerance is relative to it
-        super().__init__(model, _HEIGHT / 2 - REST_DEPTH)
+        super().__init__(model, _HEIGHT / 2 - depth)
 
     def _write_parameters(self) -> None:
         self.model.pair_friction[:, :2] = FRICTION
 
 
-def _soft_xml(points: Array, weights: Array, time_step: float) -> str:
-    """The model; a foot's stiffness is its weight's share of what sinks by ``REST_DEPTH``."""
+def _soft_xml(points: Array, weights: Array, time_step: float, depth: float, stiffness: float) -> str:
+    """The model; a foot's stiffness is its weight's share of what makes the object sink by ``depth``."""
     inertia = MASS / 12.0 * (np.dot(SIZE, SIZE) - np.square(SIZE))
-    spring, damper = GRAVITY / REST_DEPTH * SCALE, 2.0 * math.sqrt(GRAVITY / REST_DEPTH) * SCALE
-    tip_spring = TIP_STIFFNESS / MASS * SCALE
-    tip_damper = 2.0 * TIP_DAMPING * math.sqrt(TIP_STIFFNESS / MASS) * SCALE
+    spring, damper = GRAVITY / depth * SCALE, 2.0 * math.sqrt(GRAVITY / depth) * SCALE
+    tip_spring = stiffness / MASS * SCALE
+    tip_damper = 2.0 * TIP_DAMPING * math.sqrt(stiffness / MASS) * SCALE
     soft = f'solimp="{IMPEDANCE} {IMPEDANCE} .001" solreffriction="0 {-IMPEDANCE / time_step}" condim="3"'
     rub = f'friction="{FRICTION} {FRICTION}"'
     feet = "".join(

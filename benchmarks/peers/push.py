@@ -40,7 +40,9 @@ class Push:
     def positions(self, times: Array) -> Array:
         """Positions (n, 2) of the tip [m] at ``times`` (n,)."""
         spans = np.diff(self.times)[:, None]
-        knots = np.vstack([np.zeros(2), np.cumsum(0.5 * spans * (self.velocities[1:] + self.velocities[:-1]), axis=0)])
+        knots = np.vstack(
+            [np.zeros(2), np.cumsum(0.5 * spans * (self.velocities[1:] + self.velocities[:-1]), axis=0)]
+        )
         t = np.clip(times, self.times[0], self.times[-1])
         k = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.times) - 2)
         into, slope = (t - self.times[k])[:, None], np.diff(self.velocities, axis=0) / spans

@@ -239,7 +239,7 @@ class Identifier:
         return Identification(
             thetas=self.thetas,
             theta=theta,
-            estimates=estimates_of(self.thetas, polished, degrees),
+            estimates=estimates_of(self.thetas, polished),
             noise=self.noise,
             search=found,
             polished=polished,
@@ -252,7 +252,7 @@ class Identifier:
         )
 
 
-def estimates_of(thetas: ThetaMap, polished: Polished, degrees: int) -> tuple[Estimate, ...]:
+def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
     """Intervals from the curvature of the cost; widened where the fit is worse than the noise.
 
     Source: G. A. F. Seber and C. J. Wild, Nonlinear Regression, 1989, section 5.1 (linearised intervals).
@@ -262,10 +262,9 @@ def estimates_of(thetas: ThetaMap, polished: Polished, degrees: int) -> tuple[Es
     # Parameters without a prior of their own count as uniform over their bounds: 1/12 of the cube's side squared.
     flat = np.array([0.0 if p.prior_std is not None else 12.0 for p in space.parameters])
     information = polished.jacobian.T @ polished.jacobian + np.diag(flat)
-    inflation = max(1.0, polished.chi2 / degrees)
     prior_rows = polished.jacobian[-d:]
     prior_information = prior_rows.T @ prior_rows + np.diag(flat)
-    spread = np.sqrt(np.diag(np.linalg.inv(information)) * inflation)
+    spread = np.sqrt(np.diag(np.linalg.inv(information)))
     prior_spread = np.sqrt(np.diag(np.linalg.inv(prior_information)))
     u = np.asarray(space.to_unit(polished.theta))
     z = float(stats.norm.ppf(0.95))

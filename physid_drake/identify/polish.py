@@ -31,8 +31,10 @@ class Polished:
 
     Attributes:
         theta: (d,).
-        jacobian: (m, d) of all whitened residuals and priors with respect to the unit cube.
+        jacobian: (m, d) of all whitened residuals, over the square root of the inflation, and of theta's
+            priors, with respect to the unit cube.
         chi2: cost of the residuals and the pushes' unknowns, without theta's prior.
+        inflation: reduced chi-square by which the noise was widened in the fit, at least 1.
         samples: number of residuals.
         friction_scatter: from push to push [-].
         residuals: one per push, marginal (m_i,).
@@ -43,6 +45,7 @@ class Polished:
     theta: Array
     jacobian: Array
     chi2: float
+    inflation: float
     samples: int
     friction_scatter: float
     residuals: tuple[Array, ...]
@@ -63,6 +66,7 @@ class Polisher:
     ) -> None:
         self._pool, self._problems, self._noise = pool, problems, noise
         self._scatter = scatter
+        self._inflation = 1.0
         self._tick = tick or (lambda _: None)
         self._space = pool.thetas.space
 
@@ -75,7 +79,7 @@ class Polisher:
             self._tick(f"least squares, round {round_ + 1} of {ROUNDS}")
             theta = self._fit(theta, whiteners)
             whiteners = self._linearise(theta)
-            self._scatter = self._new_scatter(theta, whiteners)
+            self._learn_scales(theta, whiteners)
         return self._result(theta, whiteners, self._pool.count - before)
 
     def _nuisances(self) -> list[Nuisance]:
@@ -116,8 +120,7 @@ class Polisher:
 
         def cost(u: Array) -> Array:
             point = space.from_unit(u)
-            marginal = [w.apply(r) for w, r in zip(whiteners, self._residuals(point), strict=True)]
-            return np.concatenate([*marginal, np.asarray(space.prior_whitened(point))])
+            return self._stacked(whiteners, self._residuals(point), point)
 
         def slope(u: Array) -> Array:
             return self._jacobian(u, whiteners)
@@ -148,25 +151,34 @@ class Polisher:
         rows = []
         for k, point in enumerate(points):
             part = predictions[k * count : (k + 1) * count]
-            marginal = [
-                w.apply(self._residual_of(p, r)) for w, p, r in zip(whiteners, self._problems, part, strict=True)
-            ]
-            rows.append(
-                np.concatenate([*marginal, np.asarray(self._space.prior_whitened(self._space.from_unit(point)))])
-            )
+            residuals = [self._residual_of(p, r) for p, r in zip(self._problems, part, strict=True)]
+            rows.append(self._stacked(whiteners, residuals, self._space.from_unit(point)))
         columns = [(rows[2 * j + 1] - rows[2 * j]) / (points[2 * j + 1][j] - points[2 * j][j]) for j in range(len(u))]
         return np.column_stack(columns)
 
-    def _new_scatter(self, theta: Array, whiteners: list[Whitener]) -> float:
-        """One step of expectation-maximisation for the scatter of friction from push to push."""
+    def _stacked(self, whiteners: list[Whitener], residuals: list[Array], theta: Array) -> Array:
+        """Marginal residuals and theta's priors; where the fit is worse than the noise, the noise is widened.
+
+        Otherwise a misfit that no theta explains would overrule what a scale said of the mass.
+        """
+        scale = 1.0 / np.sqrt(self._inflation)
+        marginal = [scale * w.apply(r) for w, r in zip(whiteners, residuals, strict=True)]
+        return np.concatenate([*marginal, np.asarray(self._space.prior_whitened(theta))])
+
+    def _learn_scales(self, theta: Array, whiteners: list[Whitener]) -> None:
+        """The noise's inflation, and one step of expectation-maximisation for the scatter of friction."""
+        residuals = self._residuals(theta)
+        chi2 = sum(float((w.apply(r) ** 2).sum()) for w, r in zip(whiteners, residuals, strict=True))
+        degrees = max(1, sum(len(r) for r in residuals) - len(theta))
+        self._inflation = max(1.0, chi2 / degrees)
         if len(self._problems) < SCATTER_PUSHES:
-            return self._scatter
+            return
         second = []
-        for nuisance, whitener, residual in zip(self._nuisances(), whiteners, self._residuals(theta), strict=True):
+        for nuisance, whitener, residual in zip(self._nuisances(), whiteners, residuals, strict=True):
             k = nuisance.index("friction")
-            second.append(whitener.unknowns(residual)[k] ** 2 + whitener.variances()[k])
+            second.append(whitener.unknowns(residual)[k] ** 2 / self._inflation + whitener.variances()[k])
         scatter = self._scatter * float(np.sqrt(np.mean(second)))
-        return float(np.clip(scatter, SMALLEST_SCATTER, LARGEST_SCATTER))
+        self._scatter = float(np.clip(scatter, SMALLEST_SCATTER, LARGEST_SCATTER))
 
     def _result(self, theta: Array, whiteners: list[Whitener], rollouts: int) -> Polished:
         residuals = self._residuals(theta)
@@ -179,6 +191,7 @@ class Polisher:
             theta=theta,
             jacobian=self._jacobian(np.asarray(self._space.to_unit(theta)), whiteners),
             chi2=float(sum((m**2).sum() for m in marginal)),
+            inflation=self._inflation,
             samples=sum(len(r) for r in residuals),
             friction_scatter=self._scatter,
             residuals=tuple(marginal),

@@ -16,9 +16,7 @@ def cell():
 
 
 def slide(cell, x, speed, seconds=1.0):
-    body = Body(
-        mass=0.3, p_BBcm=np.zeros(2), inertia_ratio=1.0, hand_friction=0.3, support_friction=np.array([MU])
-    )
+    body = Body(mass=0.3, p_BBcm=np.zeros(2), inertia_ratio=1.0, hand_friction=0.3, support_friction=np.array([MU]))
     start = Start(pose=(x, 0.0, 0.0), velocity=(speed, 0.0, 0.0))
     return cell.rollout(body, start=start, path=None, begin=0.0, end=seconds)
 

@@ -94,11 +94,13 @@ def test_an_object_of_uneven_density_is_followed_within_half_a_sigma(model):
 
 @pytest.mark.parametrize("remedy", ["impact_law", "drift_feedforward"])
 def test_each_remedy_matters(remedy):
-    pick = slice(30)
-    with_it = rms(np.concatenate(errors("sixty", 0, "point", pick=pick)))
-    without = rms(np.concatenate(errors("sixty", 0, "point", ((remedy, False),), pick=pick)))
-    # Measured on these thirty: 0.29 with both; 52.8 without the impact law, 1.33 without the feed-forward of drift
-    # (all sixty: 0.36, 58.5 and 2.79).
+    # Low objects only: without the impact law some Drake releases topple a bottle.
+    low = [k for k, (body, *_) in enumerate(sixty(0)) if body.height < 0.08][:18]
+    with_it, without = (
+        rms(np.concatenate([errors("sixty", 0, "point", solver, pick=slice(k, k + 1))[0] for k in low]))
+        for solver in ((), ((remedy, False),))
+    )
+    # Measured: 0.26 with both; 15.4 without the impact law, 0.73 without the feed-forward of drift.
     assert without > 2 * with_it
 
 
