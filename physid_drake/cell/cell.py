@@ -28,7 +28,7 @@ from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]
 
-EDGE_POINTS = 14  # along the longer side, where the table's edge cuts the underside
+EDGE_POINTS = 200  # under an object where the table's edge cuts the underside
 
 
 class Cell:
@@ -157,7 +157,7 @@ class Cell:
         if self._at_edge is None:
             shape, hand_radius, table = self._build
             # Few Gauss points would let an object tip over the innermost one that has left the table.
-            contact = dc.replace(self.config.contact, model="point", points_per_side=EDGE_POINTS)
+            contact = dc.replace(self.config.contact, model="point", support_points=EDGE_POINTS)
             config = dc.replace(self.config, contact=contact)
             self._at_edge = Cell(shape, hand_radius=hand_radius, config=config, table=table, with_edge=True)
         return self._at_edge

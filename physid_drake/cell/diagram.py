@@ -125,7 +125,7 @@ def add_scene(
     )
     plant.set_name("plant")
     grid = FrictionGrid(nx=config.friction_cells[0], ny=config.friction_cells[1])
-    support = support_of(solid.underside, grid, config.contact.points_per_side, height=solid.height)
+    support = support_of(solid.underside, grid, config.contact.support_points, height=solid.height)
     if solid.rolling_radius is not None:
         support = _axis_support(solid, support)
 

@@ -58,33 +58,32 @@ class Support:
     cells: NDArray[np.intp]
 
 
-def support_of(outline: Outline, grid: FrictionGrid, points_per_side: int, *, height: float = 0.0) -> Support:
+def support_of(outline: Outline, grid: FrictionGrid, points: int, *, height: float = 0.0) -> Support:
     """Quadrature points over an outline, fine enough that every friction cell holds some.
 
     Args:
         outline: the underside, convex, in B.
         grid: the friction cells.
-        points_per_side: Gauss points along the longer side; the shorter has one less when it can (5 by 4
-            equals 8 by 8 and costs a third).
+        points: about how many; Gauss points as dense along x as along y.
         height: of the object [m]: a slender disc stands on part of its underside while it is pushed, and
             needs a third ring of points.
     """
     match outline:
         case Polygon() if _is_rectangle(outline):
-            points, weights = _rectangle_points(outline, grid, points_per_side)
+            places, weights = _rectangle_points(outline, grid, points)
         case _ if grid.size > 1:
-            points, weights = _cell_points(outline, grid, math.ceil(points_per_side / 2))
+            places, weights = _cell_points(outline, grid, math.ceil(math.sqrt(points) / 2))
         case Disc(radius=radius):
-            rings = 3 if height > SLENDER * radius else 2
-            points, weights = _star_points(lambda _: radius, max(rings, math.ceil(points_per_side / 3)), 8)
+            rings = max(3 if height > SLENDER * radius else 2, math.ceil(math.sqrt(points) / 3))
+            places, weights = _star_points(lambda _: radius, rings, 8 if points <= 64 else 16)
         case Polygon(vertices=vertices) if len(vertices) <= FEW_CORNERS:
-            points, weights = _fan_points(outline, points_per_side)
+            places, weights = _fan_points(outline, points)
         case Polygon():
-            points, weights = _star_points(outline.reach, max(2, math.ceil(points_per_side / 3)), 16)
+            places, weights = _star_points(outline.reach, max(2, math.ceil(math.sqrt(points) / 3)), 16)
         case _:
             raise TypeError(f"no quadrature for an outline of type {type(outline).__name__}")
-    cells = grid.cell_of(points, outline)
-    return Support(points=points, weights=weights / weights.sum(), cells=cells)
+    cells = grid.cell_of(places, outline)
+    return Support(points=places, weights=weights / weights.sum(), cells=cells)
 
 
 def _is_rectangle(polygon: Polygon) -> bool:
@@ -101,15 +100,15 @@ def _composite_gauss(lower: float, upper: float, pieces: int, order: int) -> tup
     return (middle + half * node).ravel(), (half * weight).ravel()
 
 
-def _rectangle_points(polygon: Polygon, grid: FrictionGrid, per_side: int) -> tuple[Array, Array]:
+def _rectangle_points(polygon: Polygon, grid: FrictionGrid, points: int) -> tuple[Array, Array]:
     x0, y0, x1, y1 = polygon.extent()
-    along_x = per_side if x1 - x0 >= y1 - y0 else per_side - 1
-    along_y = per_side - 1 if x1 - x0 >= y1 - y0 else per_side
+    slender = (x1 - x0) / (y1 - y0)
+    along_x, along_y = round(math.sqrt(points * slender)), round(math.sqrt(points / slender))
     # One point across a cell would be the midpoint rule again.
     x, wx = _composite_gauss(x0, x1, grid.nx, max(2, math.ceil(along_x / grid.nx)))
     y, wy = _composite_gauss(y0, y1, grid.ny, max(2, math.ceil(along_y / grid.ny)))
-    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-    return points, np.outer(wx, wy).ravel()
+    places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    return places, np.outer(wx, wy).ravel()
 
 
 def _radial_gauss(order: int) -> tuple[Array, Array]:
@@ -136,24 +135,24 @@ def _star_points(reach: Callable[[float], float], radii: int, angles: int) -> tu
     return (r[:, None, None] * ring).reshape(-1, 2), np.outer(wr, area / area.sum()).ravel()
 
 
-def _fan_points(polygon: Polygon, per_side: int) -> tuple[Array, Array]:
+def _fan_points(polygon: Polygon, points: int) -> tuple[Array, Array]:
     """A Gauss rule on each triangle of the fan about the centroid, by collapsing the square (Duffy).
 
     Source: M. G. Duffy, Quadrature over a pyramid or cube of integrands with a singularity at a vertex, 1982.
     """
     vertices = np.array(polygon.vertices)
-    order = max(4 if len(vertices) == 3 else 3, math.ceil(per_side / len(vertices)))
+    order = max(4 if len(vertices) == 3 else 3, round(math.sqrt(points / len(vertices))))
     u, wu = _radial_gauss(order)
     v, wv = _composite_gauss(0.0, 1.0, 1, order)
     centre = _centroid(vertices)
-    points, weights = [], []
+    places, weights = [], []
     for a, b in zip(vertices, np.roll(vertices, -1, axis=0), strict=True):
         area = 0.5 * abs((a - centre)[0] * (b - centre)[1] - (a - centre)[1] * (b - centre)[0])
         edge = a + v[:, None] * (b - a)
         grid_points = centre + u[:, None, None] * (edge - centre)[None]
-        points.append(grid_points.reshape(-1, 2))
+        places.append(grid_points.reshape(-1, 2))
         weights.append(area * np.outer(wu, wv).ravel())
-    return np.concatenate(points), np.concatenate(weights)
+    return np.concatenate(places), np.concatenate(weights)
 
 
 def _cell_points(outline: Outline, grid: FrictionGrid, fewest: int) -> tuple[Array, Array]:

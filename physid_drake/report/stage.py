@@ -82,6 +82,8 @@ class Stage:
         self._diagram = builder.Build()
         self._root = self._diagram.CreateDefaultContext()
         self._context = plant.GetMyMutableContextFromRoot(self._root)
+        for clutter in ("/Axes", "/Grid"):
+            self.meshcat.SetProperty(clutter, "visible", False)
         centre = np.array([*recording.pushes[0].object.positions[0][:2], 0.0])
         self.meshcat.SetCameraPose(centre + np.array([-0.10, -0.45, 0.32]), centre)
 
@@ -188,7 +190,8 @@ def _motion_at(motion: Motion, time: float) -> RigidTransform:
 def _pose_at(push: Push, time: float) -> RigidTransform:
     stream = push.object
     k = int(np.clip(np.searchsorted(stream.times, time, side="right") - 1, 0, len(stream) - 1))
-    return _transform(stream.quaternions[k], stream.positions[k])
+    # A hair above: where ghost and object coincide, neither would be seen.
+    return _transform(stream.quaternions[k], stream.positions[k] + [0.0, 0.0, 1e-3])
 
 
 def _hand_at(push: Push, time: float) -> RigidTransform | None:

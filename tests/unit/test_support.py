@@ -20,8 +20,8 @@ every_outline = pytest.mark.parametrize("name", list(OUTLINES))
 every_grid = pytest.mark.parametrize("grid", GRIDS)
 
 
-def quadrature(name, grid=(1, 1), points_per_side=5):
-    return support_of(OUTLINES[name], FrictionGrid(nx=grid[0], ny=grid[1]), points_per_side)
+def quadrature(name, grid=(1, 1), points=30):
+    return support_of(OUTLINES[name], FrictionGrid(nx=grid[0], ny=grid[1]), points)
 
 
 def fine_points(outline, n=900):
