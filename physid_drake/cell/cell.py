@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses as dc
+import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +13,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from physid_drake.cell.config import CellConfig
 from physid_drake.cell.diagram import Scene, add_scene
+from physid_drake.cell.forces import ForceLaw, FrictionLaw
 from physid_drake.cell.hand_path import HandPath
 from physid_drake.cell.motion import Motion, Start
 from physid_drake.cell.setters import (
@@ -118,6 +121,8 @@ class Cell:
         begin: float,
         end: float,
         hand_height: float | None = None,
+        laws: Sequence[ForceLaw] = (),
+        frictions: Sequence[FrictionLaw] = (),
     ) -> Motion:
         """Simulate one push.
 
@@ -128,8 +133,10 @@ class Cell:
             begin: start time [s].
             end: end time [s].
             hand_height: of the tip's contact above the table [m]; half the object's height if None.
+            laws: forces beyond weight, Coulomb friction and the hand.
+            frictions: friction laws; the contact holds the largest friction of each, the law gives back the rest.
         """
-        self.set_body(body)
+        self.set_body(_holding(body, frictions))
         motion = self._stepper.run(
             body=body,
             start=start,
@@ -138,11 +145,20 @@ class Cell:
             height=0.5 * self.solid.height if hand_height is None else hand_height,
             begin=begin,
             end=end,
+            laws=laws,
+            frictions=frictions,
         )
         if self._table is None or not self._overhangs(motion):
             return motion
         return self._cell_with_edge().rollout(
-            body, start=start, path=path, begin=begin, end=end, hand_height=hand_height
+            body,
+            start=start,
+            path=path,
+            begin=begin,
+            end=end,
+            hand_height=hand_height,
+            laws=laws,
+            frictions=frictions,
         )
 
     def _overhangs(self, motion: Motion) -> bool:
@@ -181,3 +197,11 @@ def _stiffer(solid: Solid) -> float:
     x0, y0, x1, y1 = solid.underside.extent()
     radius = 0.5 * min(x1 - x0, y1 - y0)
     return float(np.clip((SLENDER * radius / solid.height) ** 2, 1.0 / 3.0, 1.0))
+
+
+def _holding(body: Body, frictions: Sequence[FrictionLaw]) -> Body:
+    """The body whose contact friction is the largest that the laws reach."""
+    if not frictions:
+        return body
+    factor = math.prod(law.largest for law in frictions)
+    return dc.replace(body, support_friction=factor * body.support_friction)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
 
 from physid_drake.cell.config import SolverConfig
-from physid_drake.cell.diagram import HAND_MASS, Scene
+from physid_drake.cell.diagram import GRAVITY, HAND_MASS, Scene
+from physid_drake.cell.forces import ForceLaw, FrictionLaw, ObjectState, Wrench, refund_wrench
 from physid_drake.cell.hand_path import HandPath
 from physid_drake.cell.impact import routh_impulse
 from physid_drake.cell.motion import Log, Motion, Outcome, Start, planar_pose
@@ -21,6 +23,7 @@ REST_SPEED = 2e-4  # m/s of any point: Drake's regularised friction lets a stopp
 NEAR = 3  # ticks: the hand is near when it could arrive within so many
 SMALLEST_STEP = 1e-7  # s
 GENTLE = 1e-3  # m/s: below this closing speed a touch needs no impact law
+SURELY_HELD = 0.5  # of the friction: a resting object under less does not slide
 FALLEN = 0.05  # m below the table top: it does not come back
 PARKED = (0.0, 0.0, 10.0)  # m: a hand that takes no part
 FASTEST = 50.0  # m/s: beyond it a rollout has diverged
@@ -66,6 +69,8 @@ class Stepper:
         height: float,
         begin: float,
         end: float,
+        laws: Sequence[ForceLaw] = (),
+        frictions: Sequence[FrictionLaw] = (),
     ) -> Motion:
         """Simulate from ``begin`` to ``end`` [s].
 
@@ -77,7 +82,10 @@ class Stepper:
             height: of the tip's centre above the table [m].
             begin: time of the start [s].
             end: time of the end [s].
+            laws: forces beyond weight, friction and hand.
+            frictions: friction laws; the contact must hold their largest friction already.
         """
+        self._laws, self._frictions = laws, frictions
         dt = self._solver.time_step_s
         count = max(1, math.ceil((end - begin) / dt - 1e-6))
         self._body, self._begin, self._height = body, begin, height
@@ -199,10 +207,9 @@ class Stepper:
         vx, vy, wz = self._twist()
         if math.hypot(vx, vy) + abs(wz) * 0.05 > REST_SPEED or self._scene.solid.rolling_radius is not None:
             return False
-        if self._hand is None:
-            return True
-        gap, *_ = self._gap_at(*self._section()[0], *self._hand[k])
-        return gap > 1e-6
+        if self._hand is not None and self._gap_at(*self._section()[0], *self._hand[k])[0] <= 1e-6:
+            return False
+        return self._holds(k * self._solver.time_step_s)
 
     def _skip_rest(self, k: int, count: int) -> int:
         """Nothing happens until the hand comes: go to the last tick before it touches."""
@@ -336,16 +343,96 @@ class Stepper:
         )  # fmt: skip
         jx = impulse.normal * nx - impulse.tangent * ny
         jy = impulse.normal * ny + impulse.tangent * nx
-        turn = (mx * jy - my * jx) / self._inertia
+        gain = self._kick(yaw, jx, jy, mx * jy - my * jx)
+        if until > 0.0:
+            self._shift(-until * gain[0], -until * gain[1], -until * gain[2])
+        self._drift = 0.0
+
+    def _kick(self, yaw: float, jx: float, jy: float, spin: float) -> tuple[float, float, float]:
+        """Give the object a planar impulse [N s] at Bcm and an angular one [N m s]; returns Bo's gain in velocity."""
+        body = self._body
+        c, s = math.cos(yaw), math.sin(yaw)
+        cx, cy = float(body.p_BBcm[0]), float(body.p_BBcm[1])
+        turn = spin / self._inertia
         # Bcm gets J/m; Bo moves with it and with the new spin about it.
         ox, oy = -(c * cx - s * cy), -(s * cx + c * cy)
         gain = (jx / body.mass - turn * oy, jy / body.mass + turn * ox, turn)
         self._x[self._v + 2] += gain[2]
         self._x[self._v + 3] += gain[0]
         self._x[self._v + 4] += gain[1]
-        if until > 0.0:
-            self._shift(-until * gain[0], -until * gain[1], -until * gain[2])
-        self._drift = 0.0
+        return gain
+
+    # Force laws.
+
+    def _apply_laws(self, time: float, span: float) -> None:
+        """Add the laws' impulses over a tick to the velocities."""
+        state = self._object_state(time)
+        for wrench in self._wrenches(state):
+            self._kick(state.yaw, span * wrench.fx, span * wrench.fy, span * wrench.torque)
+            if wrench.at_table:
+                self._tip(state.yaw, span * wrench.fx, span * wrench.fy)
+
+    def _wrenches(self, state: ObjectState) -> list[Wrench]:
+        refunds = [refund_wrench(state, law.refund(state)) for law in self._frictions]
+        return [law.wrench(state) for law in self._laws] + refunds
+
+    def _tip(self, yaw: float, jx: float, jy: float) -> None:
+        """The pitch and roll that a horizontal impulse at the table gives, half the height below Bcm."""
+        arm = -0.5 * self._scene.solid.height
+        scale = self._body.mass * self._body.inertia_ratio
+        ix, iy = scale * self._scene.solid.gyration[0], scale * self._scene.solid.gyration[1]
+        c, s = math.cos(yaw), math.sin(yaw)
+        hx, hy = -arm * jy, arm * jx
+        about_x, about_y = (c * hx + s * hy) / ix, (c * hy - s * hx) / iy
+        self._x[self._v] += c * about_x - s * about_y
+        self._x[self._v + 1] += s * about_x + c * about_y
+
+    def _object_state(self, time: float) -> ObjectState:
+        px, py, yaw = self._pose()
+        vx, vy, wz = self._twist()
+        c, s = math.cos(yaw), math.sin(yaw)
+        body, support = self._body, self._scene.support
+        R_WB = np.array([[c, -s], [s, c]])
+        arms = support.points @ R_WB.T
+        to_cm = R_WB @ body.p_BBcm
+        return ObjectState(
+            time=time,
+            p_WBcm=np.array([px, py]) + to_cm,
+            v_WBcm=np.array([vx - wz * to_cm[1], vy + wz * to_cm[0]]),
+            yaw=yaw,
+            yaw_rate=wz,
+            mass=body.mass,
+            inertia=self._inertia,
+            p_WQ=arms + np.array([px, py]),
+            v_WQ=np.column_stack([vx - wz * arms[:, 1], vy + wz * arms[:, 0]]),
+            loads=self._loads(),
+            friction=body.support_friction[support.cells],
+        )
+
+    def _depths(self) -> Array:
+        """How deep the support points (n,) are in the table [m]; 0 where they hang over it."""
+        w, i, j, k, _, _, z = self._x[self._q : self._q + 7].tolist()
+        # The plane of the underside, in B: depth = d0 + pitch x - roll y.
+        pitch, roll = 2.0 * (w * j - i * k), 2.0 * (w * i + j * k)
+        plane: Array = (0.5 * self._scene.solid.height - z) + self._scene.support.points @ np.array([pitch, -roll])
+        depths: Array = np.maximum(plane, 0.0)
+        return depths
+
+    def _loads(self) -> Array:
+        """Normal forces (n,) on the support points [N]: in proportion to depth, carrying the weight together."""
+        shares: Array = self._scene.support.weights * self._depths()
+        total = float(shares.sum())
+        return shares * (self._body.mass * GRAVITY / total) if total > 0.0 else shares
+
+    def _holds(self, time: float) -> bool:
+        """Whether friction surely holds a resting object against the laws' forces."""
+        if not self._laws:
+            return True
+        state = self._object_state(time)
+        limit = float((state.loads * state.friction).sum())
+        reach = math.sqrt(self._inertia / self._body.mass)
+        pull = sum(math.hypot(w.fx, w.fy) + abs(w.torque) / reach for w in self._wrenches(state))
+        return pull < SURELY_HELD * limit
 
     def _shift(self, dx: float, dy: float, turn: float) -> None:
         """Move the object's pose by a small planar displacement."""
@@ -381,6 +468,8 @@ class Stepper:
             self._x[self._hand_v[0]], self._x[self._hand_v[1]] = command
             self._x[self._hand_v[2]] = 0.0
         height = self._x[self._hand_q[2]] if move is not None else 0.0
+        if self._laws or self._frictions:
+            self._apply_laws(begin, span)
         self._send()
         self._simulator.AdvanceTo(end)
         self._x = self._scene.plant.GetPositionsAndVelocities(self._context)
@@ -414,12 +503,7 @@ class Stepper:
         not flat; equilibrium makes up for it by sinking deeper, and CENIC's lagged friction follows the
         depth: too large by v n dt / depth. Measured: -2.5 % of a slide at 1 m/s and 2 ms.
         """
-        w, i, j, k, _, _, z = self._x[self._q : self._q + 7].tolist()
-        # The plane of the underside, in B: depth = d0 + pitch x - roll y.
-        pitch, roll = 2.0 * (w * j - i * k), 2.0 * (w * i + j * k)
-        support = self._scene.support
-        depths = (0.5 * self._scene.solid.height - z) + support.points @ np.array([pitch, -roll])
-        excess = float(support.weights @ np.maximum(depths, 0.0)) * self._tilt_gain - 1.0
+        excess = float(self._scene.support.weights @ self._depths()) * self._tilt_gain - 1.0
         if not 0.0 < excess < 0.5:  # lighter than at rest, or a bounce: nothing of the kind
             return after
         factor = 1.0 / (1.0 + excess)
