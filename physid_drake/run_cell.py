@@ -69,15 +69,16 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     Raises:
         PhysidError: one line that says what is wrong.
     """
-    name, scenario = load_scenario(arguments.config, arguments.override)
-    if arguments.recording is not None:
-        scenario.recording = arguments.recording
-    if arguments.seed is not None:
-        scenario.seed = arguments.seed
+    name, scenario = load_scenario(
+        arguments.config, arguments.override, recording=arguments.recording, seed=arguments.seed
+    )
     recording = read_recording(_recording_folder(scenario.recording))
-    folder = RunFolder.open(arguments.out or Path("runs") / name, dump_scenario(name, scenario))
+    out = arguments.out or Path("runs") / name
+    # Everything that can be refused is refused before anything is written.
+    identifier = _identifier(scenario, recording, out)
+    folder = RunFolder.open(out, dump_scenario(name, scenario))
     stage = None if arguments.no_view else _live(recording, console)
-    result, identifier = _identify(scenario, recording, folder, console)
+    result = _identify(identifier, recording, console)
     console.print()
     console.print(estimates_table(result, recording.name))
     console.print(accuracy_table(result))
@@ -115,39 +116,39 @@ def _live(recording: Recording, console: Console) -> Stage:
     return stage
 
 
-def _identify(
-    scenario: Scenario, recording: Recording, folder: RunFolder, console: Console
-) -> tuple[Identification, Identifier]:
+def _identifier(scenario: Scenario, recording: Recording, out: Path) -> Identifier:
+    return Identifier(
+        recording,
+        cell=scenario.cell,
+        theta=scenario.theta,
+        search=scenario.search,
+        held_out_share=scenario.held_out_share,
+        seed=scenario.seed,
+        state=out / "belief.npz",
+    )
+
+
+def _identify(identifier: Identifier, recording: Recording, console: Console) -> Identification:
     """Wire and run the diagram: the recording's player, and the system that learns from its pushes."""
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as progress:
-        identifier = Identifier(
-            recording,
-            cell=scenario.cell,
-            theta=scenario.theta,
-            search=scenario.search,
-            held_out_share=scenario.held_out_share,
-            seed=scenario.seed,
-            state=folder.path / "belief.npz",
-            progress=_bar(progress),
-        )
+        bar = _bar(progress)
         builder = DiagramBuilder()
         player = builder.AddSystem(RecordingPlayer(recording.pushes))
         system = builder.AddSystem(
             IdentificationSystem(
-                lambda _: identifier.run(),
+                lambda _: identifier.run(bar),
                 after=len(recording.pushes),
                 dimension=identifier.thetas.space.dimension,
                 nominal=identifier.thetas.space.nominal,
             )
         )
         builder.Connect(player.GetOutputPort("push.measured"), system.GetInputPort("push.measured"))
-        diagram = builder.Build()
-        simulator = Simulator(diagram)
+        simulator = Simulator(builder.Build())
         simulator.AdvanceTo(len(recording.pushes) * PUSH_PERIOD)
-        result = system.identification(system.GetMyContextFromRoot(simulator.get_context()))
+        result: Identification | None = system.identification(system.GetMyContextFromRoot(simulator.get_context()))
     assert result is not None
-    return result, identifier
+    return result
 
 
 def _bar(progress: Progress) -> Callable[[str, int, int], None]:
@@ -209,12 +210,15 @@ class RunFolder:
         Raises:
             OutputError: if it cannot be written.
         """
+        part = None
         try:
             with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=self.path, delete=False) as part:
                 part.write(text)
             Path(part.name).chmod(0o644)
             os.replace(part.name, self.path / name)  # noqa: PTH105
         except OSError as error:
+            if part is not None:
+                Path(part.name).unlink(missing_ok=True)
             raise OutputError(f"'{self.path / name}': cannot be written: {error}.") from error
 
     def forget_state(self) -> None:

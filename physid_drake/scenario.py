@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses as dc
+import math
 import re
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin
 
 import yaml
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
@@ -18,12 +20,16 @@ DEFAULT = "eraser.yaml"
 SCHEMES = ("cenic", "lagged", "similar", "sap", "tamsi")
 
 
-def load_scenario(config: str | None, override: str | None) -> tuple[str, Scenario]:
+def load_scenario(
+    config: str | None, override: str | None, *, recording: str | None = None, seed: int | None = None
+) -> tuple[str, Scenario]:
     """Read a scenario.
 
     Args:
         config: ``FILE`` or ``FILE:NAME``; a bare name is looked up among the shipped ones. None is the default.
         override: one line of YAML laid over it, such as ``{search: {budget: 20}}``.
+        recording: instead of the scenario's.
+        seed: instead of the scenario's.
 
     Returns:
         The scenario's name and its values.
@@ -44,6 +50,10 @@ def load_scenario(config: str | None, override: str | None) -> tuple[str, Scenar
         except yaml.YAMLError as error:
             raise ConfigError(f"--set: is no YAML: {_one_line(error)}.") from error
         scenario = _typed(extra, scenario, "--set")
+    if recording is not None:
+        scenario.recording = recording
+    if seed is not None:
+        scenario.seed = seed
     return name, _checked(scenario, f"config '{path}', scenario '{name}'")
 
 
@@ -75,15 +85,16 @@ def _read_yaml(path: Path) -> dict[str, Any]:
     if not isinstance(content, dict) or not content:
         raise ConfigError(f"config '{path}': needs named scenarios at the top level, 'name: {{...}}'.")
     # Keys that start with an underscore are for anchors and templates.
-    return {str(key): value for key, value in content.items() if not str(key).startswith("_")}
+    scenarios = {str(key): value for key, value in content.items() if not str(key).startswith("_")}
+    if not scenarios:
+        raise ConfigError(f"config '{path}': holds no scenario; names that start with '_' are templates.")
+    return scenarios
 
 
 def _typed(content: Any, defaults: Scenario, where: str) -> Scenario:
     if content is None:
         return defaults
-    if not isinstance(content, dict):
-        raise ConfigError(f"{where}: needs keys and values, but got {content!r}.")
-    _refuse_unknown(content, Scenario, where)
+    _refuse_wrong(content, Scenario, where)
     try:
         loaded: Scenario = yaml_load_typed(schema=Scenario, data=yaml.safe_dump(content), defaults=defaults)
     except (RuntimeError, ValueError, TypeError, KeyError, AssertionError) as error:
@@ -91,22 +102,66 @@ def _typed(content: Any, defaults: Scenario, where: str) -> Scenario:
     return loaded
 
 
-def _refuse_unknown(content: dict[str, Any], schema: type, where: str) -> None:
-    """Drake's loader names neither the file nor the path of an unknown key."""
-    fields = {field.name: field.type for field in dc.fields(schema)}
-    for key, value in content.items():
-        if key not in fields:
-            raise ConfigError(f"{where}: the key '{key}' is unknown; known are {', '.join(fields)}.")
-        inner = fields[key]
-        if isinstance(inner, type) and dc.is_dataclass(inner):
-            if not isinstance(value, dict):
-                raise ConfigError(f"{where}, key '{key}': needs keys and values, but got {value!r}.")
-            _refuse_unknown(value, inner, f"{where}, key '{key}'")
+def _refuse_wrong(content: Any, schema: Any, where: str, key: str = "") -> None:
+    """Refuse unknown keys and values of a wrong kind; Drake's loader names neither the file nor the key.
+
+    Args:
+        content: parsed YAML.
+        schema: a dataclass, ``list[...]``, ``dict[str, ...]``, ``str``, ``int``, ``float`` or ``bool``.
+        where: file and scenario, for the message.
+        key: dotted path of the content.
+    """
+    place = f"{where}, key '{key}'" if key else where
+    if dc.is_dataclass(schema):
+        if not isinstance(content, dict):
+            raise ConfigError(f"{place}: needs keys and values, but got {content!r}.")
+        fields = {field.name: field.type for field in dc.fields(schema)}
+        for name, value in content.items():
+            if name not in fields:
+                raise ConfigError(f"{place}: the key '{name}' is unknown; known are {', '.join(fields)}.")
+            _refuse_wrong(value, fields[name], where, f"{key}.{name}".lstrip("."))
+        return
+    origin, inner = get_origin(schema), get_args(schema)
+    if origin is not None:
+        if not isinstance(content, origin):
+            raise ConfigError(f"{place}: needs a {'list' if origin is list else 'mapping'}, but got {content!r}.")
+        for name, value in content.items() if isinstance(content, dict) else enumerate(content):
+            _refuse_wrong(value, inner[-1], where, f"{key}.{name}")
+        return
+    kind, fits = _KINDS[schema]
+    if not fits(content):
+        raise ConfigError(f"{place}: needs {kind}, but got {content!r}.")
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _is_number(value: Any) -> bool:
+    """YAML reads 1e-3 as text and 1 as a whole number; both are fine where a number is wanted."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        return False
+    try:
+        return math.isfinite(float(value))
+    except ValueError:
+        return False
+
+
+_KINDS: dict[Any, tuple[str, Callable[[Any], bool]]] = {
+    str: ("text", _is_text),
+    int: ("a whole number", _is_whole),
+    float: ("a number", _is_number),
+    bool: ("true or false", lambda value: isinstance(value, bool)),
+}
 
 
 def _checked(scenario: Scenario, where: str) -> Scenario:
     """Refuse values that no run can use."""
-    cell, search = scenario.cell, scenario.search
+    cell, search, contact = scenario.cell, scenario.search, scenario.cell.contact
     rules: list[tuple[str, object, bool, str]] = [
         ("cell.contact.model", cell.contact.model, cell.contact.model in ("hydroelastic", "point"),
          "'hydroelastic' or 'point'"),
@@ -119,6 +174,12 @@ def _checked(scenario: Scenario, where: str) -> Scenario:
          "from 4 to 1000"),
         ("cell.contact.rest_depth_m", cell.contact.rest_depth_m, 1e-8 <= cell.contact.rest_depth_m <= 1e-2,
          "from 1e-8 to 1e-2 m"),
+        ("cell.contact.dissipation_s_per_m", contact.dissipation_s_per_m, contact.dissipation_s_per_m >= 0.0,
+         "at least 0 s/m"),
+        ("cell.contact.stiction_tolerance_mps", contact.stiction_tolerance_mps, contact.stiction_tolerance_mps > 0.0,
+         "above 0 m/s"),
+        ("cell.contact.hand_frequency_rad_s", contact.hand_frequency_rad_s, contact.hand_frequency_rad_s > 0.0,
+         "above 0 rad/s"),
         ("cell.friction_cells", cell.friction_cells,
          len(cell.friction_cells) == 2 and all(1 <= n <= 10 for n in cell.friction_cells), "[nx, ny] from 1 to 10"),
         ("cell.default_mass_kg", cell.default_mass_kg, cell.default_mass_kg > 0.0, "above 0 kg"),
@@ -126,6 +187,10 @@ def _checked(scenario: Scenario, where: str) -> Scenario:
         ("search.budget", search.budget, search.budget >= 1, "at least 1"),
         ("search.batch", search.batch, search.batch >= 1, "at least 1"),
         ("search.patience", search.patience, search.patience >= 1, "at least 1"),
+        ("search.jobs", search.jobs, search.jobs >= 0, "at least 0"),
+        ("search.entropy_tolerance_nats", search.entropy_tolerance_nats, search.entropy_tolerance_nats >= 0.0,
+         "at least 0 nats"),
+        ("seed", scenario.seed, scenario.seed >= 0, "at least 0"),
         ("held_out_share", scenario.held_out_share, 0.0 <= scenario.held_out_share < 1.0, "in [0, 1)"),
     ]  # fmt: skip
     for key, value, fine, rule in rules:

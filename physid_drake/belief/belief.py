@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, final
+from zipfile import BadZipFile
 
 import numpy as np
 import numpy.typing as npt
@@ -277,7 +278,7 @@ class Belief:
             ParameterError: When the file is not a belief of this format.
             FileNotFoundError: When there is no file.
         """
-        with np.load(path, allow_pickle=False) as arrays:
+        with _opened(path) as arrays:
             header = _read_header(arrays, path)
             saved: dict[str, Any] = {name: arrays[name] for name in _SAVED}
             amplitude, noise = (float(v) for v in arrays["variances"])
@@ -359,6 +360,15 @@ def _matches(u: Array, trials: Array) -> npt.NDArray[np.bool_]:
 def _nearest(points: Array, u: Array) -> npt.NDArray[np.intp]:
     """Index (n',) of the nearest of points (n, d) to each of u (n', d)."""
     return np.asarray(cKDTree(points).query(u)[1], dtype=np.intp)
+
+
+def _opened(path: str | Path) -> Any:
+    try:
+        return np.load(path, allow_pickle=False)
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError, EOFError, BadZipFile) as error:
+        raise ParameterError(f"belief '{path}': cannot be read ({error}); delete it to begin anew.") from error
 
 
 def _read_header(arrays: Any, path: str | Path) -> dict[str, Any]:

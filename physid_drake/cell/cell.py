@@ -75,14 +75,13 @@ class Cell:
         self.scene: Scene = add_scene(builder, self.config, self.solid, hand_radius, edge=edge)
         cells = self.config.friction_cells[0] * self.config.friction_cells[1]
         self._cells = cells
-        self.setters: tuple[ParameterSetter, ...] = tuple(
-            builder.AddSystem(setter)
-            for setter in (
-                InertiaSetter(self.scene),
-                SupportSetter(self.scene, self.config, cells, self.mean_depth),
-                HandContactSetter(self.scene, self.config),
-            )
+        self.setters: tuple[ParameterSetter, ...] = (
+            InertiaSetter(self.scene),
+            SupportSetter(self.scene, self.config, cells, self.mean_depth),
+            HandContactSetter(self.scene, self.config),
         )
+        for setter in self.setters:
+            builder.AddSystem(setter.system)
         self.diagram: Diagram = builder.Build()
         self.simulator = Simulator(self.diagram)
         solver = self.config.solver
@@ -148,7 +147,7 @@ class Cell:
             laws=laws,
             frictions=frictions,
         )
-        if self._table is None or not self._overhangs(motion):
+        if self._table is None or not len(motion.times) or not self._overhangs(motion):
             return motion
         return self._cell_with_edge().rollout(
             body,

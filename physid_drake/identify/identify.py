@@ -131,7 +131,6 @@ class Identifier:
         held_out_share: float,
         seed: int,
         state: Path | None = None,
-        progress: Progress | None = None,
     ) -> None:
         """Prepare.
 
@@ -143,7 +142,6 @@ class Identifier:
             held_out_share: of the pushes that are not fitted.
             seed: of everything random.
             state: a file in which the search's belief is kept, to go on from.
-            progress: told stage, steps done, steps in all.
         """
         solid = solid_of(recording.object.shape)
         self.recording = recording
@@ -160,11 +158,21 @@ class Identifier:
         self.training = [self.problems[i] for i in train]
         self.held_out = [self.problems[i] for i in held]
         self._state = state
-        self._progress = progress or (lambda stage, done, total: None)
+        self._progress: Progress = lambda stage, done, total: None
 
-    def run(self) -> Identification:
-        """Search, polish, score."""
+    def run(self, progress: Progress | None = None) -> Identification:
+        """Search, polish, score.
+
+        Args:
+            progress: told stage, steps done, steps in all.
+
+        Raises:
+            KeyboardInterrupt: when interrupted; the search's state is kept, and a new run goes on from it.
+        """
+        self._progress = progress or self._progress
         found = self.search()
+        if found.stop_reason == "interrupted":
+            raise KeyboardInterrupt
         start = found.theta_best if np.isfinite(found.error_best) else self.thetas.space.nominal
         polisher = Polisher(
             self.pool, self.training, self.noise, FIRST_SCATTER, tick=lambda what: self._progress(what, 0, 0)
@@ -253,21 +261,28 @@ class Identifier:
 
 
 def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
-    """Intervals from the curvature of the cost; widened where the fit is worse than the noise.
+    """Estimates with intervals: the wider of the cost's curvature and the pushes' disagreement.
 
-    Source: G. A. F. Seber and C. J. Wild, Nonlinear Regression, 1989, section 5.1 (linearised intervals).
+    The curvature knows the noise that is in the model. What is not in it (the cell's own error, a hand path that
+    was fitted) pulls theta differently in every push; taking the push as the unit shows by how much.
+
+    Source: G. A. F. Seber and C. J. Wild, Nonlinear Regression, 1989, section 5.1 (curvature); K.-Y. Liang and
+    S. L. Zeger, Biometrika 73, 1986 (the sandwich over clusters).
     """
     space = thetas.space
-    d = space.dimension
-    # Parameters without a prior of their own count as uniform over their bounds: 1/12 of the cube's side squared.
-    flat = np.array([0.0 if p.prior_std is not None else 12.0 for p in space.parameters])
-    information = polished.jacobian.T @ polished.jacobian + np.diag(flat)
-    prior_rows = polished.jacobian[-d:]
-    prior_information = prior_rows.T @ prior_rows + np.diag(flat)
-    spread = np.sqrt(np.diag(np.linalg.inv(information)))
-    prior_spread = np.sqrt(np.diag(np.linalg.inv(prior_information)))
+    information = polished.jacobian.T @ polished.jacobian
+    covariance = np.linalg.inv(information)
+    prior_rows = polished.jacobian[-space.dimension :]
+    prior_spread = np.sqrt(1.0 / np.diag(prior_rows.T @ prior_rows))
+    curvature = np.sqrt(np.diag(covariance))
+    z, spread = float(stats.norm.ppf(0.95)), curvature
+    pushes, free = len(polished.residuals), len(polished.residuals) - space.dimension
+    if free >= 2:
+        pulls = _pulls(polished)
+        meat = pulls.T @ pulls * (pushes / free)
+        sandwich = np.sqrt(np.diag(covariance @ meat @ covariance))
+        spread = np.maximum(curvature, sandwich * float(stats.t.ppf(0.95, free)) / z)
     u = np.asarray(space.to_unit(polished.theta))
-    z = float(stats.norm.ppf(0.95))
     result = []
     for j, parameter in enumerate(space.parameters):
         ends = []
@@ -288,7 +303,24 @@ def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
     return tuple(result)
 
 
+def _pulls(polished: Polished) -> Array:
+    """Gradient (pushes, d) of each push's share of the cost with respect to the unit cube."""
+    scale = 1.0 / math.sqrt(polished.inflation)
+    pulls, first = [], 0
+    for residual in polished.residuals:
+        rows = polished.jacobian[first : first + len(residual)]
+        pulls.append(scale * (rows.T @ residual))
+        first += len(residual)
+    return np.array(pulls)
+
+
 def _accuracy(pairs: list[tuple[PushProblem, Prediction]], noise: Noise, diverged: int) -> Accuracy:
+    if not pairs:
+        nothing = float("inf")
+        return Accuracy(
+            position=nothing, rotation=nothing, end_position=nothing, end_rotation=nothing, force=None,
+            sigmas=nothing, diverged=diverged,
+        )  # fmt: skip
     errors = [r.poses - p.poses for p, r in pairs]
     every, last = np.concatenate(errors), np.array([e[-1] for e in errors])
     forces = np.concatenate([r.forces - p.forces for p, r in pairs])

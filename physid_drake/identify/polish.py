@@ -22,6 +22,8 @@ ROUNDS = 2  # of linearising the pushes' own unknowns
 LARGEST_SCATTER = 0.2
 SMALLEST_SCATTER = 2e-3
 FAILED = 1e3  # standard deviations: residual of a rollout that diverged
+SCATTER_STEPS = 50
+SCATTER_WEIGHT = 4.0
 SCATTER_PUSHES = 4  # fewer pushes than this do not tell their scatter
 
 
@@ -65,7 +67,7 @@ class Polisher:
         tick: Callable[[str], None] | None = None,
     ) -> None:
         self._pool, self._problems, self._noise = pool, problems, noise
-        self._scatter = scatter
+        self._scatter = self._first_scatter = scatter
         self._inflation = 1.0
         self._tick = tick or (lambda _: None)
         self._space = pool.thetas.space
@@ -163,22 +165,48 @@ class Polisher:
         """
         scale = 1.0 / np.sqrt(self._inflation)
         marginal = [scale * w.apply(r) for w, r in zip(whiteners, residuals, strict=True)]
-        return np.concatenate([*marginal, np.asarray(self._space.prior_whitened(theta))])
+        return np.concatenate([*marginal, self._prior_rows(theta)])
+
+    def _prior_rows(self, theta: Array) -> Array:
+        """Distance from the prior (d,) in its standard deviations.
+
+        A uniform prior counts as 1/sqrt(12) of the cube about the nominal value: nothing against pushes that tell
+        the parameter, and it keeps a parameter that they do not tell where it was.
+        """
+        space = self._space
+        flat = np.sqrt(12.0) * (np.asarray(space.to_unit(theta)) - space.to_unit(space.nominal))
+        own = np.asarray(space.prior_whitened(theta))
+        return np.where([p.prior_std is None for p in space.parameters], flat, own)
 
     def _learn_scales(self, theta: Array, whiteners: list[Whitener]) -> None:
-        """The noise's inflation, and one step of expectation-maximisation for the scatter of friction."""
+        """Learn the noise's inflation and the scatter of friction from what is left."""
         residuals = self._residuals(theta)
         chi2 = sum(float((w.apply(r) ** 2).sum()) for w, r in zip(whiteners, residuals, strict=True))
         degrees = max(1, sum(len(r) for r in residuals) - len(theta))
         self._inflation = max(1.0, chi2 / degrees)
         if len(self._problems) < SCATTER_PUSHES:
             return
-        second = []
-        for nuisance, whitener, residual in zip(self._nuisances(), whiteners, residuals, strict=True):
-            k = nuisance.index("friction")
-            second.append(whitener.unknowns(residual)[k] ** 2 / self._inflation + whitener.variances()[k])
-        scatter = self._scatter * float(np.sqrt(np.mean(second)))
-        self._scatter = float(np.clip(scatter, SMALLEST_SCATTER, LARGEST_SCATTER))
+        self._scatter = self._new_scatter(whiteners, [r / np.sqrt(self._inflation) for r in residuals])
+
+    def _new_scatter(self, whiteners: list[Whitener], residuals: list[Array]) -> float:
+        """Scatter of friction from push to push, by expectation-maximisation on the linearised pushes.
+
+        Few pushes alone would drive it to nothing, so ``SCATTER_WEIGHT`` pushes' worth of the first guess stand by
+        (the mode under an inverse-gamma prior).
+        """
+        places = [nuisance.index("friction") for nuisance in self._nuisances()]
+        factor = 1.0
+        for _ in range(SCATTER_STEPS):
+            second = []
+            for k, whitener, residual in zip(places, whiteners, residuals, strict=True):
+                jacobian = whitener.jacobian.copy()
+                jacobian[:, k] *= factor
+                scaled = Whitener.of(jacobian)
+                second.append(scaled.unknowns(residual)[k] ** 2 + scaled.variances()[k])
+            guess = SCATTER_WEIGHT * (self._first_scatter / (factor * self._scatter)) ** 2
+            factor *= float(np.sqrt((sum(second) + guess) / (len(second) + SCATTER_WEIGHT)))
+            factor = float(np.clip(factor, SMALLEST_SCATTER / self._scatter, LARGEST_SCATTER / self._scatter))
+        return self._scatter * factor
 
     def _result(self, theta: Array, whiteners: list[Whitener], rollouts: int) -> Polished:
         residuals = self._residuals(theta)
