@@ -8,6 +8,7 @@ The truth is the fine planar integrator of the tests. A peer that is not install
 from __future__ import annotations
 
 import argparse
+import hashlib
 import os
 import sys
 import time
@@ -25,6 +26,8 @@ from peers.push import DURATION, FRICTION, MASS, PUSHES, SIZE, TIP_HEIGHT, TIP_R
 from reference.planar import Hand, HandPath, box, simulate_planar
 from rich.console import Console
 from rich.table import Table
+
+from physid_drake import cell
 
 POINT = Setting(model="point", near=1e-3, slide=1e-3)
 HYDROELASTIC = Setting(model="hydroelastic", near=1e-3, slide=1e-3)
@@ -80,21 +83,24 @@ def drake_rows() -> list[Row]:
             ("1 ms, rebuilt", 1e-3, 1e-3, True),
         ):
             setting = Setting(model=model, near=near, slide=slide, rebuilt=rebuilt)
-            note = {"1 ms, slides 2 ms": "default", "1 ms, rebuilt": "a new Cell per push"}.get(label, "")
+            note = {"1 ms, slides 2 ms": "default", "1 ms, rebuilt": "new Cell per push"}.get(label, "")
             rows.append(Row(f"{model} {label}", lambda setting=setting: CellEngine(setting), note))
     return rows
 
 
 def mujoco_rows() -> list[Row]:
     """MuJoCo as it comes, and with the settings that make its friction right."""
-    from peers.mujoco_feet import NaiveBox, SoftFeet, gauss_points, midpoints  # noqa: PLC0415
+    from peers.mujoco_feet import NaiveBox, SoftFeet, midpoints  # noqa: PLC0415
 
+    support = engine_of(POINT).cell.scene.support  # the same quadrature, so that only the engines differ
+    points, weights = support.points, support.weights
+    same = f"the Cell's {len(points)} points"
     return [
         Row("MuJoCo box 2 ms", NaiveBox, "all default"),
-        Row("MuJoCo 4x4 feet 1 ms", lambda: SoftFeet(*midpoints(4, 4), 1e-3), "soft impedance, free tip"),
-        Row("MuJoCo 8x8 feet 1 ms", lambda: SoftFeet(*midpoints(8, 8), 1e-3), "soft impedance, free tip"),
-        Row("MuJoCo 5x4 Gauss feet 1 ms", lambda: SoftFeet(*gauss_points(5, 4), 1e-3), "the Cell's own points"),
-        Row("MuJoCo 5x4 Gauss feet 2 ms", lambda: SoftFeet(*gauss_points(5, 4), 2e-3, soft=True), "softer contacts"),
+        Row("MuJoCo 4x4 feet 1 ms", lambda: SoftFeet(*midpoints(4, 4), 1e-3), "soft impedance"),
+        Row("MuJoCo 8x8 feet 1 ms", lambda: SoftFeet(*midpoints(8, 8), 1e-3), "soft impedance"),
+        Row("MuJoCo Cell's feet 1 ms", lambda: SoftFeet(points, weights, 1e-3), same),
+        Row("MuJoCo Cell's feet 2 ms", lambda: SoftFeet(points, weights, 2e-3, soft=True), "same, softer"),
     ]
 
 
@@ -103,9 +109,9 @@ def bullet_rows() -> list[Row]:
     from peers.bullet import BulletBox, BulletFeet  # noqa: PLC0415
 
     return [
-        Row("PyBullet box 240 Hz", lambda: BulletBox(1 / 240), "default, damping 0"),
+        Row("PyBullet box 240 Hz", lambda: BulletBox(1 / 240), "damping 0"),
         Row("PyBullet box 1 kHz", lambda: BulletBox(1e-3), "damping 0"),
-        Row("PyBullet 4x4 feet 1 kHz", lambda: BulletFeet(1e-3), "contact stiffness, damping 0"),
+        Row("PyBullet 4x4 feet 1 kHz", lambda: BulletFeet(1e-3), "soft, damping 0"),
     ]
 
 
@@ -151,7 +157,7 @@ def rate_table(rows: Sequence[Row], truth: Truth) -> Table:
         "rms\nmm", "worst\nmm", "rms\ndeg", "worst\ndeg",
     ):  # fmt: skip
         table.add_column(name, justify="right")
-    table.add_column("wanted / note")
+    table.add_column("wanted / note", no_wrap=True)
     base = next(row.seconds for row in rows if row.name == "point 1 ms")
     for row, following in zip(rows, [*rows[1:], None], strict=True):
         rate, rms, worst = 1.0 / row.seconds, np.sqrt(np.mean(row.errors**2, axis=0)), row.errors.max(axis=0)
@@ -168,7 +174,7 @@ def verdict(name: str, rate: float) -> str:
     """What was wanted of a row, and whether it holds."""
     if name not in WANTED:
         return ""
-    return f"at least {WANTED[name]:.0f}: {'yes' if rate >= WANTED[name] else 'NO'}"
+    return f"≥ {WANTED[name]:.0f}: {'yes' if rate >= WANTED[name] else 'NO'}"
 
 
 def skipped_line(truth: Truth) -> str:
@@ -231,10 +237,18 @@ def share_lines() -> Iterator[str]:
 
 
 def machine_line() -> str:
-    """Where this was measured, and how busy it was."""
+    """Where and what this measures, and how busy the machine is."""
     load = os.getloadavg()[0]
     busy = "" if load < 1.3 else "  BUSY: rates are too low, the ratio of two processes too."
-    return f"{os.cpu_count()} cores, load {load:.2f} at the start.{busy}"
+    return f"Cell {cell_print()}, {os.cpu_count()} cores, load {load:.2f} at the start.{busy}"
+
+
+def cell_print() -> str:
+    """A fingerprint of the Cell's sources: workers import them later than this process."""
+    digest = hashlib.sha256()
+    for file in sorted(Path(cell.__file__).parent.glob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:10]
 
 
 def main() -> None:
@@ -242,7 +256,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="one short round: rates within 30 %%")
     quick = parser.parse_args().quick
     rounds, shortest, sets = (1, 0.3, 4) if quick else (3, 1.5, 10)
-    console = Console(width=max(132, Console().width))
+    console, before = Console(width=max(146, Console().width)), cell_print()
     console.print(machine_line())
     truth = truth_of_pushes()
     rows = all_rows(console)
@@ -256,6 +270,8 @@ def main() -> None:
     console.print(scaling_table(sets, rounds))
     for line in share_lines():
         console.print(line)
+    if cell_print() != before:
+        console.print("INVALID: the Cell's sources changed while this ran, so the rows are of different programs.")
 
 
 if __name__ == "__main__":

@@ -27,13 +27,6 @@ def midpoints(nx: int, ny: int) -> tuple[Array, Array]:
     return np.column_stack([_LENGTH * x.ravel(), _WIDTH * y.ravel()]), np.full(nx * ny, 1.0 / (nx * ny))
 
 
-def gauss_points(nx: int, ny: int) -> tuple[Array, Array]:
-    """Gauss-Legendre points (n, 2) of the underside [m] and their weights (n,): the Cell's own support."""
-    (x, wx), (y, wy) = np.polynomial.legendre.leggauss(nx), np.polynomial.legendre.leggauss(ny)
-    grid = np.stack(np.meshgrid(0.5 * _LENGTH * x, 0.5 * _WIDTH * y, indexing="ij"), axis=-1)
-    return grid.reshape(-1, 2), np.outer(wx, wy).ravel() / 4.0
-
-
 class _Prescribed:
     """Steps a model whose first two joints are the tip's."""
 

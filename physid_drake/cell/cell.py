@@ -89,7 +89,8 @@ class Cell:
             ApplySimulatorConfig(
                 SimulatorConfig(
                     integration_scheme="cenic",
-                    max_step_size=solver.slide_time_step_s,
+                    # A hair above the tick: rounding would else split every other tick in two steps.
+                    max_step_size=1.001 * solver.slide_time_step_s,
                     use_error_control=False,
                 ),
                 self.simulator,

@@ -24,6 +24,7 @@ from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.recording import Recording
 from physid_drake.search import GreedyEntropySearch, SearchResult, search_minimum
+from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
 
@@ -285,22 +286,30 @@ def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
     u = np.asarray(space.to_unit(polished.theta))
     result = []
     for j, parameter in enumerate(space.parameters):
-        ends = []
-        for sign in (-1.0, 1.0):
-            point = u.copy()
-            point[j] = np.clip(u[j] + sign * z * min(spread[j], prior_spread[j]), 0.0, 1.0)
-            ends.append(float(space.from_unit(point)[j]))
+        told = bool(spread[j] < IDENTIFIABLE * prior_spread[j])
+        if told or parameter.prior_std is not None:
+            reach = z * min(spread[j], prior_spread[j])
+            low, high = max(0.0, u[j] - reach), min(1.0, u[j] + reach)
+        else:
+            low, high = 0.05, 0.95  # of a uniform prior
         result.append(
             Estimate(
                 name=parameter.name,
                 unit=parameter.unit,
                 value=float(polished.theta[j]),
-                ci90=(ends[0], ends[1]),
-                identifiable=bool(spread[j] < IDENTIFIABLE * prior_spread[j]),
+                ci90=(_moved(space, u, j, low), _moved(space, u, j, high)),
+                identifiable=told,
                 prior=parameter.prior_mean,
             )
         )
     return tuple(result)
+
+
+def _moved(space: ParameterSpace, u: Array, j: int, value: float) -> float:
+    """Parameter j of the point u (d,) of the unit cube with its entry j moved to ``value``."""
+    point = u.copy()
+    point[j] = value
+    return float(space.from_unit(point)[j])
 
 
 def _pulls(polished: Polished) -> Array:

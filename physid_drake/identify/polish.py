@@ -22,7 +22,7 @@ ROUNDS = 2  # of linearising the pushes' own unknowns
 LARGEST_SCATTER = 0.2
 SMALLEST_SCATTER = 2e-3
 FAILED = 1e3  # standard deviations: residual of a rollout that diverged
-SCATTER_STEPS = 50
+SCATTER_STEPS = 2
 SCATTER_WEIGHT = 4.0
 SCATTER_PUSHES = 4  # fewer pushes than this do not tell their scatter
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,7 @@ def _numbers(accuracy: Accuracy | None) -> dict[str, float | int | None] | None:
     """An accuracy with units in its keys."""
     if accuracy is None:
         return None
-    return {
+    numbers = {
         "position_rms_m": accuracy.position,
         "rotation_rms_rad": accuracy.rotation,
         "end_position_rms_m": accuracy.end_position,
@@ -75,3 +76,5 @@ def _numbers(accuracy: Accuracy | None) -> dict[str, float | int | None] | None:
         "sigmas_rms": accuracy.sigmas,
         "diverged": accuracy.diverged,
     }
+    # JSON has no infinity, which stands where every rollout diverged.
+    return {key: value if value is None or math.isfinite(value) else None for key, value in numbers.items()}

@@ -1,0 +1,173 @@
+"""The hand's path fitted to noisy streams: what it recovers, and that it always ends."""
+
+import time
+
+import numpy as np
+import pytest
+
+from physid_drake.cell import HandPath
+from physid_drake.cell.hand_path import MOST_KNOTS, fit_hand_path, stream_std
+
+STD = 5e-5  # m, of a good tracker of the hand
+
+
+def trapezoid(speed=0.3, ramp=0.05, cruise=0.3, brake=0.04, lead=0.2):
+    times = np.cumsum([lead, ramp, cruise, brake])
+    return HandPath(
+        times=times, velocities=np.outer([0.0, speed, speed, 0.0], [0.8, 0.6]), start=np.array([0.1, 0.2])
+    )
+
+
+def sampled(path, end, rate=100.0, std=STD, seed=0, begin=0.0):
+    times = np.arange(begin, end, 1.0 / rate)
+    noise = std * np.random.default_rng(seed).standard_normal((len(times), 2))
+    return times, path.positions(times) + noise
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_knots_of_a_noisy_trapezoid_are_recovered(seed):
+    path = trapezoid()
+    times, stream = sampled(path, 0.9, seed=seed)
+    fit = fit_hand_path(times, stream, STD)
+    dense = np.arange(0.0, 0.88, 1e-3)
+    assert np.linalg.norm(fit.positions(dense) - path.positions(dense), axis=1).max() < 1e-4  # 2 std; 0.07 mm
+    knots = fit.times[np.linalg.norm(np.diff(fit.velocities, axis=0, append=0.0), axis=1) > 0.03]
+    for knot in path.times:
+        assert np.abs(fit.times - knot).min() < 6e-3  # s
+    assert len(fit.times) <= 8
+    assert len(knots) >= 2
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_cruise_and_the_brake_are_recovered(seed):
+    """The velocity at which the object is touched and the instant at which it leaves decide where it goes."""
+    path = trapezoid()
+    times, stream = sampled(path, 0.9, seed=seed)
+    fit = fit_hand_path(times, stream, STD)
+    cruise = (fit.positions(np.array([0.5])) - fit.positions(np.array([0.3])))[0] / 0.2
+    assert np.linalg.norm(cruise) == pytest.approx(0.3, abs=1e-3)
+    first, last = fit.last_brake()
+    assert 0.5 * (fit.times[first] + fit.times[last]) == pytest.approx(0.57, abs=2e-3)
+    np.testing.assert_allclose(fit.velocities[-1], 0.0, atol=2e-3)
+
+
+def test_a_quieter_stream_is_fitted_more_closely():
+    path, dense = trapezoid(), np.arange(0.0, 0.88, 1e-3)
+    errors = []
+    for std in (2e-4, 5e-5):
+        runs = [fit_hand_path(*sampled(path, 0.9, std=std, seed=seed), std) for seed in range(6)]
+        errors.append(np.mean([np.abs(f.positions(dense) - path.positions(dense)).max() for f in runs]))
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_a_stream_that_begins_in_motion_is_fitted_from_its_first_sample():
+    path = trapezoid(lead=0.2)
+    times, stream = sampled(path, 0.9, begin=0.3)
+    fit = fit_hand_path(times, stream, STD)
+    assert fit.times[0] == pytest.approx(0.3, abs=1e-9)
+    np.testing.assert_allclose(fit.velocities[0], path.velocities[1], atol=6e-3)
+    dense = np.arange(0.3, 0.88, 1e-3)
+    assert np.linalg.norm(fit.positions(dense) - path.positions(dense), axis=1).max() < 1e-4
+
+
+def test_a_stream_that_ends_in_motion_keeps_moving_to_its_end():
+    path = trapezoid()
+    times, stream = sampled(path, 0.5)
+    fit = fit_hand_path(times, stream, STD)
+    np.testing.assert_allclose(fit.velocities[-1], path.velocities[2], atol=6e-3)
+    dense = np.arange(0.0, times[-1], 1e-3)
+    assert np.linalg.norm(fit.positions(dense) - path.positions(dense), axis=1).max() < 1e-4
+
+
+def test_a_hand_at_rest_stays_there():
+    rng = np.random.default_rng(0)
+    times = np.arange(0.0, 1.0, 0.01)
+    fit = fit_hand_path(times, np.array([0.3, -0.1]) + STD * rng.standard_normal((100, 2)), STD)
+    np.testing.assert_allclose(fit.positions(times), np.tile([0.3, -0.1], (100, 1)), atol=3e-5)
+    assert fit.last_brake() is None
+
+
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_few_samples_are_joined_by_straight_lines(count):
+    rng = np.random.default_rng(count)
+    times, stream = np.cumsum(rng.uniform(0.1, 1.0, count)), rng.uniform(-0.2, 0.2, (count, 2))
+    fit = fit_hand_path(times, stream, None)
+    np.testing.assert_allclose(fit.positions(times), stream, atol=2e-6)
+    middle = 0.5 * (times[:-1] + times[1:])
+    np.testing.assert_allclose(fit.positions(middle), 0.5 * (stream[:-1] + stream[1:]), atol=2e-6)
+    assert (np.diff(fit.times) > 0.0).all()
+
+
+def test_the_origin_of_time_does_not_matter():
+    path = trapezoid()
+    times, stream = sampled(path, 0.9)
+    early, late = (fit_hand_path(times + shift, stream, STD) for shift in (0.0, 1024.0))
+    np.testing.assert_allclose(late.times - 1024.0, early.times, atol=1e-6)
+    np.testing.assert_allclose(late.velocities, early.velocities, atol=1e-4)
+
+
+def test_the_noise_of_a_stream_is_seen_through_its_motion():
+    for std in (1e-5, 1e-4):
+        _, stream = sampled(trapezoid(), 0.9, std=std, seed=3)
+        assert stream_std(stream) == pytest.approx(std, rel=0.35)
+
+
+MERGED = pytest.mark.xfail(
+    strict=True,
+    reason="fault: _place merges knots closer than 2 ms although the fit needs both, and keeps the result",
+)
+
+
+@MERGED
+@pytest.mark.parametrize("rate", [100.0, 250.0, 1000.0])
+def test_a_hand_that_starts_and_stops_at_once_is_followed(rate):
+    """A commanded straight line at constant speed; between two samples 0.3 m/s may err by 3 mm, at them by none."""
+    path = HandPath(times=np.array([0.203, 0.6037]), velocities=np.full((2, 2), 0.3), start=np.zeros(2))
+    for seed in range(4):
+        times, stream = sampled(path, 0.8, rate=rate, seed=seed)
+        fit = fit_hand_path(times, stream, STD)
+        assert np.abs(fit.positions(times) - stream).max() < 10 * STD  # up to 7.5, 24 and 25 mm
+
+
+@MERGED
+def test_a_path_of_few_knots_is_explained_to_its_noise():
+    ratios = []
+    for seed in range(20, 40):
+        rng = np.random.default_rng([2, seed])
+        k = int(rng.integers(3, 8))
+        knots, velocities = np.cumsum(rng.uniform(0.05, 0.3, k)), rng.uniform(-0.5, 0.5, (k, 2))
+        velocities[[0, -1]] = 0.0
+        path = HandPath(times=knots, velocities=velocities, start=np.zeros(2))
+        times, stream = sampled(path, knots[-1] + 0.2, seed=seed)
+        error = fit_hand_path(times, stream, STD).positions(times) - stream
+        ratios.append(np.sqrt(np.mean(error**2)) / STD)
+    assert np.median(ratios) < 1.1
+    assert max(ratios) < 1.5  # 3.5
+
+
+def test_every_noisy_path_is_fitted_with_few_knots_and_in_no_time():
+    """Two hundred paths: knots, speeds, rates, noise and rounding at random, some jumping, some frozen."""
+    longest = 0.0
+    for seed in range(200):
+        rng = np.random.default_rng([1, seed])
+        count = int(rng.integers(6, 40))
+        times = np.cumsum(rng.uniform(0.5, 1.5, count)) / rng.choice([20.0, 100.0, 250.0])
+        k = int(rng.integers(2, 9))
+        knots = np.sort(rng.uniform(times[0], times[-1], k)) + 1e-4 * np.arange(k)
+        path = HandPath(times=knots, velocities=rng.uniform(-0.5, 0.5, (k, 2)), start=rng.uniform(-0.3, 0.3, 2))
+        std = float(10.0 ** rng.uniform(-7, -2.5))
+        stream = path.positions(times) + std * rng.standard_normal((count, 2))
+        match seed % 4:
+            case 1:
+                stream = np.round(stream, 3)
+            case 2:
+                stream[count // 2 :] += rng.uniform(-0.05, 0.05, 2)
+            case 3:
+                stream[count // 3 : 2 * count // 3] = stream[count // 3]
+        begun = time.perf_counter()
+        fit = fit_hand_path(times, stream, None if seed % 3 else std)
+        longest = max(longest, time.perf_counter() - begun)
+        assert len(fit.times) <= MOST_KNOTS + 3
+        assert (np.diff(fit.times) > 0.0).all()
+        assert np.isfinite(fit.velocities).all()
+    assert longest < 10.0  # s; 0.3

@@ -1,0 +1,246 @@
+"""A recorded push as the fit sees it: noise, start, height of the contact, force windows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from runs import shipped_pushes
+
+from physid_drake.errors import RecordingError
+from physid_drake.identify.problem import FORCE_SHARE, Noise, noise_of, problems_of, spec_of
+from physid_drake.recording import (
+    Cylinder,
+    ForceStream,
+    Hand,
+    ObjectModel,
+    PoseStream,
+    Push,
+    Recording,
+    Sensors,
+    Table,
+)
+
+QUIET = Noise(position=3e-4, rotation=3e-3, hand=5e-5, force=0.02, correlation=0.0, source={})
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return shipped_pushes(3)
+
+
+def with_pushes(recording, change):
+    return replace(recording, pushes=tuple(change(push) for push in recording.pushes))
+
+
+def at_height(stream, z):
+    return PoseStream(times=stream.times, positions=stream.positions * [1, 1, 0] + [0, 0, z],
+                      quaternions=stream.quaternions)  # fmt: skip
+
+
+def first(recording, noise=QUIET, height=0.03):
+    return problems_of(recording, noise, height)[0]
+
+
+# Noise.
+
+
+def test_what_the_sensors_state_is_believed(recording):
+    noise = noise_of(recording)
+    assert (noise.position, noise.rotation, noise.hand) == (3e-4, 3e-3, 5e-5)
+    assert noise.source == {"position": "stated", "rotation": "stated", "hand": "stated", "force": "assumed"}
+
+
+def test_what_is_not_stated_is_seen_at_rest(recording):
+    noise = noise_of(replace(recording, sensors=Sensors()))
+    assert noise.source == {"position": "seen", "rotation": "seen", "hand": "seen", "force": "assumed"}
+    # Truth 0.3 mm, 3 mrad, 0.05 mm, from some hundred samples.
+    assert noise.position == pytest.approx(3e-4, rel=0.2)
+    assert noise.rotation == pytest.approx(3e-3, rel=0.2)
+    assert noise.hand == pytest.approx(5e-5, rel=0.3)
+
+
+def test_what_is_neither_stated_nor_seen_is_assumed(recording):
+    def ends(push):
+        rows = [0, len(push.object) - 1]
+        s = push.object
+        stream = PoseStream(times=s.times[rows], positions=s.positions[rows], quaternions=s.quaternions[rows])
+        return replace(push, object=stream)
+
+    noise = noise_of(replace(with_pushes(recording, ends), sensors=Sensors()))
+    assert noise.source["position"] == noise.source["rotation"] == noise.source["force"] == "assumed"
+    assert min(noise.position, noise.rotation, noise.force) > 0.0
+    assert noise.correlation == 0.0
+
+
+def test_a_recording_without_noise_is_not_believed_to_be_exact(recording):
+    def exact(push):
+        s = push.object
+        return replace(push, object=PoseStream(times=s.times, positions=np.tile(s.positions[0], (len(s), 1)),
+                                               quaternions=np.tile(s.quaternions[0], (len(s), 1))))  # fmt: skip
+
+    noise = noise_of(replace(with_pushes(recording, exact), sensors=Sensors()))
+    assert noise.source["position"] == "assumed"
+    assert noise.position > 1e-4
+
+
+def test_white_noise_has_no_correlation_and_correlated_noise_has(recording):
+    assert noise_of(recording).correlation < 0.2
+
+    def smear(push):
+        rng, s = np.random.default_rng(0), push.object
+        e = rng.standard_normal((len(s), 3)) * 3e-4
+        for k in range(1, len(e)):
+            e[k] = 0.7 * e[k - 1] + np.sqrt(0.51) * e[k]
+        place = np.tile(s.positions[0], (len(s), 1)) + e * [1, 1, 0]
+        half = 0.5 * e[:, 2] * 10
+        q = np.column_stack([np.cos(half), 0 * half, 0 * half, np.sin(half)])
+        return replace(push, object=PoseStream(times=s.times, positions=place, quaternions=q))
+
+    assert noise_of(with_pushes(recording, smear)).correlation == pytest.approx(0.7, abs=0.2)
+
+
+# The contact's height.
+
+
+@pytest.mark.parametrize(
+    ("hand", "z", "want"),
+    [
+        (Hand(tip="sphere", radius=0.01), 0.012, 0.012),
+        (Hand(tip="cylinder", radius=0.01, length=0.06), 0.040, 0.020),  # 10 to 70 mm against 0 to 30 mm
+        (Hand(tip="cylinder", radius=0.01, length=0.10), 0.040, 0.015),
+        (Hand(tip="capsule", radius=0.01, length=0.02), 0.010, 0.010),
+        (Hand(tip="capsule", radius=0.01, length=0.02), 0.005, 0.0075),
+    ],
+)
+def test_the_contact_is_in_the_middle_of_what_tip_and_object_share(recording, hand, z, want):
+    changed = with_pushes(recording, lambda p: replace(p, hand=at_height(p.hand, z)))
+    assert first(replace(changed, hand=hand)).hand_height == pytest.approx(want)
+
+
+@pytest.mark.parametrize("z", [0.2, 0.0301, -0.02])
+def test_a_hand_that_passes_the_object_is_refused(recording, z):
+    changed = with_pushes(recording, lambda p: replace(p, hand=at_height(p.hand, z)))
+    with pytest.raises(RecordingError, match=r"push 'pushes/001.csv': the hand at z = .* passes the object"):
+        first(changed)
+
+
+def test_a_rolling_cylinder_is_touched_at_its_axis(recording):
+    can = ObjectModel(shape=Cylinder(radius=0.033, length=0.1, axis="y"))
+    assert first(replace(recording, object=can), height=0.066).hand_height == 0.033
+
+
+# The start.
+
+
+def test_a_push_starts_at_the_mean_of_the_rest_before_it(recording):
+    push = recording.pushes[0]
+    problem = first(recording)
+    assert problem.begin == push.object.times[0]
+    assert problem.end == push.end_time
+    still = push.object.planar[:15]  # the hand comes after 0.2 s
+    np.testing.assert_allclose(problem.start.pose, still.mean(axis=0), atol=3 * 3e-3 / np.sqrt(15))
+    assert (problem.start_std < 0.5 * QUIET.sigmas).all()
+    assert (problem.start_std > QUIET.sigmas / np.sqrt(len(push.object))).all()
+
+
+def test_correlated_noise_makes_the_start_less_sure(recording):
+    sure, unsure = (first(recording, replace(QUIET, correlation=c)).start_std for c in (0.0, 0.9))
+    np.testing.assert_allclose(unsure / sure, np.sqrt(19.0), rtol=0.35)
+
+
+def test_without_a_rest_the_first_pose_is_the_start(recording):
+    def cut(push):
+        s = push.object
+        moving = np.flatnonzero(np.linalg.norm(s.planar[:, :2] - s.planar[0, :2], axis=1) > 5e-3)[0]
+        keep = slice(moving, moving + 8)
+        stream = PoseStream(times=s.times[keep], positions=s.positions[keep], quaternions=s.quaternions[keep])
+        return replace(push, object=stream)
+
+    changed = with_pushes(recording, cut)
+    problem = first(changed)
+    np.testing.assert_array_equal(problem.start.pose, changed.pushes[0].object.planar[0])
+    np.testing.assert_array_equal(problem.start_std, QUIET.sigmas)
+
+
+def test_of_two_poses_the_first_is_the_start_and_the_last_is_compared(recording):
+    def ends(push):
+        s = push.object
+        rows = [0, len(s) - 1]
+        stream = PoseStream(times=s.times[rows], positions=s.positions[rows], quaternions=s.quaternions[rows])
+        return replace(push, object=stream)
+
+    changed = with_pushes(recording, ends)
+    problem = first(changed)
+    np.testing.assert_array_equal(problem.start.pose, changed.pushes[0].object.planar[0])
+    np.testing.assert_array_equal(problem.poses, changed.pushes[0].object.planar[1:])
+    np.testing.assert_array_equal(problem.times, changed.pushes[0].object.times[1:])
+
+
+def slide(poses=40):
+    """A free slide: 0.5 m/s along x, slowing by 2 m/s^2, turning at 3 rad/s, without noise."""
+    t = 0.01 * np.arange(poses)
+    half = 0.5 * 3.0 * t
+    zeros = np.zeros(poses)
+    stream = PoseStream(
+        times=t + 7.0,
+        positions=np.column_stack([0.5 * t - t**2, zeros, zeros + 0.015]),
+        quaternions=np.column_stack([np.cos(half), zeros, zeros, np.sin(half)]),
+    )
+    recording = shipped_pushes(1)
+    push = Push(name="slide", object=stream, hand=None, force=None)
+    return Recording(
+        name="slide", description="", object=recording.object, table=Table(size=(2.0, 2.0)), hand=None,
+        sensors=Sensors(), pushes=(push,),
+    )  # fmt: skip
+
+
+def test_a_free_slide_starts_with_the_velocity_of_its_first_samples():
+    problem = first(slide())
+    assert problem.path is None
+    np.testing.assert_allclose(problem.start.velocity, [0.5, 0.0, 3.0], atol=1e-9)
+    np.testing.assert_allclose(problem.start.pose, 0.0, atol=1e-9)
+    assert problem.start_std.shape == (6,)
+    assert (problem.start_std > 0.0).all()
+    assert spec_of(slide(), None).hand_radius is None
+
+
+def test_a_free_slide_of_two_poses_has_no_velocity_and_is_refused():
+    with pytest.raises(RecordingError, match=r"'slide'.*at least 3 poses"):
+        first(slide(2))
+
+
+# Forces.
+
+
+def with_forces(recording, force_of, rate=100.0):
+    def add(push):
+        times = np.arange(push.hand.times[0], push.hand.times[-1], 1.0 / rate)
+        return replace(push, force=ForceStream(times=times, forces=force_of(times - times[0])))
+
+    return with_pushes(recording, add)
+
+
+def test_forces_are_means_over_windows(recording):
+    problem = first(with_forces(recording, lambda t: np.column_stack([10.0 * t, 0.0 * t + 2.0, 0.0 * t + 9.0])))
+    middles = problem.force_times
+    np.testing.assert_allclose(middles - middles[0], 0.1 * np.arange(len(middles)), atol=0.006)
+    start = with_forces(recording, lambda t: np.zeros((len(t), 3))).pushes[0].force.times[0]
+    np.testing.assert_allclose(problem.forces[:, 0], 10.0 * (problem.force_times - start), atol=1e-9)
+    np.testing.assert_allclose(problem.forces[:, 1], 2.0)
+    largest = np.linalg.norm(problem.forces, axis=1).max()
+    np.testing.assert_allclose(problem.force_std[0], np.hypot(0.02 / np.sqrt(10), FORCE_SHARE * largest), rtol=0.01)
+
+
+def test_a_window_of_one_sample_is_left_out(recording):
+    assert first(with_forces(recording, lambda t: np.zeros((len(t), 3)), rate=9.0)).force_times.size == 0
+
+
+def test_without_forces_there_are_no_windows(recording):
+    problem = first(recording)
+    assert problem.forces.shape == (0, 2)
+    assert problem.force_std.shape == problem.force_times.shape == (0,)
+
+
+def test_the_table_of_the_cell_is_the_recorded_one(recording):
+    moved = replace(recording, table=Table(size=(1.0, 0.4), centre=(0.2, -0.1)))
+    np.testing.assert_allclose(spec_of(moved, None).table, [[-0.3, -0.3], [0.7, 0.1]])

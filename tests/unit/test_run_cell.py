@@ -1,0 +1,192 @@
+"""The main job: what a run leaves behind, and how it goes on after an interrupt."""
+
+import json
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from runs import laid_over, quick, write_small
+
+from physid_drake import run_cell
+from physid_drake.identify import Identifier
+from physid_drake.identify.polish import Polisher
+from physid_drake.scenario import load_scenario
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    return write_small(tmp_path_factory.mktemp("recordings") / "small")
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory, recording):
+    """The folder of a finished run, seed 3."""
+    folder = tmp_path_factory.mktemp("runs") / "deep" / "done"
+    assert quick(folder, "--seed", 3, recording=recording) == 0
+    return folder
+
+
+def result_of(folder):
+    return json.loads((folder / "result.json").read_text())
+
+
+def test_a_run_leaves_its_configuration_its_result_and_its_page(done):
+    assert {path.name for path in done.iterdir()} == {"config.yaml", "result.json", "page.html"}
+    assert {oct(path.stat().st_mode & 0o777) for path in done.iterdir()} == {"0o644"}
+
+
+def test_the_result_says_everything_that_was_asked(done):
+    result = result_of(done)
+    assert result["format"] == "physid-result/1"
+    assert result["seed"] == 3
+    assert set(result["versions"]) >= {"physid_drake", "drake", "numpy", "scipy", "python"}
+    assert result["held_out"]["pushes"] + result["training"]["pushes"] == [
+        *result["held_out"]["pushes"],
+        *result["push_unknowns"],
+    ]
+    friction = result["theta"]["support_friction"]
+    assert set(friction) == {"value", "unit", "ci90", "identifiable", "prior"}
+    assert friction["ci90"][0] < friction["value"] < friction["ci90"][1]
+    assert result["search"]["trials"] == 2
+
+
+def test_the_configuration_beside_the_result_gives_the_same_result(done, recording, tmp_path):
+    again = tmp_path / "again"
+    assert run_cell.main([str(done / "config.yaml"), "--out", str(again), "--no-view"]) == 0
+    assert (again / "config.yaml").read_text() == (done / "config.yaml").read_text()
+    assert (again / "result.json").read_bytes() == (done / "result.json").read_bytes()
+
+
+def test_flags_and_overrides_are_written_into_the_configuration(done, recording):
+    _, scenario = load_scenario(str(done / "config.yaml"), None)
+    assert scenario.seed == 3
+    assert scenario.recording == str(recording)
+    assert scenario.search.budget == 2
+    assert scenario.cell.contact.model == "point"
+
+
+class Page(HTMLParser):
+    """Attributes of a page's own tags, and its text; scripts are not looked into."""
+
+    def __init__(self):
+        super().__init__()
+        self.loads, self.text, self.tags = [], [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.loads += [value or "" for name, value in attrs if name in ("src", "href", "srcset", "data", "action")]
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+@pytest.fixture(scope="module")
+def page(done):
+    parser = Page()
+    parser.feed((done / "page.html").read_text())
+    return parser
+
+
+def test_the_page_loads_nothing_from_elsewhere(page):
+    assert [value[:80] for value in page.loads if not value.startswith(("data:", "#"))] == []
+
+
+def test_the_page_shows_the_numbers_of_the_result(page, done):
+    text = " ".join("".join(page.text).split())
+    result = result_of(done)
+    for name, estimate in result["theta"].items():
+        assert name in text
+        assert f"{estimate['value']:.4g}" in text
+        assert "{:.4g} to {:.4g}".format(*estimate["ci90"]) in text
+    assert f"{1e3 * result['held_out']['after']['position_rms_m']:.2f}" in text
+    assert f"reduced chi-square {result['reduced_chi2']:.2f}" in text
+    assert "Seed 3" in text
+
+
+def test_the_page_lets_a_person_choose_every_push(page, done):
+    result = result_of(done)
+    assert page.tags.count("option") == 3
+    for name in [*result["held_out"]["pushes"], *result["training"]["pushes"]]:
+        assert name in "".join(page.text)
+
+
+def test_a_name_that_looks_like_html_stays_text(tmp_path):
+    folder = write_small(tmp_path / "odd", name="<b>odd</b> & [red]$x$")
+    assert quick(tmp_path / "out", recording=folder) == 0
+    assert "&lt;b&gt;odd&lt;/b&gt; &amp; [red]$x$" in (tmp_path / "out" / "page.html").read_text()
+
+
+def test_the_terminal_shows_theta_accuracy_and_verdict(recording, tmp_path, capsys):
+    assert quick(tmp_path / "out", recording=recording, theta={"parameters": ["mass"]}) == 0
+    shown = capsys.readouterr().out
+    assert "mass" in shown
+    assert "no: it keeps" in shown
+    assert "held out" in shown
+    assert "reduced chi-square" in shown
+
+
+class _CtrlC:
+    """Ctrl-C during a trial of the search, or at the polish."""
+
+    def __init__(self, monkeypatch, trial=None):
+        self.patch, self.calls = monkeypatch, 0
+        target, name = (Polisher, "run") if trial is None else (Identifier, "_objective")
+        original = getattr(target, name)
+
+        def interrupted(this, *args):
+            self.calls += 1
+            if trial is None or self.calls == trial:
+                raise KeyboardInterrupt
+            return original(this, *args)
+
+        monkeypatch.setattr(target, name, interrupted)
+
+
+SEARCH = {"search": {"budget": 6, "entropy_tolerance_nats": 0.0}}
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory, recording):
+    folder = tmp_path_factory.mktemp("runs") / "uninterrupted"
+    assert quick(folder, recording=recording, **SEARCH) == 0
+    return result_of(folder)
+
+
+@pytest.mark.parametrize(
+    "trial",
+    [
+        pytest.param(
+            4,
+        ),
+        None,
+    ],
+    ids=["in the search", "in the polish"],
+)
+def test_ctrl_c_keeps_what_was_found_and_the_same_command_goes_on(
+    trial, recording, tmp_path, capsys, monkeypatch, uninterrupted
+):
+    out = tmp_path / "out"
+    with monkeypatch.context() as patch:
+        _CtrlC(patch, trial)
+        assert quick(out, recording=recording, **SEARCH) == 130
+    assert capsys.readouterr().err.startswith("interrupted")
+    assert {path.name for path in out.iterdir()} == {"config.yaml", "belief.npz"}
+    with monkeypatch.context() as patch:
+        count = _CtrlC(patch, trial=-1)
+        assert quick(out, recording=recording, **SEARCH) == 0
+    assert count.calls == (0 if trial is None else 3)
+    assert not (out / "belief.npz").exists()
+    assert result_of(out) == uninterrupted
+
+
+def test_another_configuration_does_not_go_on_from_there(recording, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    with monkeypatch.context() as patch:
+        _CtrlC(patch)
+        assert quick(out, recording=recording) == 130
+    other = laid_over(SEARCH, {"seed": 4})
+    with monkeypatch.context() as patch:
+        count = _CtrlC(patch, trial=-1)
+        assert quick(out, recording=recording, **other) == 0
+    assert count.calls == 6
+    assert np.isfinite(result_of(out)["reduced_chi2"])
