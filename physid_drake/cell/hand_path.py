@@ -222,7 +222,12 @@ class _Fit:
         found = least_squares(
             residual, knots, bounds=(-0.5 * SHORTEST_PIECE, self._span), x_scale=0.01, max_nfev=evaluations
         )
-        return self._separate(np.sort(found.x))
+        moved = self._separate(np.sort(found.x))
+        # Knots that merged must have been worth less than their price, or both are needed where they were.
+        allowed = (len(knots) - len(moved)) * self._price
+        if self._solve(moved, ended=False)[1] > self._solve(knots, ended=False)[1] + allowed:
+            return knots
+        return moved
 
     def _separate(self, knots: Array) -> Array:
         kept = [float(knots[0])]

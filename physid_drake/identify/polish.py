@@ -81,7 +81,7 @@ class Polisher:
             self._tick(f"least squares, round {round_ + 1} of {ROUNDS}")
             theta = self._fit(theta, whiteners)
             whiteners = self._linearise(theta)
-            self._learn_scales(theta, whiteners)
+            whiteners = self._learn_scales(theta, whiteners)
         return self._result(theta, whiteners, self._pool.count - before)
 
     def _nuisances(self) -> list[Nuisance]:
@@ -178,15 +178,18 @@ class Polisher:
         own = np.asarray(space.prior_whitened(theta))
         return np.where([p.prior_std is None for p in space.parameters], flat, own)
 
-    def _learn_scales(self, theta: Array, whiteners: list[Whitener]) -> None:
-        """Learn the noise's inflation and the scatter of friction from what is left."""
+    def _learn_scales(self, theta: Array, whiteners: list[Whitener]) -> list[Whitener]:
+        """Learn the noise's inflation and the scatter of friction from what is left; the whiteners that follow."""
         residuals = self._residuals(theta)
         chi2 = sum(float((w.apply(r) ** 2).sum()) for w, r in zip(whiteners, residuals, strict=True))
         degrees = max(1, sum(len(r) for r in residuals) - len(theta))
         self._inflation = max(1.0, chi2 / degrees)
         if len(self._problems) < SCATTER_PUSHES:
-            return
+            return whiteners
+        old = self._scatter
         self._scatter = self._new_scatter(whiteners, [r / np.sqrt(self._inflation) for r in residuals])
+        places = [nuisance.index("friction") for nuisance in self._nuisances()]
+        return [_rescaled(w, k, self._scatter / old) for w, k in zip(whiteners, places, strict=True)]
 
     def _new_scatter(self, whiteners: list[Whitener], residuals: list[Array]) -> float:
         """Scatter of friction from push to push, by expectation-maximisation on the linearised pushes.
@@ -199,9 +202,7 @@ class Polisher:
         for _ in range(SCATTER_STEPS):
             second = []
             for k, whitener, residual in zip(places, whiteners, residuals, strict=True):
-                jacobian = whitener.jacobian.copy()
-                jacobian[:, k] *= factor
-                scaled = Whitener.of(jacobian)
+                scaled = _rescaled(whitener, k, factor)
                 second.append(scaled.unknowns(residual)[k] ** 2 + scaled.variances()[k])
             guess = SCATTER_WEIGHT * (self._first_scatter / (factor * self._scatter)) ** 2
             factor *= float(np.sqrt((sum(second) + guess) / (len(second) + SCATTER_WEIGHT)))
@@ -226,6 +227,13 @@ class Polisher:
             unknowns=tuple(unknowns),
             rollouts=rollouts,
         )
+
+
+def _rescaled(whitener: Whitener, k: int, factor: float) -> Whitener:
+    """The whitener after the prior of its unknown k was widened by a factor."""
+    jacobian = whitener.jacobian.copy()
+    jacobian[:, k] *= factor
+    return Whitener.of(jacobian)
 
 
 def _first_motion(problem: PushProblem) -> float:
