@@ -31,7 +31,7 @@ def test_a_notebook_opens_with_what_will_be_seen(path):
 def test_a_notebook_holds_no_outputs_no_classes_and_no_machine_paths(path):
     notebook = nbformat.read(path, as_version=4)
     for cell in notebook.cells:
-        assert not re.search(r"(/home/|/work/|/tmp/|/Users/|[A-Z]:\\)", cell.source)
+        assert not re.search(r"(/(home|work|tmp|Users)/|[A-Z]:\\)", cell.source)
         if cell.cell_type == "code":
             assert cell.outputs == []
             assert cell.execution_count is None
