@@ -26,7 +26,7 @@ from physid_drake.cell.setters import (
 )
 from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.cell.stepper import Stepper
-from physid_drake.cell.support import SLENDER, rest_depths
+from physid_drake.cell.support import SLENDER, PressureGrid, rest_depths
 from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]
@@ -50,6 +50,7 @@ class Cell:
         config: CellConfig | None = None,
         table: Array | None = None,
         with_edge: bool = False,
+        pressure: PressureGrid | None = None,
     ) -> None:
         """Build the diagram.
 
@@ -60,19 +61,20 @@ class Cell:
             table: (2, 2) lower and upper corner of the table top [m]; None for an endless one. An object that
                 comes to its edge is simulated again in a cell with that edge, from which it can fall.
             with_edge: model the edge from the start: point contact on a box, slower than the endless table.
+            pressure: under the object, where it is not even.
 
         Raises:
             CellError: if the shape cannot be built.
         """
         self.config = config or CellConfig()
-        self._build = (shape, hand_radius, table)
+        self._build = (shape, hand_radius, table, pressure)
         self._table = None if table is None or with_edge else np.asarray(table, dtype=np.float64)
         self._at_edge: Cell | None = None
         edge = np.asarray(table, dtype=np.float64) if table is not None and with_edge else None
         self.solid: Solid = solid_of(shape)
         self.mean_depth = self.config.contact.rest_depth_m * _stiffer(self.solid)
         builder = DiagramBuilder()
-        self.scene: Scene = add_scene(builder, self.config, self.solid, hand_radius, edge=edge)
+        self.scene: Scene = add_scene(builder, self.config, self.solid, hand_radius, edge=edge, pressure=pressure)
         cells = self.config.friction_cells[0] * self.config.friction_cells[1]
         self._cells = cells
         self.setters: tuple[ParameterSetter, ...] = (
@@ -171,11 +173,13 @@ class Cell:
 
     def _cell_with_edge(self) -> Cell:
         if self._at_edge is None:
-            shape, hand_radius, table = self._build
+            shape, hand_radius, table, pressure = self._build
             # Few Gauss points would let an object tip over the innermost one that has left the table.
             contact = dc.replace(self.config.contact, model="point", support_points=EDGE_POINTS)
             config = dc.replace(self.config, contact=contact)
-            self._at_edge = Cell(shape, hand_radius=hand_radius, config=config, table=table, with_edge=True)
+            self._at_edge = Cell(
+                shape, hand_radius=hand_radius, config=config, table=table, with_edge=True, pressure=pressure
+            )
         return self._at_edge
 
     def rest_pose(self, body: Body) -> Array:

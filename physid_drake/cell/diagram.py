@@ -32,7 +32,7 @@ from pydrake.systems.framework import DiagramBuilder
 from physid_drake.cell.config import CellConfig
 from physid_drake.cell.outline import Disc, Outline
 from physid_drake.cell.solid import Solid
-from physid_drake.cell.support import FrictionGrid, Support, support_of
+from physid_drake.cell.support import FrictionGrid, PressureGrid, Support, support_of
 
 Array = NDArray[np.float64]
 
@@ -101,6 +101,7 @@ def add_scene(
     hand_radius: float | None,
     *,
     edge: Array | None,
+    pressure: PressureGrid | None = None,
 ) -> Scene:
     """Add plant and scene graph of a cell to a diagram builder.
 
@@ -111,6 +112,7 @@ def add_scene(
         hand_radius: of the tip [m]; None without a hand.
         edge: (2, 2) lower and upper corner of the table top [m] for a table that an object can fall from;
             None for an endless one, which is faster.
+        pressure: under the object, where it is not even.
     """
     discrete = config.solver.scheme != "cenic"
     hydroelastic = config.contact.model == "hydroelastic" and edge is None and solid.rolling_radius is None
@@ -125,7 +127,7 @@ def add_scene(
     )
     plant.set_name("plant")
     grid = FrictionGrid(nx=config.friction_cells[0], ny=config.friction_cells[1])
-    support = support_of(solid.underside, grid, config.contact.support_points, height=solid.height)
+    support = support_of(solid.underside, grid, config.contact.support_points, height=solid.height, pressure=pressure)
     if solid.rolling_radius is not None:
         support = _axis_support(solid, support)
 

@@ -73,7 +73,10 @@ class FrictionLaw(Protocol):
     gives back what is too much of it, which vanishes at rest and is therefore never stiff.
     """
 
-    largest: float
+    @property
+    def largest(self) -> float:
+        """Largest ratio to the cell's coefficient that the law reaches, at least 1."""
+        ...
 
     def refund(self, state: ObjectState) -> Array:
         """Forces (n, 2) on the support points [N], along their slip: the contact's friction less the true one."""

@@ -44,6 +44,28 @@ class FrictionGrid:
 
 
 @dataclass(frozen=True, kw_only=True)
+class PressureGrid:
+    """A pressure that is not even: a regular grid of weights over the outline's bounding box.
+
+    Attributes:
+        weights: rows along x of B, columns along y; only their proportions matter.
+    """
+
+    weights: tuple[tuple[float, ...], ...]
+
+    @property
+    def grid(self) -> FrictionGrid:
+        """The cells of the weights."""
+        return FrictionGrid(nx=len(self.weights), ny=len(self.weights[0]))
+
+    def factors(self, points: Array, outline: Outline) -> Array:
+        """Weight (n,) of the cell of each point (n, 2)."""
+        flat = np.array([w for row in self.weights for w in row])
+        factors: Array = flat[self.grid.cell_of(points, outline)]
+        return factors
+
+
+@dataclass(frozen=True, kw_only=True)
 class Support:
     """Quadrature of the pressure under the object.
 
@@ -58,7 +80,14 @@ class Support:
     cells: NDArray[np.intp]
 
 
-def support_of(outline: Outline, grid: FrictionGrid, points: int, *, height: float = 0.0) -> Support:
+def support_of(
+    outline: Outline,
+    grid: FrictionGrid,
+    points: int,
+    *,
+    height: float = 0.0,
+    pressure: PressureGrid | None = None,
+) -> Support:
     """Quadrature points over an outline, fine enough that every friction cell holds some.
 
     Args:
@@ -67,12 +96,14 @@ def support_of(outline: Outline, grid: FrictionGrid, points: int, *, height: flo
         points: about how many; Gauss points as dense along x as along y.
         height: of the object [m]: a slender disc stands on part of its underside while it is pushed, and
             needs a third ring of points.
+        pressure: where it is not even; the quadrature is then as fine as its cells need too.
     """
+    cut = grid if pressure is None else _common(grid, pressure.grid)
     match outline:
         case Polygon() if _is_rectangle(outline):
-            places, weights = _rectangle_points(outline, grid, points)
-        case _ if grid.size > 1:
-            places, weights = _cell_points(outline, grid, math.ceil(math.sqrt(points) / 2))
+            places, weights = _rectangle_points(outline, cut, points)
+        case _ if cut.size > 1:
+            places, weights = _cell_points(outline, cut, math.ceil(math.sqrt(points) / 2))
         case Disc(radius=radius):
             rings = max(3 if height > SLENDER * radius else 2, math.ceil(math.sqrt(points) / 3))
             places, weights = _star_points(lambda _: radius, rings, 8 if points <= 64 else 16)
@@ -83,7 +114,14 @@ def support_of(outline: Outline, grid: FrictionGrid, points: int, *, height: flo
         case _:
             raise TypeError(f"no quadrature for an outline of type {type(outline).__name__}")
     cells = grid.cell_of(places, outline)
+    if pressure is not None:
+        weights = weights * pressure.factors(places, outline)
     return Support(points=places, weights=weights / weights.sum(), cells=cells)
+
+
+def _common(first: FrictionGrid, second: FrictionGrid) -> FrictionGrid:
+    """The coarsest grid whose cells lie within those of both."""
+    return FrictionGrid(nx=math.lcm(first.nx, second.nx), ny=math.lcm(first.ny, second.ny))
 
 
 def _is_rectangle(polygon: Polygon) -> bool:

@@ -91,6 +91,7 @@ class PushProblem:
 
     Attributes:
         name: the push's.
+        order: its number in the recording, from 0.
         begin, end: times [s].
         start: state at ``begin``.
         start_std: (3,) of the start pose [m, m, rad]; (6,) with the velocity where nothing pushes.
@@ -104,6 +105,7 @@ class PushProblem:
     """
 
     name: str
+    order: int
     begin: float
     end: float
     start: Start
@@ -149,10 +151,11 @@ def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[Push
     Raises:
         RecordingError: if the hand passes above the object or an object cannot be compared.
     """
-    return tuple(_problem(recording, push, noise, height) for push in recording.pushes)
+    return tuple(_problem(recording, k, noise, height) for k in range(len(recording.pushes)))
 
 
-def _problem(recording: Recording, push: Push, noise: Noise, height: float) -> PushProblem:
+def _problem(recording: Recording, order: int, noise: Noise, height: float) -> PushProblem:
+    push = recording.pushes[order]
     planar = push.object.planar
     path = None
     if push.hand is not None:
@@ -165,6 +168,7 @@ def _problem(recording: Recording, push: Push, noise: Noise, height: float) -> P
     force_times, forces, force_std = _force_windows(push, noise)
     return PushProblem(
         name=push.name,
+        order=order,
         begin=begin,
         end=push.end_time,
         start=start,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -11,31 +12,48 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from physid_drake.cell import Cell, Motion, Outcome
+from physid_drake.effects import Effect
+from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
 from physid_drake.identify.nuisance import Nuisance, apply_nuisance
 from physid_drake.identify.problem import CellSpec, PushProblem
 from physid_drake.identify.theta import ThetaMap
 
 Array = NDArray[np.float64]
 
-_cells: dict[str, Cell] = {}
+MOST_CELLS = 24  # kept by a process: effects of shape and pressure build their own
+
+_cells: OrderedDict[str, Cell] = OrderedDict()
 
 
-def cell_of(spec: CellSpec) -> Cell:
-    """This process's cell for a spec, built at the first call."""
-    key = repr(spec)
+def cell_of(spec: CellSpec, geometry: Geometry | None = None) -> Cell:
+    """This process's cell for a spec, built at the first call.
+
+    Args:
+        spec: the plain cell's.
+        geometry: the shape and pressure, where effects change the spec's.
+    """
+    made = geometry or Geometry(shape=spec.shape)
+    key = repr((spec, made))
     if key not in _cells:
-        _cells[key] = Cell(spec.shape, hand_radius=spec.hand_radius, config=spec.config, table=np.array(spec.table))
+        _cells[key] = Cell(
+            made.shape, hand_radius=spec.hand_radius, config=spec.config, table=np.array(spec.table),
+            pressure=made.pressure,
+        )  # fmt: skip
+        if len(_cells) > MOST_CELLS:
+            _cells.popitem(last=False)
+    _cells.move_to_end(key)
     return _cells[key]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """One rollout to make: push ``problem`` with ``theta`` (d,) and the push's own unknowns (k,)."""
+    """One rollout to make: push ``problem`` with ``theta`` (d,), the push's own unknowns (k,), and effects."""
 
     problem: PushProblem
     theta: Array
     nuisance: Nuisance
     values: Array
+    effects: tuple[Effect, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,14 +68,15 @@ def simulate(spec: CellSpec, thetas: ThetaMap, task: Task) -> Motion:
     """One rollout in this process."""
     setting = apply_nuisance(task.problem, task.nuisance, task.values)
     body = thetas.body(task.theta, friction_scale=setting.friction_scale, restitution=setting.restitution)
-    return cell_of(spec).rollout(
-        body,
+    push = Rollout(
         start=setting.start,
         path=setting.path,
         begin=task.problem.begin,
         end=task.problem.end,
         hand_height=task.problem.hand_height,
+        order=task.problem.order,
     )
+    return roll(lambda geometry: cell_of(spec, geometry), Geometry(shape=spec.shape), body, push, task.effects)
 
 
 def predict(spec: CellSpec, thetas: ThetaMap, task: Task) -> Prediction | None:
@@ -65,11 +84,10 @@ def predict(spec: CellSpec, thetas: ThetaMap, task: Task) -> Prediction | None:
     motion = simulate(spec, thetas, task)
     if motion.outcome is Outcome.DIVERGED:
         return None
-    poses = motion.planar_at(task.problem.times)
+    poses = tracked(motion, task.problem.times, task.effects)
     # The recorded yaw may have been unwrapped from another turn.
-    turns = np.round(
-        (task.problem.start.pose[2] - motion.planar_at(np.array([task.problem.begin]))[0, 2]) / (2 * np.pi)
-    )
+    first = tracked(motion, np.array([task.problem.begin]), task.effects)[0, 2]
+    turns = np.round((task.problem.start.pose[2] - first) / (2 * np.pi))
     poses[:, 2] += 2.0 * np.pi * turns
     return Prediction(poses=poses, forces=_window_forces(motion, task.problem.force_times))
 

@@ -1,0 +1,57 @@
+"""The catalogue: every effect that a diagnosis knows. A new effect is one class and one line here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from physid_drake.effects.body import ComOffset, Restitution, RotationalInertia, SizeError, UnevenSupport
+from physid_drake.effects.effect import Effect, Surroundings
+from physid_drake.effects.forces import (
+    Magnet,
+    QuadraticDrag,
+    RollingResistance,
+    Sloshing,
+    TableTilt,
+    Tether,
+    ViscousDrag,
+)
+from physid_drake.effects.friction import (
+    AnisotropicObject,
+    AnisotropicTable,
+    FrictionDrift,
+    FrictionGradient,
+    FrictionPatch,
+    StribeckFriction,
+)
+from physid_drake.effects.hand import ActuatorLag, HandCompliance, HandOffset
+from physid_drake.effects.tracker import TrackerBias, TrackerLatency, TrackerScale
+from physid_drake.errors import ConfigError
+
+CATALOGUE: tuple[type[Effect], ...] = (
+    StribeckFriction, ViscousDrag, QuadraticDrag, AnisotropicTable, AnisotropicObject, FrictionPatch,
+    FrictionGradient, FrictionDrift, TableTilt, UnevenSupport, ComOffset, RotationalInertia, Sloshing,
+    RollingResistance, Tether, Magnet, Restitution, HandCompliance, ActuatorLag, HandOffset, TrackerLatency,
+    TrackerBias, TrackerScale, SizeError,
+)  # fmt: skip
+
+
+def effect_named(name: str) -> type[Effect]:
+    """The effect of a name.
+
+    Raises:
+        ConfigError: if there is none.
+    """
+    for kind in CATALOGUE:
+        if kind.name == name:
+            return kind
+    raise ConfigError(f"effect '{name}' is unknown; known are {', '.join(kind.name for kind in CATALOGUE)}.")
+
+
+def applicable(around: Surroundings, names: Sequence[str] | None = None) -> tuple[type[Effect], ...]:
+    """The effects, all or those named, that can be in a recording.
+
+    Raises:
+        ConfigError: if a name is unknown.
+    """
+    kinds: Iterable[type[Effect]] = CATALOGUE if names is None else [effect_named(name) for name in names]
+    return tuple(kind for kind in kinds if kind.applies(around))

@@ -1,0 +1,376 @@
+"""Effects that push or pull the object: drag, tilt, tether, magnet, sloshing, rolling resistance."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.cell import Body
+from physid_drake.cell.diagram import GRAVITY
+from physid_drake.cell.forces import ForceLaw, ObjectState, Wrench
+from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
+from physid_drake.effects.places import grid_of_places
+
+Array = NDArray[np.float64]
+WEAKEST = 1e-9  # N/m: a spring weaker than this has no anchor
+ROLLING_EDGE = 1e-3  # m/s: below it rolling resistance fades, so that it never drives backwards
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class ViscousDrag(Effect):
+    """A force -c v at the centre of mass and a torque -c k^2 w, k^2 the mean square radius of the underside."""
+
+    name: ClassVar[str] = "viscous_drag"
+    element: ClassVar[str] = "table"
+    statement: ClassVar[str] = "a drag in proportion to the object's speed"
+    frame: ClassVar[str] = "object_velocity"
+    amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
+
+    coefficient: float = parameter(0.0, "N*s/m")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """The coefficient."""
+        return (Coordinate(name="coefficient", step=around.slight / (0.5 * around.top_speed), lower=0.0),)
+
+    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
+        """The drag."""
+        return (_ViscousLaw(self.coefficient, facts.polar),)
+
+
+@dc.dataclass(frozen=True)
+class _ViscousLaw:
+    coefficient: float
+    polar: float
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        fx, fy = (-self.coefficient * state.v_WBcm).tolist()
+        return Wrench(fx=fx, fy=fy, torque=-self.coefficient * self.polar * state.yaw_rate)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class QuadraticDrag(Effect):
+    """A force -c v abs(v) at the centre of mass: air."""
+
+    name: ClassVar[str] = "quadratic_drag"
+    element: ClassVar[str] = "world"
+    statement: ClassVar[str] = "a drag in proportion to the square of the object's speed"
+    frame: ClassVar[str] = "object_velocity"
+    amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
+
+    coefficient: float = parameter(0.0, "N*s^2/m^2")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """The coefficient."""
+        return (Coordinate(name="coefficient", step=around.slight / (0.4 * around.top_speed**2), lower=0.0),)
+
+    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
+        """The drag."""
+        del facts
+        return (_QuadraticLaw(self.coefficient),)
+
+
+@dc.dataclass(frozen=True)
+class _QuadraticLaw:
+    coefficient: float
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        vx, vy = state.v_WBcm.tolist()
+        factor = -self.coefficient * math.hypot(vx, vy)
+        return Wrench(fx=factor * vx, fy=factor * vy, torque=0.0)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class TableTilt(Effect):
+    """Gravity has a component along the table: m g sin(x) along x of W, m g sin(y) along y."""
+
+    name: ClassVar[str] = "table_tilt"
+    element: ClassVar[str] = "table"
+    statement: ClassVar[str] = "a constant force along one direction of the table: it is not level"
+    frame: ClassVar[str] = "world"
+    amplitudes: ClassVar[tuple[str, ...]] = ("x", "y")
+
+    x: float = parameter(0.0, "rad")
+    y: float = parameter(0.0, "rad")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """The two angles."""
+        step, most = 0.015 * around.friction, 0.9 * math.atan(around.friction)
+        return tuple(Coordinate(name=name, step=step, lower=-most, upper=most) for name in ("x", "y"))
+
+    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
+        """Gravity's component."""
+        del facts
+        return (_TiltLaw(GRAVITY * math.sin(self.x), GRAVITY * math.sin(self.y)),)
+
+
+@dc.dataclass(frozen=True)
+class _TiltLaw:
+    ax: float
+    ay: float
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        return Wrench(fx=state.mass * self.ax, fy=state.mass * self.ay, torque=0.0)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Tether(Effect):
+    """A spring or cable to a point of the world: pulls with stiffness (d - rest_length) where it is taut."""
+
+    name: ClassVar[str] = "tether"
+    element: ClassVar[str] = "world"
+    statement: ClassVar[str] = "a pull towards a point of the world that grows with the distance: a spring or a cable"
+    frame: ClassVar[str] = "world"
+    amplitudes: ClassVar[tuple[str, ...]] = ("stiffness",)
+
+    stiffness: float = parameter(0.0, "N/m")
+    x: float = parameter(0.0, "m")
+    y: float = parameter(0.0, "m")
+    rest_length: float = parameter(0.0, "m")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """Stiffness, the force at the region's middle, and the rest length: linear where the rest length is 0."""
+        reach = float(np.max(around.region[1] - around.region[0]))
+        force, most = around.slight, 0.8 * around.friction * around.weight
+        return (
+            Coordinate(name="stiffness", step=2.0 * force / reach, lower=0.0),
+            Coordinate(name="force_x", step=force, lower=-most, upper=most),
+            Coordinate(name="force_y", step=force, lower=-most, upper=most),
+            Coordinate(name="rest_length", step=0.02 * reach, lower=0.0, upper=2.0 * reach, std=0.3 * reach),
+        )
+
+    @classmethod
+    def families(cls, around: Surroundings) -> tuple[Family, ...]:
+        """With rest length 0."""
+        return (Family(point=(0.0, 0.0, 0.0, 0.0), free=(0, 1, 2)),)
+
+    @classmethod
+    def at(cls, point: Array, around: Surroundings) -> Tether:
+        """The spring whose pull at the region's middle is the chart's force."""
+        stiffness, fx, fy, rest = point.tolist()
+        if stiffness == fx == fy == 0.0:
+            return cls(rest_length=rest)
+        middle = 0.5 * (around.region[0] + around.region[1])
+        k = max(stiffness, WEAKEST)
+        pull = math.hypot(fx, fy)
+        # Taut at the middle: pull = k (d - rest), towards the anchor.
+        stretch = 1.0 + (k * rest / pull if pull > 0.0 else 0.0)
+        return cls(stiffness=k, x=middle[0] + stretch * fx / k, y=middle[1] + stretch * fy / k, rest_length=rest)
+
+    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
+        """The spring."""
+        del facts
+        return (_SpringLaw(self.stiffness, self.x, self.y, self.rest_length),)
+
+
+@dc.dataclass(frozen=True)
+class _SpringLaw:
+    stiffness: float
+    x: float
+    y: float
+    rest_length: float
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        px, py = state.p_WBcm.tolist()
+        dx, dy = self.x - px, self.y - py
+        if self.rest_length == 0.0:
+            return Wrench(fx=self.stiffness * dx, fy=self.stiffness * dy, torque=0.0)
+        distance = math.hypot(dx, dy)
+        pull = self.stiffness * max(0.0, distance - self.rest_length) / max(distance, 1e-9)
+        return Wrench(fx=pull * dx, fy=pull * dy, torque=0.0)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Magnet(Effect):
+    """A short-range attraction to a point of the table: F = strength / (d^2 + core^2)."""
+
+    name: ClassVar[str] = "magnet"
+    element: ClassVar[str] = "world"
+    statement: ClassVar[str] = "an attraction to a point of the table that fades with distance"
+    frame: ClassVar[str] = "world"
+    amplitudes: ClassVar[tuple[str, ...]] = ("strength",)
+
+    strength: float = parameter(0.0, "N*m^2")
+    x: float = parameter(0.0, "m")
+    y: float = parameter(0.0, "m")
+    core: float = parameter(0.03, "m")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """Strength, place, log of the core."""
+        _, spacing = grid_of_places(around)
+        return (
+            Coordinate(name="strength", step=1.0 * around.slight * spacing**2, lower=0.0),
+            Coordinate(name="x", step=0.05 * spacing, std=spacing),
+            Coordinate(name="y", step=0.05 * spacing, std=spacing),
+            Coordinate(name="log_core", step=0.1, lower=math.log(0.002), upper=math.log(0.3), std=0.7),
+        )
+
+    @classmethod
+    def families(cls, around: Surroundings) -> tuple[Family, ...]:
+        """A grid of places."""
+        places, _ = grid_of_places(around)
+        return tuple(Family(point=(0.0, float(x), float(y), math.log(0.03)), free=(0,)) for x, y in places)
+
+    @classmethod
+    def at(cls, point: Array, around: Surroundings) -> Magnet:
+        """From strength, place and log core."""
+        del around
+        return cls(strength=float(point[0]), x=float(point[1]), y=float(point[2]), core=math.exp(point[3]))
+
+    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
+        """The attraction."""
+        del facts
+        return (_MagnetLaw(self.strength, self.x, self.y, self.core),)
+
+
+@dc.dataclass(frozen=True)
+class _MagnetLaw:
+    strength: float
+    x: float
+    y: float
+    core: float
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        px, py = state.p_WBcm.tolist()
+        dx, dy = self.x - px, self.y - py
+        square = dx * dx + dy * dy
+        pull = self.strength / (square + self.core**2) / max(math.sqrt(square), 1e-6)
+        return Wrench(fx=pull * dx, fy=pull * dy, torque=0.0)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Sloshing(Effect):
+    """A part of the mass hangs on a spring and damper inside: liquid in a bottle.
+
+    The rigid rest carries the whole weight on the table; the moving part's pull acts at the centre of mass.
+    """
+
+    name: ClassVar[str] = "sloshing"
+    element: ClassVar[str] = "object"
+    statement: ClassVar[str] = "a part of the mass swings inside the object"
+    frame: ClassVar[str] = "object_acceleration"
+    amplitudes: ClassVar[tuple[str, ...]] = ("fraction",)
+
+    fraction: float = parameter(0.0, "-")
+    frequency: float = parameter(4.0, "Hz")
+    damping: float = parameter(0.05, "-")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """Fraction, log frequency, log damping."""
+        del around
+        return (
+            Coordinate(name="fraction", step=0.02, lower=0.0, upper=0.8),
+            Coordinate(name="log_frequency", step=0.02, lower=math.log(0.3), upper=math.log(40.0), std=0.7),
+            Coordinate(name="log_damping", step=0.2, lower=math.log(1e-3), upper=math.log(2.0), std=1.0),
+        )
+
+    @classmethod
+    def families(cls, around: Surroundings) -> tuple[Family, ...]:
+        """A few frequencies."""
+        del around
+        return tuple(
+            Family(point=(0.0, math.log(frequency), math.log(0.05)), free=(0,)) for frequency in (1.5, 3.0, 5.0, 9.0)
+        )
+
+    @classmethod
+    def at(cls, point: Array, around: Surroundings) -> Sloshing:
+        """From fraction and logs."""
+        del around
+        return cls(fraction=float(point[0]), frequency=math.exp(point[1]), damping=math.exp(point[2]))
+
+    def body(self, body: Body, facts: PushFacts) -> Body:
+        """The rigid rest: lighter, with the friction and the inertia of the whole."""
+        del facts
+        rest = 1.0 - self.fraction
+        return dc.replace(
+            body, mass=rest * body.mass, support_friction=body.support_friction / rest,
+            inertia_ratio=body.inertia_ratio / rest,
+        )  # fmt: skip
+
+    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
+        """A fresh oscillator for each rollout."""
+        return (_SloshLaw(self.fraction * facts.mass, 2.0 * math.pi * self.frequency, self.damping),)
+
+
+class _SloshLaw:
+    """Swinging mass: its place relative to the object is the law's own state."""
+
+    def __init__(self, mass: float, frequency: float, damping: float) -> None:
+        self._mass, self._frequency, self._damping = mass, frequency, damping
+        self._time: float | None = None
+        self._place = np.zeros(2)  # of the swinging mass in W [m]
+        self._velocity = np.zeros(2)
+        self._wrench = Wrench(fx=0.0, fy=0.0, torque=0.0)
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        if self._time is None:
+            self._place, self._velocity = state.p_WBcm.copy(), state.v_WBcm.copy()
+        elif state.time > self._time:
+            self._advance(state, state.time - self._time)
+        self._time = state.time
+        return self._wrench
+
+    def _advance(self, state: ObjectState, span: float) -> None:
+        """Semi-implicit Euler over a tick; long spans (a rest that was skipped) in short pieces."""
+        pieces = max(1, math.ceil(span / 2e-3))
+        h = span / pieces
+        stiffness, damper = self._frequency**2, 2.0 * self._damping * self._frequency
+        # The object moved from where it was to where it is; end values suffice for the spring's anchor.
+        for _ in range(pieces):
+            pull = stiffness * (self._place - state.p_WBcm) + damper * (self._velocity - state.v_WBcm)
+            self._velocity = self._velocity - h * pull
+            self._place = self._place + h * self._velocity
+        pull = stiffness * (self._place - state.p_WBcm) + damper * (self._velocity - state.v_WBcm)
+        fx, fy = (self._mass * pull).tolist()
+        self._wrench = Wrench(fx=fx, fy=fy, torque=0.0)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class RollingResistance(Effect):
+    """A rolling object loses speed: the contact force leads by ``coefficient``, so a moment N b opposes the roll.
+
+    On a cylinder that rolls without slip the moment is a force N b / R at the centre of mass.
+    """
+
+    name: ClassVar[str] = "rolling_resistance"
+    element: ClassVar[str] = "object"
+    statement: ClassVar[str] = "a rolling object slows down"
+    frame: ClassVar[str] = "object_velocity"
+    amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
+
+    coefficient: float = parameter(0.0, "m")
+
+    @classmethod
+    def applies(cls, around: Surroundings) -> bool:
+        """On lying cylinders."""
+        return around.rolls
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """The coefficient."""
+        return (Coordinate(name="coefficient", step=5e-4 * around.height, lower=0.0, upper=0.2 * around.height),)
+
+    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
+        """The force."""
+        return (_RollingLaw(self.coefficient / facts.rolling_radius),) if facts.rolling_radius else ()
+
+
+@dc.dataclass(frozen=True)
+class _RollingLaw:
+    share: float  # of the weight
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        # Across the axis (y of B) it rolls; along the axis it slides.
+        across = np.array([math.cos(state.yaw), math.sin(state.yaw)])
+        speed = float(across @ state.v_WBcm)
+        force = -self.share * state.mass * GRAVITY * speed / math.hypot(speed, ROLLING_EDGE)
+        return Wrench(fx=force * across[0], fy=force * across[1], torque=0.0)

@@ -1,0 +1,299 @@
+"""Effects on the friction between object and table: by speed, direction, place and order."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.cell import Body
+from physid_drake.cell.forces import FrictionLaw, ObjectState
+from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
+from physid_drake.effects.places import grid_of_places
+
+Array = NDArray[np.float64]
+SLOWEST = 5e-4  # m/s: below this slip a point feels the contact's full friction, which holds it at rest
+SLIGHT_SHARE = 0.015  # of the friction
+
+
+def _direction(state: ObjectState) -> tuple[Array, Array]:
+    """Slip speeds (n,) and directions (n, 2) that fade to zero at rest."""
+    speeds = np.sqrt((state.v_WQ**2).sum(axis=1))
+    return speeds, state.v_WQ / np.sqrt(speeds**2 + SLOWEST**2)[:, None]
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class StribeckFriction(Effect):
+    """Friction falls with slip: mu(v) = mu_k + (mu_s - mu_k) exp(-(v / v_s)^2), with excess = mu_s / mu_k - 1.
+
+    Source: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30, 1994, equation 5 with exponent 2.
+    """
+
+    name: ClassVar[str] = "stribeck_friction"
+    element: ClassVar[str] = "table"
+    statement: ClassVar[str] = "friction with the table falls as slip gets faster"
+    frame: ClassVar[str] = "object_velocity"
+    amplitudes: ClassVar[tuple[str, ...]] = ("excess",)
+
+    excess: float = parameter(0.0, "-")
+    speed: float = parameter(0.1, "m/s")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """Excess and log speed."""
+        del around
+        return (
+            Coordinate(name="excess", step=2.0 * SLIGHT_SHARE, lower=0.0, upper=3.0),
+            Coordinate(name="log_speed", step=0.05, lower=math.log(2e-3), upper=math.log(1.0), std=1.0),
+        )
+
+    @classmethod
+    def families(cls, around: Surroundings) -> tuple[Family, ...]:
+        """A few speeds below the object's top speed."""
+        speeds = [v for v in (0.01, 0.03, 0.07, 0.15, 0.3) if v < around.top_speed] or [0.3 * around.top_speed]
+        return tuple(Family(point=(0.0, math.log(v)), free=(0,)) for v in speeds)
+
+    @classmethod
+    def at(cls, point: Array, around: Surroundings) -> StribeckFriction:
+        """From excess and log speed."""
+        del around
+        return cls(excess=float(point[0]), speed=math.exp(point[1]))
+
+    def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:
+        """The law."""
+        del facts
+        return (_StribeckLaw(self.excess, self.speed),)
+
+
+@dc.dataclass(frozen=True)
+class _StribeckLaw:
+    excess: float
+    speed: float
+
+    @property
+    def largest(self) -> float:
+        return 1.0 + max(0.0, self.excess)
+
+    def refund(self, state: ObjectState) -> Array:
+        speeds, along = _direction(state)
+        ratio = 1.0 + self.excess * np.exp(-((speeds / self.speed) ** 2))
+        forces: Array = ((self.largest - ratio) * state.loads * state.friction)[:, None] * along
+        return forces
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class _Anisotropic(Effect):
+    """An elliptic limit curve: force = -N M^2 v / |M v|, M with mu sqrt(ratio) and mu / sqrt(ratio) on its axes.
+
+    ``angle`` is that of the slippery axis; the geometric mean of the two coefficients is the cell's. The force
+    maximises dissipation. Source: S. Goyal, A. Ruina, J. Papadopoulos, Wear 143, 1991.
+    """
+
+    amplitudes: ClassVar[tuple[str, ...]] = ("ratio",)
+    fixed_in_object: ClassVar[bool]
+
+    ratio: float = parameter(1.0, "-")
+    angle: float = parameter(0.0, "rad")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """Log ratio times cosine and sine of twice the angle: smooth where the ratio is 1."""
+        del around
+        return tuple(Coordinate(name=name, step=0.03, lower=-2.0, upper=2.0) for name in ("cosine", "sine"))
+
+    @classmethod
+    def at(cls, point: Array, around: Surroundings) -> _Anisotropic:
+        """From cosine and sine."""
+        del around
+        log_ratio = math.hypot(point[0], point[1])
+        angle = 0.5 * math.atan2(point[1], point[0]) % math.pi
+        return cls(ratio=math.exp(log_ratio), angle=angle)
+
+    def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:
+        """The law."""
+        del facts
+        return (_EllipseLaw(self.ratio, self.angle, self.fixed_in_object),)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class AnisotropicTable(_Anisotropic):
+    """Friction is an ellipse fixed in the table: the grain of wood."""
+
+    name: ClassVar[str] = "anisotropic_table"
+    element: ClassVar[str] = "table"
+    statement: ClassVar[str] = "friction depends on the direction of slip on the table: a grain"
+    frame: ClassVar[str] = "world"
+    fixed_in_object: ClassVar[bool] = False
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class AnisotropicObject(_Anisotropic):
+    """Friction is an ellipse fixed in the object: a brushed or ribbed underside."""
+
+    name: ClassVar[str] = "anisotropic_object"
+    element: ClassVar[str] = "object"
+    statement: ClassVar[str] = "friction depends on the direction of slip in the object: a ribbed underside"
+    frame: ClassVar[str] = "object"
+    fixed_in_object: ClassVar[bool] = True
+
+
+@dc.dataclass(frozen=True)
+class _EllipseLaw:
+    ratio: float
+    angle: float
+    fixed_in_object: bool
+
+    @property
+    def largest(self) -> float:
+        return math.sqrt(self.ratio)
+
+    def refund(self, state: ObjectState) -> Array:
+        angle = self.angle + (state.yaw if self.fixed_in_object else 0.0)
+        slippery = np.array([math.cos(angle), math.sin(angle)])
+        grippy = np.array([-slippery[1], slippery[0]])
+        low, high = 1.0 / math.sqrt(self.ratio), math.sqrt(self.ratio)
+        _, along = _direction(state)
+        a, b = along @ slippery, along @ grippy
+        size = np.sqrt((low * a) ** 2 + (high * b) ** 2)
+        norm = np.sqrt(a * a + b * b)
+        # |M v| and |v| fade together, so that their ratio stays what it is.
+        scale = np.where(size > 1e-12, norm / np.maximum(size, 1e-12), 0.0)
+        true = (low**2 * a * scale)[:, None] * slippery + (high**2 * b * scale)[:, None] * grippy
+        forces: Array = (state.loads * state.friction)[:, None] * (self.largest * along - true)
+        return forces
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class FrictionPatch(Effect):
+    """A round region of the table whose friction is ``ratio`` times that of the rest."""
+
+    name: ClassVar[str] = "friction_patch"
+    element: ClassVar[str] = "table"
+    statement: ClassVar[str] = "friction differs in one round region of the table"
+    frame: ClassVar[str] = "world"
+    amplitudes: ClassVar[tuple[str, ...]] = ("ratio",)
+
+    ratio: float = parameter(1.0, "-")
+    x: float = parameter(0.0, "m")
+    y: float = parameter(0.0, "m")
+    radius: float = parameter(0.05, "m")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """Log ratio, place, log radius."""
+        _, spacing = grid_of_places(around)
+        return (
+            Coordinate(name="log_ratio", step=0.04, lower=-2.0, upper=2.0),
+            Coordinate(name="x", step=0.05 * spacing, std=spacing),
+            Coordinate(name="y", step=0.05 * spacing, std=spacing),
+            Coordinate(name="log_radius", step=0.05, lower=math.log(0.005), upper=math.log(1.0), std=0.5),
+        )
+
+    @classmethod
+    def families(cls, around: Surroundings) -> tuple[Family, ...]:
+        """A grid of places, with a radius that covers the gaps between them."""
+        places, spacing = grid_of_places(around)
+        return tuple(Family(point=(0.0, float(x), float(y), math.log(0.6 * spacing)), free=(0,)) for x, y in places)
+
+    @classmethod
+    def at(cls, point: Array, around: Surroundings) -> FrictionPatch:
+        """From log ratio, place and log radius."""
+        del around
+        return cls(ratio=math.exp(point[0]), x=float(point[1]), y=float(point[2]), radius=math.exp(point[3]))
+
+    def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:
+        """The law."""
+        del facts
+        return (_PatchLaw(self.ratio, self.x, self.y, self.radius),)
+
+
+@dc.dataclass(frozen=True)
+class _PatchLaw:
+    ratio: float
+    x: float
+    y: float
+    radius: float
+
+    @property
+    def largest(self) -> float:
+        return max(1.0, self.ratio)
+
+    def refund(self, state: ObjectState) -> Array:
+        _, along = _direction(state)
+        away = np.sqrt((state.p_WQ[:, 0] - self.x) ** 2 + (state.p_WQ[:, 1] - self.y) ** 2)
+        # The edge is as wide as the support points are apart, so that the fit's cost has no steps.
+        inside = 1.0 / (1.0 + np.exp(np.clip((away - self.radius) / (0.05 * self.radius), -50.0, 50.0)))
+        ratio = 1.0 + (self.ratio - 1.0) * inside
+        forces: Array = ((self.largest - ratio) * state.loads * state.friction)[:, None] * along
+        return forces
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class FrictionGradient(Effect):
+    """Friction changes linearly across the table: mu (1 + slope_x x + slope_y y)."""
+
+    name: ClassVar[str] = "friction_gradient"
+    element: ClassVar[str] = "table"
+    statement: ClassVar[str] = "friction changes from one side of the table to the other"
+    frame: ClassVar[str] = "world"
+    amplitudes: ClassVar[tuple[str, ...]] = ("slope_x", "slope_y")
+
+    slope_x: float = parameter(0.0, "1/m")
+    slope_y: float = parameter(0.0, "1/m")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """The two slopes."""
+        reach = np.maximum(np.abs(around.region).max(axis=0), 0.05)
+        return tuple(
+            Coordinate(name=name, step=2.0 * SLIGHT_SHARE / r, lower=-0.95 / r, upper=0.95 / r)
+            for name, r in zip(("slope_x", "slope_y"), reach.tolist(), strict=True)
+        )
+
+    def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:
+        """The law."""
+        del facts
+        return (_GradientLaw(self.slope_x, self.slope_y),)
+
+
+@dc.dataclass(frozen=True)
+class _GradientLaw:
+    slope_x: float
+    slope_y: float
+
+    @property
+    def largest(self) -> float:
+        return 1.5  # a steeper place, where the object rarely is, feels no more
+
+    def refund(self, state: ObjectState) -> Array:
+        _, along = _direction(state)
+        ratio = np.clip(1.0 + state.p_WQ @ np.array([self.slope_x, self.slope_y]), 0.0, self.largest)
+        forces: Array = ((self.largest - ratio) * state.loads * state.friction)[:, None] * along
+        return forces
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class FrictionDrift(Effect):
+    """Friction changes with the order of the pushes: mu (1 + per_push k), k from 0."""
+
+    name: ClassVar[str] = "friction_drift"
+    element: ClassVar[str] = "table"
+    statement: ClassVar[str] = "friction changes from push to push: wear, dust, warming up"
+    frame: ClassVar[str] = "push_order"
+    amplitudes: ClassVar[tuple[str, ...]] = ("per_push",)
+
+    per_push: float = parameter(0.0, "-")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """The change per push."""
+        count = max(1, around.pushes - 1)
+        return (Coordinate(name="per_push", step=2.0 * SLIGHT_SHARE / count, lower=-0.95 / count, upper=3.0 / count),)
+
+    def body(self, body: Body, facts: PushFacts) -> Body:
+        """The friction of this push."""
+        factor = max(0.0, 1.0 + self.per_push * facts.order)
+        return dc.replace(body, support_friction=factor * body.support_friction)

@@ -1,0 +1,107 @@
+"""A rollout with effects: hand path, cell, poses, tracker; each effect acts at its seams and nowhere else."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.cell import Body, Cell, HandPath, Motion, Start
+from physid_drake.cell.support import PressureGrid
+from physid_drake.effects.effect import Effect, PushFacts
+from physid_drake.recording import Shape
+
+Array = NDArray[np.float64]
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Geometry:
+    """What a cell is built from, and effects may change: the shape and the pressure under it."""
+
+    shape: Shape
+    pressure: PressureGrid | None = None
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Rollout:
+    """A push to simulate: start, path, times [s], contact height [m], number in the recording."""
+
+    start: Start
+    path: HandPath | None
+    begin: float
+    end: float
+    hand_height: float | None
+    order: int = 0
+
+
+def geometry_with(effects: Sequence[Effect], geometry: Geometry) -> Geometry:
+    """The geometry with the effects' shape and pressure; null effects change nothing."""
+    for effect in effects:
+        if not effect.is_null:
+            pressure = effect.pressure()
+            geometry = Geometry(
+                shape=effect.reshaped(geometry.shape), pressure=geometry.pressure if pressure is None else pressure
+            )
+    return geometry
+
+
+def roll(
+    build: Callable[[Geometry], Cell], geometry: Geometry, body: Body, push: Rollout, effects: Sequence[Effect]
+) -> Motion:
+    """Simulate a push with effects.
+
+    Args:
+        build: gives the cell for a geometry; keeps it between calls.
+        geometry: of the plain object.
+        body: plain parameters.
+        push: what is simulated.
+        effects: the physics that is added; at their null values not a bit changes.
+    """
+    present = [effect for effect in effects if not effect.is_null]
+    cell = build(geometry_with(present, geometry))
+    facts = PushFacts(
+        order=push.order, mass=body.mass, polar=float(sum(_second_moments(cell))),
+        rolling_radius=cell.solid.rolling_radius,
+    )  # fmt: skip
+    for effect in present:
+        body = effect.body(body, facts)
+    start = push.start
+    for effect in reversed(present):
+        start = dc.replace(start, pose=effect.true_pose(start.pose))
+    motion: Motion | None = None
+    for _ in range(max((effect.passes for effect in present), default=1)):
+        path = push.path
+        if path is not None:
+            for effect in present:
+                path = effect.hand(path, facts, motion)
+        motion = cell.rollout(
+            body,
+            start=start,
+            path=path,
+            begin=push.begin,
+            end=push.end,
+            hand_height=push.hand_height,
+            laws=[law for effect in present for law in effect.laws(facts)],
+            frictions=[law for effect in present for law in effect.frictions(facts)],
+        )
+    assert motion is not None
+    return motion
+
+
+def tracked(motion: Motion, times: Array, effects: Sequence[Effect]) -> Array:
+    """What the tracker reports (n, 3), x, y, yaw, at times (n,) [s]."""
+    present = [effect for effect in effects if not effect.is_null]
+    late = sum(effect.lateness() for effect in present)
+    poses = motion.planar_at(times - late)
+    for effect in present:
+        poses = effect.tracked(poses)
+    return poses
+
+
+def _second_moments(cell: Cell) -> tuple[float, float]:
+    """Mean x^2 and y^2 of the points that carry the object [m^2]."""
+    support = cell.scene.support
+    xx, yy = (support.weights @ support.points**2).tolist()
+    return xx, yy
