@@ -8,7 +8,7 @@ holds against it as against any force, since the tick's contact is solved after 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +63,15 @@ class ForceLaw(Protocol):
 
     def wrench(self, state: ObjectState) -> Wrench:
         """The force at a state."""
+        ...
+
+
+@runtime_checkable
+class Swinging(Protocol):
+    """A law with a motion of its own, which goes on while the object rests."""
+
+    def strongest(self) -> float:
+        """Largest force [N] that it may yet bring."""
         ...
 
 

@@ -11,7 +11,7 @@ from pydrake.systems.analysis import Simulator
 
 from physid_drake.cell.config import SolverConfig
 from physid_drake.cell.diagram import GRAVITY, HAND_MASS, Scene
-from physid_drake.cell.forces import ForceLaw, FrictionLaw, ObjectState, Wrench, refund_wrench
+from physid_drake.cell.forces import ForceLaw, FrictionLaw, ObjectState, Swinging, Wrench, refund_wrench
 from physid_drake.cell.hand_path import HandPath
 from physid_drake.cell.impact import routh_impulse
 from physid_drake.cell.motion import Log, Motion, Outcome, Start, planar_pose
@@ -432,6 +432,7 @@ class Stepper:
         limit = float((state.loads * state.friction).sum())
         reach = math.sqrt(self._inertia / self._body.mass)
         pull = sum(math.hypot(w.fx, w.fy) + abs(w.torque) / reach for w in self._wrenches(state))
+        pull += sum(law.strongest() for law in self._laws if isinstance(law, Swinging))
         return pull < SURELY_HELD * limit
 
     def _shift(self, dx: float, dy: float, turn: float) -> None:

@@ -52,7 +52,7 @@ class UnevenSupport(Effect):
         """Three second moments of the log pressure, then the log weight of each grid cell beside them."""
         del around
         moments = tuple(
-            Coordinate(name=name, step=0.15, lower=-6.0, upper=6.0, std=1.5)
+            Coordinate(name=name, step=0.15, lower=-6.0, upper=6.0, std=1.5, tolerance=0.03)
             for name in ("ends_x", "ends_y", "corners")
         )
         cells = tuple(
@@ -104,7 +104,7 @@ class ComOffset(Effect):
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """The offsets."""
         return tuple(
-            Coordinate(name=name, step=0.005 * size, lower=-0.4 * size, upper=0.4 * size)
+            Coordinate(name=name, step=0.005 * size, lower=-0.4 * size, upper=0.4 * size, tolerance=1e-4)
             for name, size in zip(("x", "y"), around.size.tolist(), strict=True)
         )
 
@@ -135,7 +135,7 @@ class RotationalInertia(Effect):
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """Log ratio."""
         del around
-        return (Coordinate(name="log_ratio", step=0.05, lower=math.log(0.1), upper=math.log(5.0)),)
+        return (Coordinate(name="log_ratio", step=0.05, lower=math.log(0.1), upper=math.log(5.0), tolerance=0.01),)
 
     @classmethod
     def at(cls, point: Array, around: Surroundings) -> RotationalInertia:
@@ -170,7 +170,8 @@ class Restitution(Effect):
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """The coefficient."""
         del around
-        return (Coordinate(name="coefficient", step=0.02, lower=0.0, upper=0.95),)
+        # A bounce is caught up by the hand, so that what is seen of it grows with the coefficient's square.
+        return (Coordinate(name="coefficient", step=0.1, lower=0.0, upper=0.95),)
 
     def body(self, body: Body, facts: PushFacts) -> Body:
         """The body with its bounce."""
@@ -193,8 +194,11 @@ class SizeError(Effect):
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """Log ratio."""
-        del around
-        return (Coordinate(name="log_ratio", step=0.006, lower=math.log(0.5), upper=math.log(2.0)),)
+        return (
+            Coordinate(
+                name="log_ratio", step=0.006, lower=math.log(0.5), upper=math.log(2.0), tolerance=1e-4 / around.radius
+            ),
+        )
 
     @classmethod
     def at(cls, point: Array, around: Surroundings) -> SizeError:

@@ -76,6 +76,8 @@ class Coordinate:
         step: for differences: moves an object by about a millimetre.
         lower, upper: bounds.
         std: prior standard deviation about the chart point where a fit starts; inf where nothing is known.
+        tolerance: what a model is not expected to be better than: the simulator's own geometry and the caliper's. A
+            mismatch that small is not missing physics.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Coordinate:
     lower: float = -np.inf
     upper: float = np.inf
     std: float = np.inf
+    tolerance: float = 0.0
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -110,12 +113,14 @@ class PushFacts:
         mass: of the object [kg].
         polar: mean square distance of the underside's points from its centre [m^2].
         rolling_radius: of a lying cylinder, else None [m].
+        region: (2, 2) lower and upper corner of where the object may come [m].
     """
 
     order: int
     mass: float
     polar: float
     rolling_radius: float | None = None
+    region: Array = dc.field(default_factory=lambda: np.array([[-1.0, -1.0], [1.0, 1.0]]))
 
 
 @dc.dataclass(frozen=True, kw_only=True)

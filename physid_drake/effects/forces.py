@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import dataclasses as dc
 import math
 from typing import ClassVar
@@ -17,6 +18,7 @@ from physid_drake.effects.places import grid_of_places
 
 Array = NDArray[np.float64]
 WEAKEST = 1e-9  # N/m: a spring weaker than this has no anchor
+TICK = 2e-3  # s: the rollout's longest; a drag is damped as if it acted so long, so that it never drives backwards
 ROLLING_EDGE = 1e-3  # m/s: below it rolling resistance fades, so that it never drives backwards
 
 
@@ -48,8 +50,11 @@ class _ViscousLaw:
     polar: float
 
     def wrench(self, state: ObjectState) -> Wrench:
-        fx, fy = (-self.coefficient * state.v_WBcm).tolist()
-        return Wrench(fx=fx, fy=fy, torque=-self.coefficient * self.polar * state.yaw_rate)
+        half = 0.5 * TICK * self.coefficient
+        # The impulse is that of the mean speed over the tick: of second order, and stable for any coefficient.
+        fx, fy = (-self.coefficient / (1.0 + half / state.mass) * state.v_WBcm).tolist()
+        turning = self.coefficient * self.polar / (1.0 + half * self.polar / state.inertia)
+        return Wrench(fx=fx, fy=fy, torque=-turning * state.yaw_rate)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -81,7 +86,8 @@ class _QuadraticLaw:
 
     def wrench(self, state: ObjectState) -> Wrench:
         vx, vy = state.v_WBcm.tolist()
-        factor = -self.coefficient * math.hypot(vx, vy)
+        drag = self.coefficient * math.hypot(vx, vy)
+        factor = -drag / (1.0 + 0.5 * TICK * drag / state.mass)
         return Wrench(fx=factor * vx, fy=factor * vy, torque=0.0)
 
 
@@ -302,36 +308,64 @@ class Sloshing(Effect):
 
 
 class _SloshLaw:
-    """Swinging mass: its place relative to the object is the law's own state."""
+    """Swinging mass: its place and velocity are the law's own state.
+
+    Over a tick the object is taken to keep its velocity, on which the oscillator's motion is exact; the object gets
+    the momentum that it loses.
+    """
 
     def __init__(self, mass: float, frequency: float, damping: float) -> None:
         self._mass, self._frequency, self._damping = mass, frequency, damping
-        self._time: float | None = None
+        self._time = math.inf  # before any call
         self._place = np.zeros(2)  # of the swinging mass in W [m]
         self._velocity = np.zeros(2)
-        self._wrench = Wrench(fx=0.0, fy=0.0, torque=0.0)
+        self._anchor = np.zeros(2)  # velocity of the object at the last call [m/s]
+        self._force = np.zeros(2)  # on the object [N]
+        self._span = TICK
 
     def wrench(self, state: ObjectState) -> Wrench:
-        if self._time is None:
+        if state.time < self._time:  # a rollout begins
             self._place, self._velocity = state.p_WBcm.copy(), state.v_WBcm.copy()
+            self._time, self._span = state.time, TICK
+            self._look_ahead(state)
         elif state.time > self._time:
             self._advance(state, state.time - self._time)
-        self._time = state.time
-        return self._wrench
+            self._time = state.time
+            self._look_ahead(state)
+        fx, fy = self._force.tolist()
+        return Wrench(fx=fx, fy=fy, torque=0.0)
+
+    def strongest(self) -> float:
+        """Largest force [N] that the swing will yet bring while the object rests."""
+        swing = np.sqrt((self._offset**2).sum() + (self._velocity**2).sum() / self._frequency**2)
+        return float(self._mass * self._frequency**2 * swing)
 
     def _advance(self, state: ObjectState, span: float) -> None:
-        """Semi-implicit Euler over a tick; long spans (a rest that was skipped) in short pieces."""
-        pieces = max(1, math.ceil(span / 2e-3))
-        h = span / pieces
-        stiffness, damper = self._frequency**2, 2.0 * self._damping * self._frequency
-        # The object moved from where it was to where it is; end values suffice for the spring's anchor.
-        for _ in range(pieces):
-            pull = stiffness * (self._place - state.p_WBcm) + damper * (self._velocity - state.v_WBcm)
-            self._velocity = self._velocity - h * pull
-            self._place = self._place + h * self._velocity
-        pull = stiffness * (self._place - state.p_WBcm) + damper * (self._velocity - state.v_WBcm)
-        fx, fy = (self._mass * pull).tolist()
-        self._wrench = Wrench(fx=fx, fy=fy, torque=0.0)
+        """Move by the tick that has passed."""
+        rest = span > 2.0 * TICK  # the object stood still, and the rollout skipped it
+        anchor = np.zeros(2) if rest else self._anchor
+        start = state.p_WBcm if rest else self._from
+        offset, rate = self._flow(self._place - start, self._velocity - anchor, span)
+        self._velocity = anchor + rate if rest else self._velocity - span * self._force / self._mass
+        self._place = start + span * anchor + offset
+        self._span = TICK if rest else span
+
+    def _look_ahead(self, state: ObjectState) -> None:
+        """The mean force of the next tick, as long as the last one."""
+        self._from, self._anchor = state.p_WBcm.copy(), state.v_WBcm.copy()
+        self._offset = self._place - state.p_WBcm
+        _, rate = self._flow(self._offset, self._velocity - self._anchor, self._span)
+        self._force = self._mass * (self._velocity - self._anchor - rate) / self._span
+
+    def _flow(self, offset: Array, rate: Array, span: float) -> tuple[Array, Array]:
+        """Offset and rate (2,) of the free oscillator after a span [s]."""
+        w, z = self._frequency, self._damping
+        root = cmath.sqrt(z * z - 1.0) or 1e-9
+        slow, fast = w * (-z + root), w * (-z - root)
+        a = (rate - fast * offset) / (slow - fast)
+        b = offset - a
+        first, second = a * cmath.exp(slow * span), b * cmath.exp(fast * span)
+        return np.real(first + second), np.real(slow * first + fast * second)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -372,5 +406,6 @@ class _RollingLaw:
         # Across the axis (y of B) it rolls; along the axis it slides.
         across = np.array([math.cos(state.yaw), math.sin(state.yaw)])
         speed = float(across @ state.v_WBcm)
-        force = -self.share * state.mass * GRAVITY * speed / math.hypot(speed, ROLLING_EDGE)
+        edge = max(ROLLING_EDGE, self.share * GRAVITY * TICK)
+        force = -self.share * state.mass * GRAVITY * speed / math.hypot(speed, edge)
         return Wrench(fx=force * across[0], fy=force * across[1], torque=0.0)

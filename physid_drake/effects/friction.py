@@ -25,6 +25,33 @@ def _direction(state: ObjectState) -> tuple[Array, Array]:
     return speeds, state.v_WQ / np.sqrt(speeds**2 + SLOWEST**2)[:, None]
 
 
+@dc.dataclass(frozen=True)
+class Together:
+    """Several friction laws at once, as one: their ratios to the plain friction multiply, their turns add."""
+
+    laws: tuple[FrictionLaw, ...]
+
+    @property
+    def largest(self) -> float:
+        """The product."""
+        return math.prod(law.largest for law in self.laws)
+
+    def refund(self, state: ObjectState) -> Array:
+        """What the contact's friction, ``largest`` times the plain one, is too much."""
+        _, along = _direction(state)
+        plain = (state.loads * state.friction)[:, None] * along
+        whole = plain[:, 0] + 1j * plain[:, 1]
+        moving = whole != 0.0
+        ratio = np.ones(len(whole), dtype=np.complex128)
+        for law in self.laws:
+            true = law.largest * plain - law.refund(state)
+            ratio[moving] *= (true[moving, 0] + 1j * true[moving, 1]) / whole[moving]
+        # Two strong ellipses might turn friction forward.
+        ratio = np.maximum(ratio.real, 0.0) + 1j * ratio.imag
+        refund = (self.largest - ratio) * whole
+        return np.column_stack([refund.real, refund.imag])
+
+
 @dc.dataclass(frozen=True, kw_only=True)
 class StribeckFriction(Effect):
     """Friction falls with slip: mu(v) = mu_k + (mu_s - mu_k) exp(-(v / v_s)^2), with excess = mu_s / mu_k - 1.
@@ -224,7 +251,7 @@ class _PatchLaw:
     def refund(self, state: ObjectState) -> Array:
         _, along = _direction(state)
         away = np.sqrt((state.p_WQ[:, 0] - self.x) ** 2 + (state.p_WQ[:, 1] - self.y) ** 2)
-        # The edge is as wide as the support points are apart, so that the fit's cost has no steps.
+        # A soft edge, so that a fit's cost has no steps as support points cross it.
         inside = 1.0 / (1.0 + np.exp(np.clip((away - self.radius) / (0.05 * self.radius), -50.0, 50.0)))
         ratio = 1.0 + (self.ratio - 1.0) * inside
         forces: Array = ((self.largest - ratio) * state.loads * state.friction)[:, None] * along
@@ -255,18 +282,17 @@ class FrictionGradient(Effect):
 
     def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:
         """The law."""
-        del facts
-        return (_GradientLaw(self.slope_x, self.slope_y),)
+        slopes = np.array([self.slope_x, self.slope_y])
+        # Of the places that the push may reach: the contact holds no more than it must.
+        steepest = float(np.maximum(slopes * facts.region[0], slopes * facts.region[1]).sum())
+        return (_GradientLaw(self.slope_x, self.slope_y, 1.0 + max(0.0, steepest)),)
 
 
 @dc.dataclass(frozen=True)
 class _GradientLaw:
     slope_x: float
     slope_y: float
-
-    @property
-    def largest(self) -> float:
-        return 1.5  # a steeper place, where the object rarely is, feels no more
+    largest: float
 
     def refund(self, state: ObjectState) -> Array:
         _, along = _direction(state)

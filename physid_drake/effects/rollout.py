@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import dataclasses as dc
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import Body, Cell, HandPath, Motion, Start
+from physid_drake.cell.diagram import GRAVITY
 from physid_drake.cell.support import PressureGrid
 from physid_drake.effects.effect import Effect, PushFacts
+from physid_drake.effects.friction import Together
 from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]
@@ -63,7 +66,7 @@ def roll(
     cell = build(geometry_with(present, geometry))
     facts = PushFacts(
         order=push.order, mass=body.mass, polar=float(sum(_second_moments(cell))),
-        rolling_radius=cell.solid.rolling_radius,
+        rolling_radius=cell.solid.rolling_radius, region=_region(cell, body, push),
     )  # fmt: skip
     for effect in present:
         body = effect.body(body, facts)
@@ -71,6 +74,9 @@ def roll(
     for effect in reversed(present):
         start = dc.replace(start, pose=effect.true_pose(start.pose))
     motion: Motion | None = None
+    frictions = [law for effect in present for law in effect.frictions(facts)]
+    if len(frictions) > 1:
+        frictions = [Together(tuple(frictions))]
     for _ in range(max((effect.passes for effect in present), default=1)):
         path = push.path
         if path is not None:
@@ -84,7 +90,7 @@ def roll(
             end=push.end,
             hand_height=push.hand_height,
             laws=[law for effect in present for law in effect.laws(facts)],
-            frictions=[law for effect in present for law in effect.frictions(facts)],
+            frictions=frictions,
         )
     assert motion is not None
     return motion
@@ -98,6 +104,19 @@ def tracked(motion: Motion, times: Array, effects: Sequence[Effect]) -> Array:
     for effect in present:
         poses = effect.tracked(poses)
     return poses
+
+
+def _region(cell: Cell, body: Body, push: Rollout) -> Array:
+    """Lower and upper corner (2, 2) of where the object's points may come [m]."""
+    places = np.array([push.start.pose[:2]])
+    speed = float(np.hypot(*push.start.velocity[:2]))
+    if push.path is not None:
+        places = np.concatenate([places, push.path.knot_positions()])
+        speed = max(speed, float(np.sqrt((push.path.velocities**2).sum(axis=1).max())))
+    slide = speed**2 / (2.0 * GRAVITY * max(float(np.min(body.support_friction)), 0.05))
+    x0, y0, x1, y1 = cell.solid.underside.extent()
+    margin = math.hypot(x1 - x0, y1 - y0) + min(slide, 1.0)
+    return np.array([places.min(axis=0) - margin, places.max(axis=0) + margin])
 
 
 def _second_moments(cell: Cell) -> tuple[float, float]:

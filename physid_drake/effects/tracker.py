@@ -30,7 +30,7 @@ class TrackerLatency(Effect):
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """The delay."""
         del around
-        return (Coordinate(name="delay", step=2e-3, lower=0.0, upper=0.5),)
+        return (Coordinate(name="delay", step=2e-3, lower=0.0, upper=0.5, tolerance=2e-4),)
 
     def lateness(self) -> float:
         """By how much."""
