@@ -1,0 +1,138 @@
+"""A recording made ready for a diagnosis: its pushes, their features, the rollouts, what sets the effects' scales."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.cell import CellConfig
+from physid_drake.cell.solid import solid_of
+from physid_drake.diagnose.features import PushFeatures, features_of
+from physid_drake.diagnose.noise import TrackerNoise, tracker_noise
+from physid_drake.effects import Surroundings
+from physid_drake.errors import RecordingError
+from physid_drake.identify.config import ThetaConfig
+from physid_drake.identify.nuisance import Nuisance, nuisance_of
+from physid_drake.identify.problem import Noise, PushProblem, problems_of, spec_of
+from physid_drake.identify.rollouts import Prediction, RolloutPool
+from physid_drake.identify.theta import ThetaMap, theta_map
+from physid_drake.recording import Recording
+
+Array = NDArray[np.float64]
+Tick = Callable[[str, int, int], None]
+
+UNIT_SCATTER = 0.025  # of friction, push to push: the columns' unit and the median of its prior
+LEAST_MOTION = 6.0  # standard deviations: an object that moves less in every push does not move
+# A rollout's own error acts like a start that is known no better than this [m, m, rad].
+START_FLOOR = np.array([3e-5, 3e-5, 3e-4])
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Case:
+    """What a diagnosis works on.
+
+    Attributes:
+        recording: the pushes.
+        noise: of the tracker.
+        sensors: of all sensors, as the identification takes them.
+        problems: one per push.
+        nuisances: each push's own unknowns.
+        features: what is compared, one per push.
+        thetas: the parameter space.
+        pool: makes the rollouts.
+        around: the effects' scales.
+        config: of the cell.
+    """
+
+    recording: Recording
+    noise: TrackerNoise
+    sensors: Noise
+    problems: tuple[PushProblem, ...]
+    nuisances: tuple[Nuisance, ...]
+    features: tuple[PushFeatures, ...]
+    thetas: ThetaMap
+    pool: RolloutPool
+    around: Surroundings
+    config: CellConfig
+
+    def vectors(self, predictions: Sequence[Prediction | None], owners: Sequence[int]) -> list[Array | None]:
+        """Features of predictions, each of the push ``owners`` says."""
+        return [None if p is None else self.features[i].of(p) for p, i in zip(predictions, owners, strict=True)]
+
+
+def case_of(recording: Recording, config: CellConfig, theta: ThetaConfig, jobs: int = 0) -> Case:
+    """Prepare a recording.
+
+    Raises:
+        RecordingError: if the object never moves, or there is no push.
+    """
+    if not recording.pushes:
+        raise RecordingError(f"recording '{recording.name}': there is no push to diagnose; record at least three.")
+    noise, sensors = tracker_noise(recording)
+    solid = solid_of(recording.object.shape)
+    problems = tuple(_floored(p) for p in problems_of(recording, sensors, solid.height))
+    _refuse_still(recording, problems, noise)
+    thetas = theta_map(
+        recording.object, solid.outline, (config.friction_cells[0], config.friction_cells[1]), theta,
+        config.default_mass_kg,
+    )  # fmt: skip
+    pushes = recording.pushes
+    return Case(
+        recording=recording,
+        noise=noise,
+        sensors=sensors,
+        problems=problems,
+        nuisances=tuple(nuisance_of(p, UNIT_SCATTER) for p in problems),
+        features=tuple(features_of(push, p, noise) for push, p in zip(pushes, problems, strict=True)),
+        thetas=thetas,
+        pool=RolloutPool(spec_of(recording, config), thetas, jobs=jobs),
+        around=_surroundings(recording, problems, thetas),
+        config=config,
+    )
+
+
+def _floored(problem: PushProblem) -> PushProblem:
+    std = problem.start_std.copy()
+    std[:3] = np.hypot(std[:3], START_FLOOR)
+    return dc.replace(problem, start_std=std)
+
+
+def _refuse_still(recording: Recording, problems: Sequence[PushProblem], noise: TrackerNoise) -> None:
+    moved = max(float((np.abs(p.poses - np.array(p.start.pose)) / noise.sigmas).max(initial=0.0)) for p in problems)
+    if moved < LEAST_MOTION:
+        raise RecordingError(
+            f"recording '{recording.name}': the object never moves by more than the tracker's noise"
+            f" ({1e3 * noise.position:.2g} mm); there is nothing to diagnose."
+        )
+
+
+def _surroundings(recording: Recording, problems: Sequence[PushProblem], thetas: ThetaMap) -> Surroundings:
+    places = np.concatenate([np.vstack([np.array(p.start.pose[:2]), p.poses[:, :2]]) for p in problems])
+    solid = solid_of(recording.object.shape)
+    x0, y0, x1, y1 = solid.underside.extent()
+    return Surroundings(
+        mass=thetas.nominal["mass"],
+        friction=0.3,
+        size=np.array([x1 - x0, y1 - y0]),
+        height=solid.height,
+        region=np.array([places.min(axis=0), places.max(axis=0)]),
+        top_speed=max(0.02, float(np.median([_top_speed(p) for p in problems])) * 1.5),
+        pushes=len(problems),
+        has_hand=recording.hand is not None,
+        rolls=solid.rolling_radius is not None,
+        interval=float(np.median(np.concatenate([np.diff(push.object.times) for push in recording.pushes]))),
+    )
+
+
+def _top_speed(problem: PushProblem) -> float:
+    """About the largest speed of a push [m/s]; the hand's where the object's path was not recorded."""
+    if len(problem.times) >= 8:
+        span = max(2, len(problem.times) // 20)
+        steps = np.linalg.norm(problem.poses[span:, :2] - problem.poses[:-span, :2], axis=1)
+        return float((steps / (problem.times[span:] - problem.times[:-span])).max())
+    if problem.path is not None:
+        return float(np.linalg.norm(problem.path.velocities, axis=1).max())
+    return 0.1

@@ -1,0 +1,114 @@
+"""Confirmation: the best few effects in the cell, fitted with theta, judged on pushes that were left out."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.diagnose.fit import EffectPoint, Fitted, Fitter
+from physid_drake.diagnose.linear import left_out_scores
+from physid_drake.diagnose.screen import Score, start_of
+
+Array = NDArray[np.float64]
+Tick = Callable[[str, int, int], None]
+
+MOST_CANDIDATES = 5
+WORTH_A_FIT = 0.35  # of the best score test's gain
+SURE = 2.0  # standard errors
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """One effect in the model, fitted.
+
+    Attributes:
+        score: its score test.
+        fitted: the model with it.
+        gains: (n,) log predictive density of each push, left out, over that without the effect.
+        degenerate: whether an amplitude ran to its null, so that it is another effect or none.
+    """
+
+    score: Score
+    fitted: Fitted
+    gains: Array
+    degenerate: bool
+
+    @property
+    def name(self) -> str:
+        """The effect's."""
+        return self.score.kind.name
+
+    @property
+    def gain(self) -> float:
+        """Total."""
+        return float(self.gains.sum())
+
+    @property
+    def standard_error(self) -> float:
+        """Of the total."""
+        return standard_error(self.gains)
+
+    @property
+    def accepted(self) -> bool:
+        """Whether held-out pushes confirm the effect."""
+        return not self.degenerate and self.gain > max(SURE * self.standard_error, 1.0)
+
+
+def standard_error(values: Array) -> float:
+    """Of the sum of values (n,) over pushes; infinite for one push."""
+    return float(np.std(values, ddof=1) * np.sqrt(len(values))) if len(values) > 1 else np.inf
+
+
+def push_scores(fitted: Fitted) -> Array:
+    """Log predictive density (n,) of each push, fitted without it."""
+    scores, _ = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std)
+    return scores
+
+
+def confirm(
+    fitter: Fitter, before: Fitted, scores: Sequence[Score], tick: Tick, *, most: int = MOST_CANDIDATES
+) -> tuple[Candidate, ...]:
+    """Fit the best few effects of a screening, each added to the model ``before``; best held-out gain first."""
+    best = max((s.gain for s in scores), default=0.0)
+    chosen = [s for s in scores if s.kept and s.gain >= WORTH_A_FIT * best][:most]
+    plain = push_scores(before)
+    found = []
+    for k, one in enumerate(chosen):
+        tick(f"fit with {one.kind.name}", k, len(chosen))
+        found.append(_candidate(fitter, before, one, plain))
+    return tuple(sorted(found, key=lambda c: (c.degenerate, -c.gain)))
+
+
+def _candidate(fitter: Fitter, before: Fitted, one: Score, plain: Array) -> Candidate:
+    start = start_of(fitter, one)
+    state = dc.replace(before.state, effects=(*before.state.effects, start))
+    fitted = fitter.fit(state, rounds=5, like=before)
+    point = fitted.state.effects[-1]
+    return Candidate(
+        score=one, fitted=fitted, gains=push_scores(fitted) - plain, degenerate=_degenerate(fitter, one, point)
+    )  # fmt: skip
+
+
+def _degenerate(fitter: Fitter, one: Score, point: EffectPoint) -> bool:
+    """Whether a one-sided amplitude is at its null."""
+    chart = one.kind.chart(fitter.case.around)
+    free = one.signature.family.free
+    return any(
+        one_sided and point.point[j] <= chart[j].lower + 1e-3 * chart[j].step
+        for j, one_sided in zip(free, one.signature.one_sided, strict=True)
+    )
+
+
+def rivals(best: Candidate, others: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """Accepted candidates whose held-out gain is not surely below the best one's."""
+    close = []
+    for other in others:
+        if other is best or not other.accepted:
+            continue
+        difference = best.gains - other.gains
+        if difference.sum() < max(SURE * standard_error(difference), 1.5):
+            close.append(other)
+    return tuple(close)

@@ -1,0 +1,380 @@
+"""Gauss-Newton on all pushes: theta, the effects' chart points, and each push's own unknowns."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.diagnose.case import Case
+from physid_drake.diagnose.linear import LinearPush, Solution, Whitened, best_scatter, own_unknowns, solve
+from physid_drake.effects import Coordinate, Effect
+from physid_drake.identify.rollouts import Prediction, Task
+
+Array = NDArray[np.float64]
+
+THETA_STEP = 0.006  # of the unit cube
+OWN_STEP = 0.5  # of the prior standard deviation
+MOST_OWN = 3.0  # standard deviations: unknowns are linearised no further out
+FAILED = 1e4  # standard deviations: features of a rollout that diverged
+MOST_THETA_MOVE = 0.25  # of the unit cube in one iteration
+Say = Callable[[str], None]
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class EffectPoint:
+    """An effect in a model.
+
+    Attributes:
+        kind: its class.
+        point: (k,) where in its chart it is.
+        free: which coordinates a fit may move.
+        origin: (k,) where the fit started: the middle of the shape coordinates' prior.
+    """
+
+    kind: type[Effect]
+    point: Array
+    free: tuple[int, ...]
+    origin: Array
+
+    def effect(self, case: Case) -> Effect:
+        """The effect itself."""
+        return self.kind.at(self.point, case.around)
+
+    def chart(self, case: Case) -> tuple[Coordinate, ...]:
+        """All coordinates."""
+        return self.kind.chart(case.around)
+
+    def moved(self, case: Case, change: Array) -> EffectPoint:
+        """Free coordinates moved by ``change``, within their bounds."""
+        point = self.point.copy()
+        chart = self.chart(case)
+        for j, step in zip(self.free, change.tolist(), strict=True):
+            point[j] = float(np.clip(point[j] + step, chart[j].lower, chart[j].upper))
+        return dc.replace(self, point=point)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class State:
+    """Where a fit is.
+
+    Attributes:
+        u: (d,) theta in the unit cube.
+        effects: the effects of the model.
+        own: per push (k,), the unknowns in units of their priors.
+        scatter: of friction, in units of ``UNIT_SCATTER``.
+    """
+
+    u: Array
+    effects: tuple[EffectPoint, ...]
+    own: tuple[Array, ...]
+    scatter: float
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Fitted:
+    """A model fitted to all pushes.
+
+    Attributes:
+        state: where.
+        pushes: linearised there; columns of ``shared``: theta, then the effects' free coordinates.
+        prior_mean, prior_std: (d,) of a change of the shared parameters.
+        solution: of the linear problem at the state; its beta is what was left to move.
+        predicted: per push (m,), features at the state, unknowns included.
+        scores: log likelihood with the scatter's prior.
+    """
+
+    state: State
+    pushes: tuple[LinearPush, ...]
+    prior_mean: Array
+    prior_std: Array
+    solution: Solution
+    predicted: tuple[Array, ...]
+    score: float
+
+    @property
+    def own_dimension(self) -> int:
+        """Shared parameters that the model has: theta and the effects' coordinates."""
+        return len(self.state.u) + sum(len(e.free) for e in self.state.effects)
+
+    @property
+    def degrees(self) -> int:
+        """Residuals less shared parameters."""
+        return sum(len(p.residual) for p in self.pushes) - self.own_dimension
+
+    @property
+    def reduced_chi2(self) -> float:
+        """Cost per degree of freedom; 1 where the model explains the pushes."""
+        return self.solution.chi2 / max(1, self.degrees)
+
+
+class Fitter:
+    """Fits models to a case."""
+
+    def __init__(
+        self, case: Case, extra: Sequence[Array] | None = None, tolerances: Sequence[Array] | None = None
+    ) -> None:
+        """Prepare.
+
+        Args:
+            case: the pushes.
+            extra: per push (m, j), directions of the numerics guard, each push with unknown multiples of its own.
+            tolerances: per push (m, t), directions that all pushes may share by one standard deviation each.
+        """
+        self.case = case
+        self.extra = extra
+        self.tolerances = tolerances
+
+    def start(self, u: Array) -> State:
+        """The plain model at theta ``u`` (d,)."""
+        own = tuple(np.zeros(len(n.names)) for n in self.case.nuisances)
+        return State(u=u, effects=(), own=own, scatter=1.0)
+
+    # Rollouts.
+
+    def task(self, state: State, i: int, *, u: Array | None = None, own: Array | None = None,
+             effects: Sequence[Effect] | None = None) -> Task:  # fmt: skip
+        """The rollout of push i at a state, or with something changed."""
+        case = self.case
+        values = state.own[i] if own is None else own
+        return Task(
+            problem=case.problems[i],
+            theta=np.asarray(case.thetas.space.from_unit(state.u if u is None else u)),
+            nuisance=case.nuisances[i],
+            values=np.clip(values, -MOST_OWN, MOST_OWN) * case.nuisances[i].stds,
+            effects=tuple(e.effect(case) for e in state.effects) if effects is None else tuple(effects),
+        )
+
+    def vectors(self, tasks: Sequence[Task]) -> list[Array]:
+        """Features of rollouts; a large value in all where one diverged."""
+        predictions: list[Prediction | None] = self.case.pool.run(tasks)
+        result = []
+        for task, prediction in zip(tasks, predictions, strict=True):
+            features = self.case.features[task.problem.order]
+            result.append(np.full(len(features.recorded), FAILED) if prediction is None else features.of(prediction))
+        return result
+
+    # Linearisation.
+
+    def linearise(self, state: State, *, learn_scatter: bool = True, like: Fitted | None = None) -> Fitted:
+        """All derivatives at a state, by differences.
+
+        Args:
+            state: where.
+            like: a fitted model whose derivatives with respect to theta and the pushes' unknowns are near enough:
+                only those of the effects are taken.
+            learn_scatter: choose the scatter of friction anew, instead of keeping the state's.
+        """
+        tasks: list[Task] = []
+        owners: list[int] = []
+        for i in range(len(self.case.problems)):
+            mine = self._tasks_of(state, i, everything=like is None)
+            tasks += mine
+            owners += [i] * len(mine)
+        vectors = self.vectors(tasks)
+        pushes, predicted = [], []
+        for i in range(len(self.case.problems)):
+            mine_vectors = [v for v, owner in zip(vectors, owners, strict=True) if owner == i]
+            if like is None:
+                pushes.append(self._linear_push(state, i, mine_vectors))
+            else:
+                pushes.append(self._chord_push(state, i, mine_vectors, like.pushes[i]))
+            predicted.append(mine_vectors[0])
+        return self._fitted(state, tuple(pushes), tuple(predicted), learn_scatter)
+
+    def _theta_steps(self, state: State) -> list[Array]:
+        steps = []
+        for j in range(len(state.u)):
+            u = state.u.copy()
+            u[j] += THETA_STEP if u[j] < 0.5 else -THETA_STEP
+            steps.append(u)
+        return steps
+
+    def _effect_steps(self, state: State) -> list[tuple[float, tuple[Effect, ...]]]:
+        """For each free coordinate of each effect: the step and all effects with it taken."""
+        plain = [e.effect(self.case) for e in state.effects]
+        steps = []
+        for k, e in enumerate(state.effects):
+            chart = e.chart(self.case)
+            for j in e.free:
+                step = chart[j].step if e.point[j] + chart[j].step <= chart[j].upper else -chart[j].step
+                point = e.point.copy()
+                point[j] += step
+                moved = [*plain]
+                moved[k] = e.kind.at(point, self.case.around)
+                steps.append((step, tuple(moved)))
+        return steps
+
+    def _tasks_of(self, state: State, i: int, everything: bool) -> list[Task]:
+        tasks = [self.task(state, i)]
+        if everything:
+            tasks += [self.task(state, i, u=u) for u in self._theta_steps(state)]
+        tasks += [self.task(state, i, effects=effects) for _, effects in self._effect_steps(state)]
+        if not everything:
+            return tasks
+        for j in range(len(state.own[i])):
+            own = np.clip(state.own[i], -MOST_OWN, MOST_OWN)
+            own[j] += OWN_STEP if own[j] <= 0.0 else -OWN_STEP
+            tasks.append(self.task(state, i, own=own))
+        return tasks
+
+    def _linear_push(self, state: State, i: int, vectors: list[Array]) -> LinearPush:
+        base, rest = vectors[0], vectors[1:]
+        columns = []
+        for u in self._theta_steps(state):
+            columns.append((rest.pop(0) - base) / float((u - state.u)[np.argmax(np.abs(u - state.u))]))
+        for step, _ in self._effect_steps(state):
+            columns.append((rest.pop(0) - base) / step)
+        own_columns = []
+        at = np.clip(state.own[i], -MOST_OWN, MOST_OWN)
+        for j in range(len(at)):
+            own_columns.append((rest.pop(0) - base) / (OWN_STEP if at[j] <= 0.0 else -OWN_STEP))
+        own = np.column_stack(own_columns)
+        residual = self.case.features[i].recorded - base + own @ at
+        friction = self.case.nuisances[i].index("friction")
+        if self.extra is not None:
+            own = np.column_stack([own, self.extra[i]])
+        return LinearPush(
+            residual=residual,
+            shared=self._with_tolerances(i, columns),
+            own=own,
+            noise=self.case.features[i].noise,
+            friction=friction,
+        )
+
+    def _chord_push(self, state: State, i: int, vectors: list[Array], like: LinearPush) -> LinearPush:
+        """The push with the derivatives of ``like`` for theta and its unknowns."""
+        base = vectors[0]
+        steps = [step for step, _ in self._effect_steps(state)]
+        columns = [(v - base) / step for v, step in zip(vectors[1:], steps, strict=True)]
+        at = np.clip(state.own[i], -MOST_OWN, MOST_OWN)
+        theta = like.shared[:, : len(state.u)]
+        return dc.replace(
+            like,
+            residual=self.case.features[i].recorded - base + like.own[:, : len(at)] @ at,
+            shared=self._with_tolerances(i, [theta, *columns]),
+        )
+
+    def _with_tolerances(self, i: int, columns: Sequence[Array]) -> Array:
+        more = [] if self.tolerances is None else [self.tolerances[i]]
+        return np.column_stack([*columns, *more])
+
+    def priors(self, state: State) -> tuple[Array, Array]:
+        """Mean and standard deviation (d,) of a change of the shared parameters from a state."""
+        space = self.case.thetas.space
+        nominal = np.asarray(space.to_unit(space.nominal))
+        lower = np.asarray(space.to_unit(space.nominal))
+        means, stds = [], []
+        for j, parameter in enumerate(space.parameters):
+            if parameter.prior_std is None:
+                std = 1.0 / np.sqrt(12.0)
+            else:
+                # One prior standard deviation in the unit cube, by the whitened prior's slope.
+                bumped = lower.copy()
+                bumped[j] += 1e-4
+                slope = (
+                    space.prior_whitened(space.from_unit(bumped)) - space.prior_whitened(space.from_unit(lower))
+                )[j]
+                std = 1e-4 / abs(float(slope))
+            means.append(nominal[j] - state.u[j])
+            stds.append(std)
+        for e in state.effects:
+            chart = e.chart(self.case)
+            for j in e.free:
+                means.append(float(e.origin[j] - e.point[j]))
+                stds.append(chart[j].std)
+        count = 0 if self.tolerances is None else self.tolerances[0].shape[1]
+        return np.array([*means, *([0.0] * count)]), np.array([*stds, *([1.0] * count)])
+
+    def _fitted(
+        self, state: State, pushes: tuple[LinearPush, ...], predicted: tuple[Array, ...], learn_scatter: bool
+    ) -> Fitted:
+        mean, std = self.priors(state)
+        scatter, score = best_scatter(pushes, mean, std, () if learn_scatter else (state.scatter,))
+        state = dc.replace(state, scatter=scatter)
+        solution = solve(Whitened.of(pushes, scatter), mean, std)
+        return Fitted(
+            state=state, pushes=pushes, prior_mean=mean, prior_std=std, solution=solution, predicted=predicted,
+            score=score,
+        )  # fmt: skip
+
+    def guard(self, fitted: Fitted) -> Fitted:
+        """A model that was fitted without the guard's directions and the tolerances, with them."""
+        assert self.extra is not None
+        pushes = tuple(
+            dc.replace(
+                push, own=np.column_stack([push.own, self.extra[i]]), shared=self._with_tolerances(i, [push.shared])
+            )
+            for i, push in enumerate(fitted.pushes)
+        )
+        return self._fitted(fitted.state, pushes, fitted.predicted, learn_scatter=True)
+
+    # Iteration.
+
+    def fit(
+        self,
+        state: State,
+        *,
+        rounds: int = 4,
+        careful: int = 0,
+        like: Fitted | None = None,
+        say: Say | None = None,
+    ) -> Fitted:
+        """Iterate from a state, with shorter steps where one fails.
+
+        Args:
+            state: where to start.
+            rounds: at most so many steps.
+            careful: in so many first rounds only the shared parameters move, the pushes' unknowns stay at zero and
+                the scatter at its prior's median: far from the answer they would explain anything.
+            like: a fitted model whose derivatives for theta and the pushes' unknowns are near enough.
+            say: told of each round.
+
+        Returns:
+            The best state seen, linearised.
+        """
+        best = self.linearise(state, learn_scatter=careful == 0, like=like)
+        for k in range(rounds):
+            if say is not None:
+                say(f"round {k + 1} of at most {rounds}")
+            cautious = k < careful
+            trial = best
+            for share in (1.0, 0.4, 0.15):
+                step = self.stepped(best, share)
+                if cautious:
+                    step = dc.replace(step, own=tuple(np.zeros_like(o) for o in step.own))
+                trial = self.linearise(step, learn_scatter=k + 1 >= careful, like=like)
+                if actual_cost(trial) < actual_cost(best) or k + 1 == careful:
+                    break
+            gained = actual_cost(best) - actual_cost(trial)
+            if gained <= 0.0 and k + 1 != careful:
+                break
+            best = trial
+            if gained < 0.5 and k >= careful:
+                break
+        return best
+
+    def stepped(self, fitted: Fitted, share: float = 1.0) -> State:
+        """The state after a Gauss-Newton step."""
+        state, beta = fitted.state, share * fitted.solution.beta
+        d = len(state.u)
+        u = np.clip(state.u + np.clip(beta[:d], -MOST_THETA_MOVE, MOST_THETA_MOVE), 1e-3, 1.0 - 1e-3)
+        effects, at = [], d
+        for e in state.effects:
+            effects.append(e.moved(self.case, beta[at : at + len(e.free)]))
+            at += len(e.free)
+        own = []
+        for push, old in zip(fitted.pushes, state.own, strict=True):
+            new = own_unknowns(push, state.scatter, fitted.solution.beta)[: len(old)]
+            own.append(np.clip(old + share * (new - old), -MOST_OWN, MOST_OWN))
+        return State(u=u, effects=tuple(effects), own=tuple(own), scatter=state.scatter)
+
+
+def actual_cost(fitted: Fitted) -> float:
+    """Twice the negative log posterior at the state itself, nothing left to move: what iterations compare."""
+    at_rest = np.zeros(len(fitted.prior_mean))
+    white = Whitened.of(fitted.pushes, fitted.state.scatter)
+    weight = 1.0 / fitted.prior_std**2
+    return float(white.y @ white.y) + white.log_determinant + float(weight @ (at_rest - fitted.prior_mean) ** 2)

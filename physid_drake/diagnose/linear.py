@@ -1,0 +1,174 @@
+"""Many pushes, linearised: what shared coefficients explain, with each push's own unknowns integrated out.
+
+A push is ``r = A beta + J eta + e`` with eta ~ N(0, I) its own unknowns in units of their priors, e ~ N(0, N)
+noise, and beta what all pushes share: theta and effects. Everything that a diagnosis asks is linear algebra on such pushes.
+"""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+
+Array = NDArray[np.float64]
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class LinearPush:
+    """One push, linearised.
+
+    Attributes:
+        residual: (m,) recorded less predicted, as if the push's unknowns were zero.
+        shared: (m, d) derivatives of the prediction with respect to beta.
+        own: (m, k) with respect to the push's unknowns, in units of their priors.
+        noise: (m, m) covariance.
+        friction: column of ``own`` that is the push's friction, in units of ``unit_scatter``.
+    """
+
+    residual: Array
+    shared: Array
+    own: Array
+    noise: Array
+    friction: int
+
+    def covariance(self, scatter: float) -> Array:
+        """Covariance (m, m) of the residual, the friction's prior being ``scatter`` times that of the column."""
+        own = self.own.copy()
+        own[:, self.friction] *= scatter
+        covariance: Array = self.noise + own @ own.T
+        return covariance
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Whitened:
+    """All pushes, divided by the roots of their covariances.
+
+    Attributes:
+        residuals: one (m_i,) per push.
+        shared: one (m_i, d) per push.
+        log_determinant: of all covariances.
+    """
+
+    residuals: tuple[Array, ...]
+    shared: tuple[Array, ...]
+    log_determinant: float
+
+    @classmethod
+    def of(cls, pushes: Sequence[LinearPush], scatter: float) -> Whitened:
+        """Whiten with the Cholesky factors."""
+        residuals, shared, total = [], [], 0.0
+        for push in pushes:
+            lower = np.linalg.cholesky(push.covariance(scatter))
+            white = solve_triangular(lower, np.column_stack([push.residual, push.shared]), lower=True)
+            residuals.append(np.asarray(white[:, 0]))
+            shared.append(np.asarray(white[:, 1:]))
+            total += 2.0 * float(np.log(np.diag(lower)).sum())
+        return cls(residuals=tuple(residuals), shared=tuple(shared), log_determinant=total)
+
+    @property
+    def y(self) -> Array:
+        """All residuals (M,)."""
+        return np.concatenate(self.residuals)
+
+    @property
+    def x(self) -> Array:
+        """All derivatives (M, d)."""
+        return np.concatenate(self.shared)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Solution:
+    """Shared coefficients by penalised least squares.
+
+    Attributes:
+        beta: (d,) change of the shared parameters.
+        precision: (d, d) of beta, prior included.
+        chi2: of what is left, prior included.
+        log_likelihood: marginal over the pushes' unknowns, at beta.
+    """
+
+    beta: Array
+    precision: Array
+    chi2: float
+    log_likelihood: float
+
+
+def solve(white: Whitened, prior_mean: Array, prior_std: Array) -> Solution:
+    """Fit beta.
+
+    Args:
+        white: the pushes.
+        prior_mean: (d,) of beta.
+        prior_std: (d,), inf where nothing is known.
+    """
+    weight = 1.0 / prior_std**2
+    precision = white.x.T @ white.x + np.diag(weight)
+    right = white.x.T @ white.y + weight * prior_mean
+    beta = (
+        np.linalg.solve(precision + 1e-12 * np.trace(precision) * np.eye(len(right)), right) if len(right) else right
+    )
+    left = white.y - white.x @ beta
+    chi2 = float(left @ left) + float(weight @ (beta - prior_mean) ** 2)
+    return Solution(beta=beta, precision=precision, chi2=chi2, log_likelihood=-0.5 * (chi2 + white.log_determinant))
+
+
+SCATTERS = tuple(np.geomspace(0.15, 8.0, 16).tolist())  # times the unit scatter
+SCATTER_PRIOR = (1.0, 0.6)  # median, in units of it, and standard deviation of the logarithm
+
+
+def best_scatter(
+    pushes: Sequence[LinearPush], prior_mean: Array, prior_std: Array, among: Sequence[float] = ()
+) -> tuple[float, float]:
+    """The friction's scatter from push to push, in units of the columns', and its log posterior."""
+    best = (1.0, -np.inf)
+    for scatter in among or SCATTERS:
+        value = solve(Whitened.of(pushes, float(scatter)), prior_mean, prior_std).log_likelihood
+        value -= 0.5 * (np.log(scatter / SCATTER_PRIOR[0]) / SCATTER_PRIOR[1]) ** 2
+        if value > best[1]:
+            best = (float(scatter), float(value))
+    return best
+
+
+def own_unknowns(push: LinearPush, scatter: float, beta: Array) -> Array:
+    """Most likely unknowns (k,) of a push, in units of the columns' priors."""
+    scale = np.ones(push.own.shape[1])
+    scale[push.friction] = scatter
+    own = push.own * scale
+    factor = cho_factor(push.noise + own @ own.T)
+    values: Array = scale * (own.T @ cho_solve(factor, push.residual - push.shared @ beta))
+    return values
+
+
+def left_out_scores(
+    pushes: Sequence[LinearPush], scatter: float, prior_mean: Array, prior_std: Array
+) -> tuple[Array, tuple[Array, ...]]:
+    """Leave one push out: fit on the others, predict it.
+
+    Returns:
+        (n,) log predictive densities, and the residuals (m_i,) of the predictions with the push's unknowns at zero.
+    """
+    weight = 1.0 / prior_std**2
+    pieces = []
+    for push in pushes:
+        factor = cho_factor(push.covariance(scatter), lower=True)
+        solved = cho_solve(factor, push.shared)
+        pieces.append((push.shared.T @ solved, solved.T @ push.residual))
+    information = sum((p[0] for p in pieces), np.diag(weight))
+    right = sum((p[1] for p in pieces), weight * prior_mean)
+    scores, residuals = [], []
+    for push, (own_information, own_right) in zip(pushes, pieces, strict=True):
+        others = information - own_information
+        others = others + 1e-10 * np.trace(information) * np.eye(len(others))
+        beta = np.linalg.solve(others, right - own_right)
+        spread = push.covariance(scatter) + push.shared @ np.linalg.solve(others, push.shared.T)
+        lower = np.linalg.cholesky(0.5 * (spread + spread.T))
+        left = push.residual - push.shared @ beta
+        white = solve_triangular(lower, left, lower=True)
+        scores.append(
+            -0.5 * float(white @ white) - float(np.log(np.diag(lower)).sum()) - 0.5 * len(left) * np.log(2.0 * np.pi)
+        )
+        residuals.append(left)
+    return np.array(scores), tuple(residuals)

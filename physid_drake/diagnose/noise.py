@@ -1,0 +1,147 @@
+"""The tracker's noise from rest: standard deviation and correlation in time, with the mean of each rest unknown."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from physid_drake.identify.problem import Noise, noise_of
+from physid_drake.recording import Push, Recording, rest_segments
+
+Array = NDArray[np.float64]
+
+LONGEST = 60  # samples of a rest that are looked at together
+FEWEST = 40  # samples at rest, in all, that tell a noise
+CONTRADICTS = 1.5  # seen over stated: beyond it the stated figure is not believed
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class TrackerNoise:
+    """Noise of the object's stream.
+
+    Attributes:
+        position, rotation: standard deviations [m, rad].
+        correlation_time: of first-order autoregressive noise, position and rotation (2,) [s]; 0 is white.
+        jitter: standard deviation of the time stamps [s], as far as moving samples show more noise than resting ones.
+        stated: whether the recording states the standard deviations, and they are believed.
+        warnings: what was found to contradict the recording.
+    """
+
+    position: float
+    rotation: float
+    correlation_time: tuple[float, float]
+    jitter: float
+    stated: bool
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def sigmas(self) -> Array:
+        """Standard deviations (3,) of x, y, yaw [m, m, rad]."""
+        return np.array([self.position, self.position, self.rotation])
+
+    def correlation(self, times: Array, dof: int) -> Array:
+        """Correlation matrix (n, n) of the noise of x, y (dof 0, 1) or yaw (dof 2) at times (n,)."""
+        constant = self.correlation_time[0 if dof < 2 else 1]
+        gaps = np.abs(times[:, None] - times[None, :])
+        if constant <= 0.0:
+            white: Array = (gaps == 0.0).astype(np.float64)
+            return white
+        matrix: Array = np.exp(-gaps / constant)
+        return matrix
+
+
+def tracker_noise(recording: Recording) -> tuple[TrackerNoise, Noise]:
+    """The object's noise as seen at rest and stated, and the identification's view of all sensors.
+
+    Restricted maximum likelihood of a first-order autoregressive process, so that a short rest, whose mean takes a
+    part of a slow noise away, does not make the noise look smaller.
+    """
+    plain = noise_of(recording)
+    pieces = [(push.object.times[r], push.object.planar[r]) for push in recording.pushes for r in rest_segments(push)]
+    seen_xy = _reml([(t, p[:, k]) for t, p in pieces for k in (0, 1)])
+    seen_yaw = _reml([(t, p[:, 2]) for t, p in pieces])
+    warnings: list[str] = []
+    position, tau_xy = _chosen("position", plain.position, plain.source["position"], seen_xy, warnings)
+    rotation, tau_yaw = _chosen("rotation", plain.rotation, plain.source["rotation"], seen_yaw, warnings)
+    noise = TrackerNoise(
+        position=position,
+        rotation=rotation,
+        correlation_time=(tau_xy, tau_yaw),
+        jitter=_jitter(recording.pushes),
+        stated=plain.source["position"] == "stated" and not warnings,
+        warnings=tuple(warnings),
+    )
+    return noise, dc.replace(plain, position=position, rotation=rotation)
+
+
+def _chosen(
+    what: str, value: float, source: str, seen: tuple[float, float] | None, warnings: list[str]
+) -> tuple[float, float]:
+    if seen is None:
+        return value, 0.0
+    sigma, constant = seen
+    if source != "stated":
+        return sigma, constant
+    if sigma > CONTRADICTS * value:
+        warnings.append(
+            f"the {what} noise at rest is {sigma:.3g}, {sigma / value:.1f} times what the recording states"
+        )
+        return sigma, constant
+    return value, constant
+
+
+def _reml(pieces: Sequence[tuple[Array, Array]]) -> tuple[float, float] | None:
+    """Standard deviation and correlation time of rests (times, values), each with a mean of its own."""
+    rests = [(t[:LONGEST], v[:LONGEST]) for t, v in pieces if len(t) >= 10]
+    if sum(len(t) for t, _ in rests) < FEWEST:
+        return None
+    interval = float(np.median(np.concatenate([np.diff(t) for t, _ in rests])))
+    spread = math.sqrt(float(np.mean([np.var(v) for _, v in rests]))) or 1e-9
+
+    def cost(x: Array) -> float:
+        sigma, rho = spread * math.exp(x[0]), 1.0 / (1.0 + math.exp(-x[1]))
+        total = 0.0
+        for times, values in rests:
+            gaps = np.abs(times[:, None] - times[None, :]) / interval
+            matrix = sigma**2 * (rho**gaps + 1e-9 * np.eye(len(times)))
+            lower = np.linalg.cholesky(matrix)
+            white = np.linalg.solve(lower, np.column_stack([values, np.ones(len(values))]))
+            ones = float(white[:, 1] @ white[:, 1])
+            residual = white[:, 0] - white[:, 1] * float(white[:, 1] @ white[:, 0]) / ones
+            total += 2.0 * float(np.log(np.diag(lower)).sum()) + math.log(ones) + float(residual @ residual)
+        # A weak prior: a short rest cannot tell slow noise from none.
+        return float(total + 0.5 * (x[0] / 1.0) ** 2 + 0.5 * ((x[1] + 1.5) / 2.0) ** 2)
+
+    found = minimize(cost, np.array([0.0, -1.5]), method="Nelder-Mead", options={"xatol": 1e-2, "fatol": 1e-2})
+    rho = 1.0 / (1.0 + math.exp(-found.x[1]))
+    constant = -interval / math.log(rho) if rho > 0.02 else 0.0
+    return spread * math.exp(float(found.x[0])), constant
+
+
+def _jitter(pushes: Sequence[Push]) -> float:
+    """Noise of moving samples beyond that of resting ones, over their speed [s], from third differences."""
+    ratios = []
+    for push in pushes:
+        times, planar = push.object.times, push.object.planar[:, :2]
+        rests = rest_segments(push)
+        if len(times) < 30 or not rests:
+            continue
+        third = np.sqrt((np.diff(planar, 3, axis=0) ** 2).sum(axis=1) / 40.0)
+        still = np.zeros(len(times), dtype=bool)
+        for rest in rests:
+            still[rest] = True
+        resting, moving = still[:-3] & still[3:], ~still[:-3] & ~still[3:]
+        speed = np.linalg.norm(planar[3:] - planar[:-3], axis=1) / (times[3:] - times[:-3])
+        fast = moving & (speed > 0.05)
+        if resting.sum() < 8 or fast.sum() < 8:
+            continue
+        # Medians, since a touch and a brake are sharp too.
+        extra = np.median(third[fast]) ** 2 - np.median(third[resting]) ** 2
+        # Jitter of neighbouring stamps adds like white noise of speed times jitter.
+        ratios.append(extra * 1.44 / float(np.median(speed[fast])) ** 2)
+    return math.sqrt(max(0.0, float(np.median(ratios)))) if len(ratios) >= 3 else 0.0

@@ -1,0 +1,95 @@
+"""The plain cell, fitted: greedy entropy search for a start, the numerics guard, Gauss-Newton."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.cell import CellConfig
+from physid_drake.diagnose.case import Case
+from physid_drake.diagnose.fit import Fitted, Fitter, State
+from physid_drake.identify.problem import spec_of
+from physid_drake.identify.rollouts import RolloutPool
+from physid_drake.search import GreedyEntropySearch, search_minimum
+
+Array = NDArray[np.float64]
+Tick = Callable[[str, int, int], None]
+
+CANDIDATES = 300
+BUDGET = 24
+SOME_PUSHES = 6  # the search needs a start, not an answer
+
+
+def search_theta(case: Case, rng: np.random.Generator, tick: Tick) -> Array:
+    """A start (d,) in the unit cube, by greedy entropy search over a part of the pushes."""
+    fitter, space = Fitter(case), case.thetas.space
+    some = np.unique(np.linspace(0, len(case.problems) - 1, min(SOME_PUSHES, len(case.problems))).round().astype(int))
+
+    def objective(thetas: Array) -> Array:
+        errors = []
+        for theta in thetas:
+            state = fitter.start(np.asarray(space.to_unit(theta)))
+            vectors = fitter.vectors([fitter.task(state, int(i)) for i in some])
+            squares = [np.mean((v - case.features[i].recorded) ** 2) for v, i in zip(vectors, some, strict=True)]
+            errors.append(0.5 * np.log(np.mean(squares)))
+        return np.array(errors)
+
+    candidates = space.sample(rng, CANDIDATES, from_prior=True)
+    # Where people would start by hand is a candidate too.
+    candidates[0] = space.nominal
+    found = search_minimum(
+        objective, space, candidates, GreedyEntropySearch(), budget=BUDGET, rng=rng,
+        on_trial=lambda belief: tick("greedy entropy search", belief.n_trials, BUDGET),
+    )  # fmt: skip
+    return np.asarray(space.to_unit(found.theta_best))
+
+
+def numerics(case: Case, state: State) -> tuple[Array, ...]:
+    """Per push (m, 2): how the rollout changes with half the time step and with the other contact model.
+
+    The cell's own error has about the shape and the size of these; each push has an unknown multiple of them.
+    """
+    fitter = Fitter(case)
+    base = fitter.vectors([fitter.task(state, i) for i in range(len(case.problems))])
+    columns: list[list[Array]] = [[] for _ in case.problems]
+    for config in (_half_step(case.config), _other_contact(case.config)):
+        pool = RolloutPool(spec_of(case.recording, config), case.thetas, jobs=case.pool.jobs)
+        other = Fitter(dc.replace(case, pool=pool))
+        vectors = other.vectors([other.task(state, i) for i in range(len(case.problems))])
+        case.pool.count += pool.count
+        for own, changed, plain in zip(columns, vectors, base, strict=True):
+            own.append(changed - plain)
+    return tuple(np.column_stack(own) for own in columns)
+
+
+def _half_step(config: CellConfig) -> CellConfig:
+    solver = config.solver
+    halved = dc.replace(
+        solver, time_step_s=0.5 * solver.time_step_s, slide_time_step_s=0.5 * solver.slide_time_step_s
+    )  # fmt: skip
+    return dc.replace(config, solver=halved)
+
+
+def _other_contact(config: CellConfig) -> CellConfig:
+    other = "point" if config.contact.model == "hydroelastic" else "hydroelastic"
+    return dc.replace(config, contact=dc.replace(config.contact, model=other))
+
+
+def coarse(case: Case) -> Case:
+    """The case on ticks twice as long: good enough for what a small change does, and twice as fast."""
+    solver = case.config.solver
+    doubled = dc.replace(
+        solver, time_step_s=2.0 * solver.time_step_s, slide_time_step_s=2.0 * solver.slide_time_step_s
+    )  # fmt: skip
+    config = dc.replace(case.config, solver=doubled)
+    return dc.replace(case, pool=RolloutPool(spec_of(case.recording, config), case.thetas, jobs=case.pool.jobs))
+
+
+def fit_plain(case: Case, rng: np.random.Generator, tick: Tick) -> Fitted:
+    """The plain cell fitted, without guard and tolerances."""
+    u = search_theta(case, rng, tick)
+    fitter = Fitter(case)
+    return fitter.fit(fitter.start(u), rounds=6, careful=2, say=lambda text: tick(f"plain fit, {text}", 0, 0))

@@ -1,0 +1,284 @@
+"""Score tests of the whole catalogue: what each effect would change, against what is left over.
+
+One or a few rollouts per effect and push give its signature at the null; what theta and the pushes' own unknowns can
+imitate is projected out of it. How many independent looks the catalogue amounts to comes from pushes drawn from the
+fitted model and refitted, in the same linear algebra.
+"""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from physid_drake.diagnose.fit import EffectPoint, Fitted, Fitter
+from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve
+from physid_drake.effects import Effect, Family
+from physid_drake.identify.rollouts import Task
+
+Array = NDArray[np.float64]
+Tick = Callable[[int, int], None]
+
+DRAWS = 1000
+ALIKE = 0.95  # cosine of two projected signatures that these pushes cannot tell apart
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Signature:
+    """What one family of one effect changes, per push, in units of its chart's steps.
+
+    Attributes:
+        kind: the effect.
+        family: where in its chart.
+        columns: per push (m, p).
+        one_sided: (p,) whether a direction may only be followed forwards.
+    """
+
+    kind: type[Effect]
+    family: Family
+    columns: tuple[Array, ...]
+    one_sided: tuple[bool, ...]
+
+    @property
+    def steps(self) -> int:
+        """Number of directions."""
+        return len(self.family.free)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Score:
+    """How much one family explains.
+
+    Attributes:
+        signature: the family's.
+        kept: indices of its directions that may be used (one-sided ones only if their sign is right).
+        coefficients: (p,) best steps; 0 in directions not kept.
+        gain: twice the gain in log likelihood.
+        log_p: of that gain, chi-square with as many degrees of freedom as directions.
+    """
+
+    signature: Signature
+    kept: tuple[int, ...]
+    coefficients: Array
+    gain: float
+    log_p: float
+
+    @property
+    def kind(self) -> type[Effect]:
+        """The effect."""
+        return self.signature.kind
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Screening:
+    """All score tests.
+
+    Attributes:
+        scores: the best family of each effect, best first.
+        p_value: of the best, the whole catalogue having been looked at.
+        looks: how many independent effects the catalogue amounts to, from draws of the fitted model.
+    """
+
+    scores: tuple[Score, ...]
+    p_value: float
+    looks: float
+
+    def score_of(self, name: str) -> Score | None:
+        """The score of an effect."""
+        return next((s for s in self.scores if s.kind.name == name), None)
+
+
+def signatures(
+    fitter: Fitter, fitted: Fitted, kinds: Sequence[type[Effect]], tick: Tick | None = None
+) -> list[Signature]:
+    """The signatures of effects at a fitted model, its own effects staying where they are.
+
+    Args:
+        fitter: makes the rollouts; that of a coarse case will do.
+        fitted: the model.
+        kinds: the effects.
+        tick: told how many rollouts are done, and of how many.
+    """
+    case, state = fitter.case, fitted.state
+    base = fitter.vectors([fitter.task(state, i) for i in range(len(case.problems))])
+    present = [e.effect(case) for e in state.effects]
+    plan: list[tuple[int, int, int, float]] = []  # signature, push, direction, step's sign and size in steps
+    tasks: list[Task] = []
+    wanted = [(kind, family) for kind in kinds for family in kind.families(case.around)]
+    for s, (kind, family) in enumerate(wanted):
+        chart = kind.chart(case.around)
+        for i in range(len(case.problems)):
+            if not _reaches(fitter, kind, family, i):
+                continue
+            for d, j in enumerate(family.free):
+                for sign in (1.0, -1.0) if family.central else (1.0,):
+                    point = np.array(family.point)
+                    point[j] += sign * chart[j].step
+                    plan.append((s, i, d, sign))
+                    tasks.append(fitter.task(state, i, effects=[*present, kind.at(point, case.around)]))
+    vectors: list[Array] = []
+    for k in range(0, len(tasks), 64):
+        vectors += fitter.vectors(tasks[k : k + 64])
+        if tick is not None:
+            tick(min(k + 64, len(tasks)), len(tasks))
+    columns = [
+        [np.zeros((len(f.recorded), len(family.free))) for f in case.features] for _, family in wanted
+    ]  # fmt: skip
+    for (s, i, d, sign), vector in zip(plan, vectors, strict=True):
+        if wanted[s][1].central:
+            columns[s][i][:, d] += 0.5 * sign * vector
+        else:
+            columns[s][i][:, d] = vector - base[i]
+    return [
+        Signature(kind=kind, family=family, columns=tuple(c), one_sided=_one_sided(fitter, kind, family))
+        for (kind, family), c in zip(wanted, columns, strict=True)
+    ]
+
+
+def _one_sided(fitter: Fitter, kind: type[Effect], family: Family) -> tuple[bool, ...]:
+    chart = kind.chart(fitter.case.around)
+    return tuple(chart[j].lower >= family.point[j] for j in family.free)
+
+
+def _reaches(fitter: Fitter, kind: type[Effect], family: Family, i: int) -> bool:
+    """Whether an effect in one place can be felt in a push: a patch that the object never covers cannot."""
+    if kind.name != "friction_patch":
+        return True
+    patch = kind.at(np.array(family.point), fitter.case.around)
+    problem, around = fitter.case.problems[i], fitter.case.around
+    places = np.vstack([np.array(problem.start.pose[:2]), problem.poses[:, :2]])
+    away = np.hypot(places[:, 0] - getattr(patch, "x"), places[:, 1] - getattr(patch, "y"))  # noqa: B009
+    half_diagonal = 0.5 * float(np.hypot(*around.size))
+    return bool(away.min() < getattr(patch, "radius") * 1.3 + half_diagonal + 0.02)  # noqa: B009
+
+
+def tolerances(fitter: Fitter, found: Sequence[Signature]) -> tuple[Array, ...]:
+    """Per push (m, t): what all pushes may share without its being physics, one standard deviation each."""
+    chosen = []
+    for s in found:
+        chart = s.kind.chart(fitter.case.around)
+        for d, j in enumerate(s.family.free):
+            if chart[j].tolerance > 0.0:
+                chosen.append((s, d, chart[j].tolerance / chart[j].step))
+    count = len(fitter.case.problems)
+    empty = [np.zeros((len(f.recorded), 0)) for f in fitter.case.features]
+    return tuple(
+        np.column_stack([empty[i], *(share * s.columns[i][:, d] for s, d, share in chosen)]) for i in range(count)
+    )
+
+
+def extended(pushes: Sequence[LinearPush], columns: Sequence[Array]) -> tuple[LinearPush, ...]:
+    """The pushes with further shared columns."""
+    return tuple(
+        dc.replace(push, shared=np.column_stack([push.shared, more]))
+        for push, more in zip(pushes, columns, strict=True)
+    )
+
+
+def score(fitted: Fitted, signature: Signature) -> Score:
+    """The score test of one family: the gain in likelihood, theta, scatter and the pushes' unknowns refitted."""
+    kept = list(range(signature.steps))
+    coefficients = np.zeros(signature.steps)
+    while kept:
+        pushes = extended(fitted.pushes, [c[:, kept] for c in signature.columns])
+        mean = np.concatenate([fitted.prior_mean, np.zeros(len(kept))])
+        std = np.concatenate([fitted.prior_std, np.full(len(kept), np.inf)])
+        scatter, value = best_scatter(pushes, mean, std)
+        beta = solve(Whitened.of(pushes, scatter), mean, std).beta[len(fitted.prior_mean) :]
+        wrong = [k for k, b in zip(kept, beta, strict=True) if signature.one_sided[k] and b < 0.0]
+        if not wrong:
+            coefficients[kept] = beta
+            gain = max(0.0, 2.0 * (value - fitted.score))
+            log_p = log_probability(gain, len(kept), len(pushes), fitted.own_dimension)
+            return Score(
+                signature=signature, kept=tuple(kept), coefficients=coefficients, gain=gain, log_p=log_p
+            )  # fmt: skip
+        kept = [k for k in kept if k not in wrong]
+    return Score(signature=signature, kept=(), coefficients=coefficients, gain=0.0, log_p=0.0)
+
+
+def log_probability(gain: float, directions: int, pushes: int, spent: int) -> float:
+    """Log p-value of a gain in twice the log likelihood, with the push as the unit.
+
+    Friction scatters from push to push, so that a gain is a ratio of variances between pushes and follows an F
+    distribution with few degrees of freedom rather than a chi-square one.
+    """
+    free = max(1, pushes - spent - directions)
+    ratio = np.expm1(min(gain / pushes, 500.0)) * free / directions
+    return float(max(stats.f.logsf(ratio, directions, free), -700.0))
+
+
+def screen(fitted: Fitted, found: Sequence[Signature], rng: np.random.Generator) -> Screening:
+    """All score tests, and the distribution of the best of them where the fitted model is true."""
+    best: dict[str, Score] = {}
+    for signature in found:
+        one = score(fitted, signature)
+        name = signature.kind.name
+        if name not in best or one.log_p < best[name].log_p:
+            best[name] = one
+    scores = tuple(sorted(best.values(), key=lambda s: s.log_p))
+    null = _null_draws(fitted, found, rng)
+    # As many independent looks as give the draws' median of the smallest p.
+    looks = max(1.0, float(np.log(2.0) / np.exp(np.median(null))))
+    seen = scores[0].log_p if scores else 0.0
+    p_value = float(-np.expm1(looks * np.log1p(-np.exp(min(seen, -1e-12)))))
+    return Screening(scores=scores, p_value=p_value, looks=looks)
+
+
+def _null_draws(fitted: Fitted, found: Sequence[Signature], rng: np.random.Generator) -> Array:
+    """Smallest log p (draws,) over all families, in draws of white noise with theta refitted."""
+    theta, blocks = projected(fitted, [s.columns for s in found])
+    draws = rng.standard_normal((theta.shape[0], DRAWS))
+    draws -= theta @ (theta.T @ draws)
+    best = np.zeros(DRAWS)
+    for signature, block in zip(found, blocks, strict=True):
+        q, r = np.linalg.qr(block)
+        told = np.abs(np.diag(r)) > 1e-9
+        if not told.any():
+            continue
+        part = (q[:, told] * np.sign(np.diag(r)[told])).T @ draws
+        if signature.steps == 1 and signature.one_sided[0]:
+            part = np.maximum(part, 0.0)
+        best = np.minimum(best, stats.chi2.logsf((part**2).sum(axis=0), int(told.sum())))
+    return best
+
+
+def projected(fitted: Fitted, columns: Sequence[Sequence[Array]]) -> tuple[Array, list[Array]]:
+    """Whitened signatures without what theta and the pushes' unknowns imitate.
+
+    Args:
+        fitted: the model.
+        columns: per signature, per push (m, p).
+
+    Returns:
+        An orthonormal basis (M, d) of theta's directions, and per signature (M, p).
+    """
+    count = fitted.pushes[0].shared.shape[1]
+    stacked = [np.column_stack([c[i] for c in columns]) for i in range(len(fitted.pushes))]
+    x = Whitened.of(extended(fitted.pushes, stacked), fitted.state.scatter).x
+    theta, _ = np.linalg.qr(x[:, :count])
+    rest = x[:, count:] - theta @ (theta.T @ x[:, count:])
+    edges = np.cumsum([c[0].shape[1] for c in columns])[:-1]
+    return theta, np.split(rest, edges, axis=1)
+
+
+def cosine(fitted: Fitted, first: Score, second: Score) -> float:
+    """Cosine between two fitted signatures, theta and the pushes' unknowns projected out."""
+    columns = [[(c @ one.coefficients)[:, None] for c in one.signature.columns] for one in (first, second)]
+    _, (a, b) = projected(fitted, columns)
+    norms = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float((a * b).sum()) / norms if norms > 0.0 else 0.0
+
+
+def start_of(fitter: Fitter, one: Score) -> EffectPoint:
+    """The chart point that a score test suggests; a fit may then move all coordinates."""
+    chart = one.kind.chart(fitter.case.around)
+    family = one.signature.family
+    origin = np.array(family.point)
+    point = origin.copy()
+    for j, c in zip(family.free, one.coefficients.tolist(), strict=True):
+        point[j] = float(np.clip(point[j] + c * chart[j].step, chart[j].lower, chart[j].upper))
+    return EffectPoint(kind=one.kind, point=point, free=tuple(range(len(chart))), origin=origin)

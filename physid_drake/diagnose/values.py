@@ -1,0 +1,149 @@
+"""What a diagnosis says."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from typing import Any
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class ParameterEstimate:
+    """One parameter of an effect: value, unit, 90 % interval, null value (None for what only shapes the effect)."""
+
+    value: Any
+    unit: str
+    ci90: Any
+    null: Any
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class EffectFinding:
+    """An effect that was found.
+
+    Attributes:
+        name, element: as in the catalogue.
+        indistinguishable_from: names of effects that explain these pushes as well.
+        probability: that the name is right, among those of the catalogue.
+        parameters: by name.
+        statement: one sentence.
+    """
+
+    name: str
+    element: str
+    indistinguishable_from: tuple[str, ...]
+    probability: float
+    parameters: dict[str, ParameterEstimate]
+    statement: str
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Window:
+    """A part of a push: file, start and end [s]."""
+
+    push: str
+    start: float
+    end: float
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Location:
+    """Where simulation and recording part.
+
+    Attributes:
+        statement: a sentence that a person can check.
+        phase: of ``contact``, ``free_slide``.
+        dof: of ``along_motion``, ``across_motion``, ``rotation``.
+        frame: in which what is missing is constant.
+        windows: where it is largest.
+    """
+
+    statement: str
+    phase: tuple[str, ...]
+    dof: tuple[str, ...]
+    frame: str
+    windows: tuple[Window, ...]
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class FitQuality:
+    """How well pushes are predicted that were left out of the fit, before and after; lengths in m, angles in rad."""
+
+    rms_before: float
+    rms_after: float
+    position_before: float
+    position_after: float
+    rotation_before: float
+    rotation_after: float
+    log_score_gain: float
+    log_score_gain_se: float
+    per_push: tuple[tuple[str, float, float], ...]
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class ThetaEstimate:
+    """One parameter of theta; value None where these pushes cannot tell it."""
+
+    value: float | None
+    unit: str
+    ci90: tuple[float, float] | None
+    identifiable: bool
+    before: float
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Ranked:
+    """One effect in the ranking: gain of the score test, held-out gain if it was fitted, and why it lost."""
+
+    name: str
+    gain: float
+    p_value: float
+    held_out_gain: float | None
+    held_out_se: float | None
+    why: str
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Detectable:
+    """The smallest effect that these pushes would have shown: parameter, value, unit, motion in sigmas."""
+
+    name: str
+    parameter: str
+    value: float
+    unit: str
+    sigmas: float
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class NextPush:
+    """The push that would tell the rivals apart, or that would teach most."""
+
+    direction_deg: float
+    speed_mps: float
+    contact_offset_m: float
+    settles_with_probability: float
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Diagnosis:
+    """The answer."""
+
+    recording: str
+    verdict: str
+    sentence: str
+    p_value: float
+    alpha: float
+    effects: tuple[EffectFinding, ...]
+    location: Location | None
+    fit: FitQuality
+    theta: dict[str, ThetaEstimate]
+    next_push: NextPush | None
+    seed: int
+    ranking: tuple[Ranked, ...]
+    detectable: tuple[Detectable, ...]
+    left: str
+    reduced_chi2_before: float
+    reduced_chi2_after: float
+    friction_scatter: float
+    noise: dict[str, Any]
+    warnings: tuple[str, ...]
+    rollouts: int

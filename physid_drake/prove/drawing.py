@@ -1,0 +1,563 @@
+"""Draws worlds: objects, pushes as people make them, sensors; and effects with one strength to be set. SI units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from physid_drake.errors import RecordingError
+from physid_drake.prove import world_effects as fx
+from physid_drake.prove.mujoco_world import (
+    GRAVITY,
+    Array,
+    Effect,
+    HandPath,
+    Plan,
+    Pose,
+    Solid,
+    feet_of,
+    height_of,
+    outline_of,
+    plan_size,
+    weighted_feet,
+)
+from physid_drake.recording import Box, Cylinder, Prism, polygon_centroid
+
+Rng: TypeAlias = np.random.Generator
+
+LEAD: Final = 0.2
+"""s of rest before the hand moves."""
+SPREAD: Final = 0.15
+"""m; start places are within this of the origin, along x and y."""
+TABLE_SIZE: Final = (1.6, 1.4)
+_SPEEDS: Final = (0.05, 0.5)
+_SHORTEST_PUSH: Final = 0.15  # s from the touch to the brake
+_LONGEST_PUSH: Final = 0.8
+_ARM: Final = 0.3  # m; about as far from the origin as objects get
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrawnPush:
+    """One push: start ``pose`` of B, what the recording says of the tip, and its own friction factor."""
+
+    pose: Pose
+    path: HandPath
+    friction_factor: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """Standard deviations of one sample, and how streams fail.
+
+    Attributes:
+        position: of the object [m].
+        rotation: of the object [rad].
+        hand: of the tip [m].
+        correlation: of object noise from sample to sample.
+        force: N; None where it is not measured.
+        jitter: a stamp differs from the true time by up to this [s].
+        dropout: share of object samples that are missing.
+        friction_scatter: relative, from push to push.
+    """
+
+    position: float
+    rotation: float
+    hand: float
+    correlation: float
+    force: float | None
+    jitter: float
+    dropout: float
+    friction_scatter: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """A world without effects, and how it is recorded.
+
+    Attributes:
+        plan: the plain cell.
+        pushes: in order.
+        noise: of the sensors.
+        rate: of samples [Hz].
+        commanded: whether the hand columns are said to be commanded.
+        sensors_stated: whether the recording states its sensors' deviations.
+        stated_mass: what a scale said [kg]; None: unknown.
+    """
+
+    plan: Plan
+    pushes: tuple[DrawnPush, ...]
+    noise: Noise
+    rate: float
+    commanded: bool
+    sensors_stated: bool
+    stated_mass: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Knob:
+    """An effect whose strength is still to be set: nothing at 0, the most that is plausible at ``limit``."""
+
+    at: Callable[[float], Effect]
+    limit: float
+
+
+# ------------------------------------------------------------------------------------------------------------ scenes
+
+
+def draw_scene(rng: Rng) -> Scene:
+    """A world without effects."""
+    shape, mass = _draw_object(rng)
+    most = min(0.5, 0.9 * _friction_that_lifts(shape))
+    plan = Plan(
+        shape=shape,
+        mass=mass,
+        support_friction=float(rng.uniform(0.15, most)),
+        hand_friction=float(rng.uniform(0.1, 0.5)),
+        tip_radius=float(rng.uniform(0.005, 0.012)),
+        tip_height=height_of(shape) / 2.0,
+    )
+    noise = _draw_noise(rng)
+    rate = float(rng.choice([100.0, 200.0]))
+    scale = float(1.0 + 0.01 * rng.standard_normal())
+    stated_mass = round(mass * scale, 5) if rng.random() < 0.8 else None
+    commanded, sensors_stated = bool(rng.random() < 0.5), bool(rng.random() < 0.5)
+    pushes = tuple(_draw_push(rng, plan, noise.friction_scatter) for _ in range(int(rng.integers(8, 21))))
+    return Scene(
+        plan=plan,
+        pushes=pushes,
+        noise=noise,
+        rate=rate,
+        commanded=commanded,
+        sensors_stated=sensors_stated,
+        stated_mass=stated_mass,
+    )
+
+
+def _draw_object(rng: Rng) -> tuple[Solid, float]:
+    """Shape and mass [kg] of one whose base stays loaded at a friction of 0.2 at least."""
+    while True:
+        kind = rng.choice(["eraser", "box", "book", "disc", "triangle", "pentagon"])
+        mass = float(np.exp(rng.uniform(math.log(0.05), math.log(1.0))))
+        shape: Solid
+        if kind == "eraser":
+            shape, mass = Box(size=(0.127, 0.051, 0.030)), 0.054
+        elif kind == "box":
+            shape = Box(size=(0.10, 0.08, 0.06))
+        elif kind == "book":
+            shape = Box(size=(0.22, 0.15, 0.03))
+        elif kind == "disc":
+            radius = round(float(rng.uniform(0.033, 0.05)), 4)
+            shape = Cylinder(radius=radius, length=round(radius * float(rng.uniform(0.8, 1.5)), 4), axis="z")
+        else:
+            shape = _draw_prism(rng, 3 if kind == "triangle" else 5)
+        if _friction_that_lifts(shape) > 0.22:
+            return shape, mass
+
+
+def _draw_prism(rng: Rng, corners: int) -> Prism:
+    while True:
+        angles = 2.0 * math.pi * (np.arange(corners) + rng.uniform(-0.18, 0.18, corners)) / corners
+        radii = rng.uniform(0.05, 0.075, corners) if corners == 3 else rng.uniform(0.045, 0.06) * np.ones(corners)
+        polygon = np.round(radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)]), 4)
+        polygon = np.round(polygon - polygon_centroid(polygon), 6)
+        try:
+            return Prism(polygon=tuple((x, y) for x, y in polygon.tolist()), height=round(rng.uniform(0.03, 0.05), 3))
+        except RecordingError:
+            continue  # not convex
+
+
+def _friction_that_lifts(shape: Solid) -> float:
+    """Least friction that lifts an edge of a uniform object pushed at half its height, or sliding."""
+    feet, weights = feet_of(shape)
+    spread = np.linalg.inv((feet * weights[:, None]).T @ feet)
+    return 1.0 / (height_of(shape) / 2.0 * float(np.linalg.norm(feet @ spread, axis=1).max()))
+
+
+def stays_loaded(plan: Plan) -> bool:
+    """Whether every foot carries weight, at rest and sliding any way."""
+    feet, weights = weighted_feet(plan)
+    columns = np.column_stack([np.ones(len(feet)), feet])
+    moments = (columns * weights[:, None]).T @ columns
+    if np.linalg.cond(moments) > 1e12:
+        return False
+    shift = 1.05 * plan.support_friction * height_of(plan.shape) / 2.0
+    ways = [(math.cos(a), math.sin(a)) for a in np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False).tolist()]
+    centres = np.array([[1.0, plan.com[0] + shift * c, plan.com[1] + shift * s] for c, s in ways])
+    return bool((columns @ np.linalg.solve(moments, centres.T)).min() > 0.0)
+
+
+def _draw_noise(rng: Rng) -> Noise:
+    level = float(rng.uniform())
+    turned = min(1.0, max(0.0, level + 0.25 * float(rng.standard_normal())))
+    correlated, forced, jittery, lossy = rng.random(4) < [1.0 / 3.0, 0.25, 0.25, 0.25]
+    correlation, dropout = float(rng.uniform(0.3, 0.9)), float(rng.uniform(0.01, 0.05))
+    return Noise(
+        position=1e-4 * 10.0**level,
+        rotation=1e-3 * 10.0**turned,
+        hand=float(rng.uniform(3e-5, 1e-4)),
+        correlation=correlation if correlated else 0.0,
+        force=0.02 if forced else None,
+        jitter=5e-4 if jittery else 0.0,
+        dropout=dropout if lossy else 0.0,
+        friction_scatter=float(rng.uniform(0.01, 0.05)),
+    )
+
+
+def _draw_push(rng: Rng, plan: Plan, scatter: float) -> DrawnPush:
+    """Rest, ramp, touch, constant speed that may turn a little, brake, rest."""
+    place, yaw = rng.uniform(-SPREAD, SPREAD, 2), float(rng.uniform(-math.pi, math.pi))
+    factor = max(0.5, 1.0 + scatter * float(rng.standard_normal()))
+    brake = float(rng.uniform(0.03, 0.08))
+    slowest = _SPEEDS[0]
+    if rng.random() < 0.75:  # to be released: the brake is harder than friction's
+        brake = min(brake, 0.45 / (1.3 * plan.support_friction * GRAVITY))
+        slowest = max(slowest, 1.3 * plan.support_friction * GRAVITY * brake)
+    speed = float(np.exp(rng.uniform(math.log(slowest), math.log(max(slowest, _SPEEDS[1])))))
+    touch, inward = _draw_contact(rng, plan)
+    heading = math.radians(rng.uniform(-25.0, 25.0))
+    bend = math.radians(rng.uniform(-25.0, 25.0)) if rng.random() < 0.3 else 0.0
+    run_up = float(rng.uniform(0.008, 0.020)) / math.cos(heading)
+    ramp = min(2.0 * float(rng.uniform(0.5, 0.9)) * run_up / speed, 0.15)
+    length = float(rng.uniform(0.03, 0.10))
+    contact = min(_LONGEST_PUSH, max(_SHORTEST_PUSH, length / speed))
+    first = (run_up - speed * ramp / 2.0) / speed
+    angle = math.atan2(inward[1], inward[0]) + heading + yaw
+    ahead, bent = (np.array([math.cos(a), math.sin(a)]) for a in (angle, angle + bend))
+    c, s = math.cos(yaw), math.sin(yaw)
+    at_touch = place + np.array([[c, -s], [s, c]]) @ touch
+    path = HandPath(
+        times=np.cumsum([LEAD, ramp, first, contact, brake]),
+        start=at_touch - run_up * ahead,
+        velocities=speed * np.array([[0.0, 0.0], ahead, ahead, bent, [0.0, 0.0]]),
+    )
+    return DrawnPush(pose=(float(place[0]), float(place[1]), yaw), path=path, friction_factor=factor)
+
+
+def _draw_contact(rng: Rng, plan: Plan) -> tuple[Array, Array]:
+    """Place of the tip's centre at the touch, and the inward normal there (2,), in B."""
+    if isinstance(plan.shape, Cylinder):
+        angle = float(rng.uniform(-math.pi, math.pi))
+        inward = np.array([math.cos(angle), math.sin(angle)])
+        return -(plan.shape.radius + plan.tip_radius) * inward, inward
+    corners = outline_of(plan.shape)
+    edges = np.roll(corners, -1, axis=0) - corners
+    lengths = np.hypot(*edges.T)
+    k = int(rng.choice(len(corners), p=lengths / lengths.sum()))
+    inward = np.array([-edges[k, 1], edges[k, 0]]) / lengths[k]
+    aim = corners[k] + (0.5 + 0.3 * float(rng.uniform(-1.0, 1.0))) * edges[k]
+    return aim - plan.tip_radius * inward, inward
+
+
+# ----------------------------------------------------------------------------------------------------------- effects
+
+
+def draw_knob(name: str, rng: Rng, scene: Scene) -> Knob:
+    """The effect ``name`` with all but its strength drawn."""
+    return _KNOBS[name](rng, scene)
+
+
+def _hold(scene: Scene) -> float:
+    """Force that friction can hold [N]."""
+    return scene.plan.support_friction * scene.plan.mass * GRAVITY
+
+
+def _direction(rng: Rng) -> tuple[float, float, float]:
+    angle = float(rng.uniform(-math.pi, math.pi))
+    return angle, math.cos(angle), math.sin(angle)
+
+
+def _place(rng: Rng, reach: float) -> tuple[float, float]:
+    x, y = rng.uniform(-reach, reach, 2).tolist()
+    return x, y
+
+
+def _sign(rng: Rng) -> float:
+    return float(rng.choice([-1.0, 1.0]))
+
+
+def _stribeck(rng: Rng, scene: Scene) -> Knob:
+    speed = float(rng.uniform(0.02, 0.15))
+    return Knob(at=lambda a: fx.StribeckFriction(excess=a, speed=speed), limit=1.0)
+
+
+def _viscous(rng: Rng, scene: Scene) -> Knob:
+    return Knob(at=lambda a: fx.ViscousDrag(coefficient=a), limit=1.5 * _hold(scene) / 0.3)
+
+
+def _quadratic(rng: Rng, scene: Scene) -> Knob:
+    return Knob(at=lambda a: fx.QuadraticDrag(coefficient=a), limit=2.0 * _hold(scene) / 0.3**2)
+
+
+def _table_grain(rng: Rng, scene: Scene) -> Knob:
+    angle = float(rng.uniform(0.0, math.pi))
+    return Knob(at=lambda a: fx.AnisotropicTable(ratio=math.exp(a), angle=angle), limit=math.log(2.0))
+
+
+def _underside_grain(rng: Rng, scene: Scene) -> Knob:
+    angle = float(rng.uniform(0.0, math.pi))
+    return Knob(at=lambda a: fx.AnisotropicObject(ratio=math.exp(a), angle=angle), limit=math.log(2.0))
+
+
+def _patch(rng: Rng, scene: Scene) -> Knob:
+    (x, y), radius, sign = _place(rng, 0.1), float(rng.uniform(0.06, 0.13)), _sign(rng)
+    limit = math.log(2.0) if sign > 0 else -math.log(0.4)
+    return Knob(at=lambda a: fx.FrictionPatch(ratio=math.exp(sign * a), x=x, y=y, radius=radius), limit=limit)
+
+
+def _gradient(rng: Rng, scene: Scene) -> Knob:
+    _, c, s = _direction(rng)
+    return Knob(at=lambda a: fx.FrictionGradient(slope_x=a * c, slope_y=a * s), limit=2.2)
+
+
+def _drift(rng: Rng, scene: Scene) -> Knob:
+    sign = _sign(rng)
+    return Knob(at=lambda a: fx.FrictionDrift(per_push=sign * a), limit=0.6 / len(scene.pushes))
+
+
+def _tilt(rng: Rng, scene: Scene) -> Knob:
+    _, c, s = _direction(rng)
+    return Knob(at=lambda a: fx.TableTilt(x=a * c, y=a * s), limit=min(0.1, 0.5 * scene.plan.support_friction))
+
+
+def _support(rng: Rng, scene: Scene) -> Knob:
+    """A pattern of pressure that the object can stand on; otherwise another."""
+    while True:
+        pattern = _pressure_pattern(rng)
+        for limit in (0.95, 0.8):
+            knob = Knob(at=lambda a, p=pattern: fx.UnevenSupport(weights=_blend(p, a)), limit=limit)  # type: ignore[misc]
+            if stays_loaded(knob.at(limit).build(scene.plan)):
+                return knob
+
+
+def _pressure_pattern(rng: Rng) -> Array:
+    kind = rng.choice(["legs", "rim", "middle", "random"])
+    if kind == "legs":
+        return np.array([[1.0, 0.0, 1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 1.0]])
+    if kind == "rim":
+        return np.array([[1.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0]])
+    if kind == "middle":
+        return np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]])
+    return np.exp(rng.normal(0.0, 1.0, (3, 3)))
+
+
+def _blend(pattern: Array, share: float) -> tuple[tuple[float, ...], ...]:
+    weights = (1.0 - share) + share * pattern / pattern.mean()
+    return tuple(tuple(round(value, 6) for value in row) for row in weights.tolist())
+
+
+def _com(rng: Rng, scene: Scene) -> Knob:
+    _, c, s = _direction(rng)
+    knob = Knob(at=lambda a: fx.ComOffset(x=a * c, y=a * s), limit=0.2 * min(plan_size(scene.plan.shape)))
+    while not stays_loaded(knob.at(knob.limit).build(scene.plan)) and knob.limit > 1e-3:
+        knob = replace(knob, limit=0.9 * knob.limit)
+    return knob
+
+
+def _inertia(rng: Rng, scene: Scene) -> Knob:
+    sign = _sign(rng)
+    return Knob(at=lambda a: fx.RotationalInertia(ratio=math.exp(sign * a)), limit=math.log(2.2))
+
+
+def _slosh(rng: Rng, scene: Scene) -> Knob:
+    frequency, damping = float(rng.uniform(1.5, 5.0)), float(rng.uniform(0.03, 0.2))
+    return Knob(at=lambda a: fx.Sloshing(fraction=a, frequency=frequency, damping=damping), limit=0.4)
+
+
+def _tether(rng: Rng, scene: Scene) -> Knob:
+    (x, y), rest = _place(rng, 0.3), float(rng.choice([0.0, rng.uniform(0.0, 0.1)]))
+    limit = 0.6 * _hold(scene) / 0.4
+    return Knob(at=lambda a: fx.Tether(stiffness=a, x=x, y=y, rest_length=rest), limit=limit)
+
+
+def _magnet(rng: Rng, scene: Scene) -> Knob:
+    (x, y), core = _place(rng, 0.12), float(rng.uniform(0.03, 0.07))
+    limit = 0.8 * _hold(scene) * core**2
+    return Knob(at=lambda a: fx.Magnet(strength=a, x=x, y=y, core=core), limit=limit)
+
+
+def _bounce(rng: Rng, scene: Scene) -> Knob:
+    return Knob(at=lambda a: fx.Restitution(coefficient=a), limit=0.7)
+
+
+def _compliance(rng: Rng, scene: Scene) -> Knob:
+    damping = float(rng.uniform(0.1, 0.6))
+    return Knob(at=lambda a: fx.HandCompliance(compliance=a, damping=damping), limit=0.008 / _hold(scene))
+
+
+def _lag(rng: Rng, scene: Scene) -> Knob:
+    return Knob(at=lambda a: fx.ActuatorLag(time_constant=a), limit=0.08)
+
+
+def _hand_offset(rng: Rng, scene: Scene) -> Knob:
+    _, c, s = _direction(rng)
+    return Knob(at=lambda a: fx.HandOffset(x=a * c, y=a * s), limit=0.004)
+
+
+def _latency(rng: Rng, scene: Scene) -> Knob:
+    return Knob(at=lambda a: fx.TrackerLatency(delay=a), limit=0.08)
+
+
+def _bias(rng: Rng, scene: Scene) -> Knob:
+    (_, c, s), yaw = _direction(rng), float(rng.uniform(-8.0, 8.0))
+    limit = min(0.012, 0.2 * min(plan_size(scene.plan.shape)))
+    return Knob(at=lambda a: fx.TrackerBias(x=a * c, y=a * s, yaw=a * yaw), limit=limit)
+
+
+def _scale(rng: Rng, scene: Scene) -> Knob:
+    sign = _sign(rng)
+    return Knob(at=lambda a: fx.TrackerScale(ratio=1.0 + sign * a), limit=0.08)
+
+
+def _size(rng: Rng, scene: Scene) -> Knob:
+    sign = _sign(rng)
+    # A larger one must not reach the tip before it starts: run-ups are 8 mm at least.
+    limit = min(0.08, 0.005 / (max(plan_size(scene.plan.shape)) / 2.0))
+    return Knob(at=lambda a: fx.SizeError(ratio=1.0 + sign * a), limit=limit)
+
+
+def _ridges(rng: Rng, scene: Scene) -> Knob:
+    wave, angle, phase = float(rng.uniform(0.05, 0.15)), _direction(rng)[0], float(rng.uniform(0.0, 0.1))
+    return Knob(at=lambda a: fx.Ridges(depth=a, wavelength=wave, angle=angle, phase=phase), limit=0.7)
+
+
+def _adhesion(rng: Rng, scene: Scene) -> Knob:
+    length = float(rng.uniform(0.02, 0.08))
+    return Knob(at=lambda a: fx.Adhesion(excess=a, length=length), limit=1.5)
+
+
+def _warming(rng: Rng, scene: Scene) -> Knob:
+    sign, time = _sign(rng), float(rng.uniform(0.1, 0.4))
+    return Knob(at=lambda a: fx.Warming(share=sign * a, time=time), limit=0.6)
+
+
+def _ratchet(rng: Rng, scene: Scene) -> Knob:
+    angle = _direction(rng)[0]
+    return Knob(at=lambda a: fx.Ratchet(share=a, angle=angle), limit=0.5)
+
+
+def _heading(rng: Rng, scene: Scene) -> Knob:
+    angle = _direction(rng)[0]
+    return Knob(at=lambda a: fx.HeadingFriction(share=a, angle=angle), limit=0.5)
+
+
+def _lift(rng: Rng, scene: Scene) -> Knob:
+    sign = _sign(rng)
+    return Knob(at=lambda a: fx.Lift(coefficient=sign * a), limit=3.0 * _hold(scene) / (2.0 * 0.2))
+
+
+def _gust(rng: Rng, scene: Scene) -> Knob:
+    (_, c, s), begin = _direction(rng), float(rng.uniform(0.35, 0.5))
+    end = begin + float(rng.uniform(0.1, 0.2))
+    return Knob(at=lambda a: fx.Gust(x=a * c, y=a * s, begin=begin, end=end), limit=0.8 * _hold(scene))
+
+
+def _seam(rng: Rng, scene: Scene) -> Knob:
+    angle, offset, width = _direction(rng)[0], float(rng.uniform(-0.08, 0.08)), float(rng.uniform(0.01, 0.03))
+    limit = 1.4 * _hold(scene) * width
+    return Knob(at=lambda a: fx.Seam(energy=a, angle=angle, offset=offset, width=width), limit=limit)
+
+
+def _trough(rng: Rng, scene: Scene) -> Knob:
+    angle, limit = _direction(rng)[0], 0.7 * _hold(scene) / 0.2**3
+    return Knob(at=lambda a: fx.Trough(coefficient=a, angle=angle), limit=limit)
+
+
+def _rotor(rng: Rng, scene: Scene) -> Knob:
+    feet, weights = feet_of(scene.plan.shape)
+    sign, limit = _sign(rng), 0.6 * _hold(scene) * float(weights @ np.hypot(*feet.T))
+    return Knob(at=lambda a: fx.Rotor(torque=sign * a), limit=limit)
+
+
+def _swirl(rng: Rng, scene: Scene) -> Knob:
+    (x, y), sign = _place(rng, 0.05), _sign(rng)
+    return Knob(at=lambda a: fx.Swirl(coefficient=sign * a, x=x, y=y), limit=0.7 * _hold(scene) / _ARM)
+
+
+def _shaken_table(rng: Rng, scene: Scene) -> Knob:
+    frequency, angle = float(rng.uniform(8.0, 25.0)), _direction(rng)[0]
+    limit = 0.8 * scene.plan.support_friction * GRAVITY
+    return Knob(at=lambda a: fx.TableVibration(acceleration=a, frequency=frequency, angle=angle), limit=limit)
+
+
+def _turntable(rng: Rng, scene: Scene) -> Knob:
+    sign, limit = _sign(rng), math.sqrt(0.5 * scene.plan.support_friction * GRAVITY / _ARM)
+    return Knob(at=lambda a: fx.Turntable(rate=sign * a), limit=limit)
+
+
+def _shaken_hand(rng: Rng, scene: Scene) -> Knob:
+    frequency, angle = float(rng.uniform(6.0, 16.0)), _direction(rng)[0]
+    return Knob(at=lambda a: fx.HandVibration(amplitude=a, frequency=frequency, angle=angle), limit=0.003)
+
+
+def _clock(rng: Rng, scene: Scene) -> Knob:
+    sign = _sign(rng)
+    return Knob(at=lambda a: fx.HandClock(rate=sign * a), limit=0.08)
+
+
+def _backlash(rng: Rng, scene: Scene) -> Knob:
+    return Knob(at=lambda a: fx.HandBacklash(play=a), limit=0.008)
+
+
+def _perspective(rng: Rng, scene: Scene) -> Knob:
+    (x, y), sign = _place(rng, 0.1), _sign(rng)
+    return Knob(at=lambda a: fx.Perspective(coefficient=sign * a, x=x, y=y), limit=2.0)
+
+
+def _overshoot(rng: Rng, scene: Scene) -> Knob:
+    damping = float(rng.uniform(0.15, 0.6))
+    return Knob(at=lambda a: fx.TrackerOvershoot(period=a, damping=damping), limit=0.25)
+
+
+def _wobble(rng: Rng, scene: Scene) -> Knob:
+    angle = _direction(rng)[0]
+    return Knob(at=lambda a: fx.MarkerWobble(amplitude=a, angle=angle), limit=0.015)
+
+
+_KNOBS: Final[dict[str, Callable[[Rng, Scene], Knob]]] = {
+    "stribeck_friction": _stribeck,
+    "viscous_drag": _viscous,
+    "quadratic_drag": _quadratic,
+    "anisotropic_table": _table_grain,
+    "anisotropic_object": _underside_grain,
+    "friction_patch": _patch,
+    "friction_gradient": _gradient,
+    "friction_drift": _drift,
+    "table_tilt": _tilt,
+    "uneven_support": _support,
+    "com_offset": _com,
+    "rotational_inertia": _inertia,
+    "sloshing": _slosh,
+    "tether": _tether,
+    "magnet": _magnet,
+    "restitution": _bounce,
+    "hand_compliance": _compliance,
+    "actuator_lag": _lag,
+    "hand_offset": _hand_offset,
+    "tracker_latency": _latency,
+    "tracker_bias": _bias,
+    "tracker_scale": _scale,
+    "size_error": _size,
+    "other_ridges": _ridges,
+    "other_adhesion": _adhesion,
+    "other_warming": _warming,
+    "other_ratchet": _ratchet,
+    "other_heading_friction": _heading,
+    "other_lift": _lift,
+    "other_gust": _gust,
+    "other_seam": _seam,
+    "other_trough": _trough,
+    "other_rotor": _rotor,
+    "other_swirl": _swirl,
+    "other_table_vibration": _shaken_table,
+    "other_turntable": _turntable,
+    "other_hand_vibration": _shaken_hand,
+    "other_hand_clock": _clock,
+    "other_hand_backlash": _backlash,
+    "other_perspective": _perspective,
+    "other_tracker_overshoot": _overshoot,
+    "other_marker_wobble": _wobble,
+}

@@ -1,0 +1,414 @@
+"""Makes sealed worlds: recordings that tell nothing, and apart from them the truth, under a hash.
+
+``python -m physid_drake.prove.make --worlds 20 --seed 0 --out FOLDER`` writes ``recordings/<id>/``,
+``sealed/<id>.json`` and ``seal.sha256``. The same seed gives the same bytes; worlds that exist are skipped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import math
+import shutil
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Final, Literal, TypeAlias, get_args
+
+import numpy as np
+
+from physid_drake.errors import ParameterError, PhysidError
+from physid_drake.prove.drawing import TABLE_SIZE, Knob, Noise, Rng, Scene, draw_knob, draw_scene
+from physid_drake.prove.mujoco_world import (
+    RESIDUAL_RESTITUTION,
+    Array,
+    Effect,
+    Motion,
+    PushWorld,
+    height_of,
+)
+from physid_drake.prove.world_effects import CATALOGUED, OTHERS, parameters_of
+from physid_drake.recording import (
+    ForceStream,
+    Hand,
+    ObjectModel,
+    PoseStream,
+    Push,
+    Recording,
+    Sensors,
+    Table,
+    write_recording,
+)
+
+Kind: TypeAlias = Literal["none", "effect", "other", "pair"]
+KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
+BLOCK: Final[tuple[Kind, ...]] = ("none",) * 5 + ("effect",) * 10 + ("other",) * 3 + ("pair",) * 2
+"""Each twenty worlds are these, shuffled."""
+SIZES: Final = (2.0, 30.0)
+"""Drawn sizes of effects, in standard deviations of the tracker."""
+SMALLEST_SIZE: Final = 1.0
+"""A world whose effect cannot reach this within its bounds is drawn anew, a few times."""
+
+_CALIBRATION_PUSHES: Final = 4
+_CALIBRATION_ROUNDS: Final = 3
+_ATTEMPTS: Final = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assignment:
+    """What world ``index`` shall be: its kind, and the names of its effects."""
+
+    index: int
+    kind: Kind
+    effects: tuple[str, ...]
+
+
+def assign(index: int, seed: int, kind: Kind | None = None, effect: str | None = None) -> Assignment:
+    """The mix: a quarter nothing, half one effect of the catalogue in turn, the rest others and pairs.
+
+    Args:
+        index: of the world.
+        seed: of the whole set.
+        kind: instead of the mix.
+        effect: instead of taking effects in turn; for a pair, its first.
+    """
+    block, within = divmod(index, len(BLOCK))
+    kinds = [BLOCK[k] for k in np.random.default_rng([seed, block, 1]).permutation(len(BLOCK)).tolist()]
+    if effect is not None and kind is None:
+        kind = "effect" if effect in CATALOGUED else "other"
+    chosen = kinds[within] if kind is None else kind
+    turn = index if kind is not None else block * BLOCK.count(chosen) + kinds[:within].count(chosen)
+    if chosen == "none":
+        return Assignment(index=index, kind=chosen, effects=())
+    pool = list(OTHERS if chosen == "other" else CATALOGUED)
+    order = np.random.default_rng([seed, 2, chosen == "other"]).permutation(len(pool)).tolist()
+    first = effect if effect is not None else pool[order[turn % len(pool)]]
+    if first not in pool:
+        raise ParameterError(f"no effect {first!r} of kind {chosen}; there are {', '.join(pool)}.")
+    if chosen != "pair":
+        return Assignment(index=index, kind=chosen, effects=(first,))
+    rest = [name for name in pool if name != first]
+    second = rest[int(np.random.default_rng([seed, index, 3]).integers(len(rest)))]
+    return Assignment(index=index, kind=chosen, effects=(first, second))
+
+
+def world_id(index: int, seed: int) -> str:
+    """Eight hex digits that tell nothing."""
+    return hashlib.sha256(f"world {seed} {index}".encode()).hexdigest()[:8]
+
+
+def make_world(
+    index: int, seed: int, kind: Kind | None = None, effect: str | None = None
+) -> tuple[Recording, dict[str, object]]:
+    """One recording, and the truth about it.
+
+    Args:
+        index: of the world.
+        seed: of the whole set.
+        kind: none, effect, other or pair; None: by the mix.
+        effect: name of the effect; None: in turn.
+    """
+    chosen = assign(index, seed, kind, effect)
+    for attempt in range(_ATTEMPTS):
+        rng = np.random.default_rng([seed, index, 4, attempt])
+        scene = draw_scene(rng)
+        effects, sizes = _draw_effects(rng, scene, chosen.effects)
+        if all(size >= SMALLEST_SIZE for size in sizes):
+            break
+    motions = simulate(scene, effects)
+    size = _difference(scene, motions, simulate(scene, ())) if effects else 0.0
+    name = world_id(index, seed)
+    pushes = [_record(rng, scene, k, motion) for k, motion in enumerate(motions)]
+    recording = _recording(name, scene, [push for push, _ in pushes], _lags(effects))
+    truth = _truth(chosen, seed, scene, effects, sizes, size, motions, [poses for _, poses in pushes])
+    return recording, {"id": name} | truth
+
+
+def _lags(effects: Sequence[Effect]) -> bool:
+    return any(effect.name == "actuator_lag" for effect in effects)
+
+
+# -------------------------------------------------------------------------------------------------- effects' strength
+
+
+def simulate(scene: Scene, effects: Sequence[Effect], which: Sequence[int] | None = None) -> list[Motion]:
+    """Noise-free motions of some pushes of a scene, or of all."""
+    world = PushWorld(scene.plan, effects, pushes=len(scene.pushes))
+    chosen = range(len(scene.pushes)) if which is None else which
+    return [
+        world.run(
+            scene.pushes[k].pose,
+            scene.pushes[k].path,
+            push=k,
+            friction_factor=scene.pushes[k].friction_factor,
+            sample_time=1.0 / scene.rate,
+        )
+        for k in chosen
+    ]
+
+
+def _draw_effects(rng: Rng, scene: Scene, names: Sequence[str]) -> tuple[list[Effect], list[float]]:
+    effects, sizes = [], []
+    for name in names:
+        target = float(np.exp(rng.uniform(*np.log(SIZES))))
+        effect, size = _calibrate(scene, draw_knob(name, rng, scene), target)
+        effects.append(effect)
+        sizes.append(size)
+    return effects, sizes
+
+
+def _calibrate(scene: Scene, knob: Knob, target: float) -> tuple[Effect, float]:
+    """Sets a strength so that the effect moves the object by ``target`` standard deviations, within its bounds."""
+    count = len(scene.pushes)
+    # Drift grows with the order of pushes, and patches may lie beside some, so they are spread over the recording.
+    which = sorted(set(np.linspace(0, count - 1, _CALIBRATION_PUSHES).round().astype(int).tolist()))
+    plain = simulate(scene, (), which)
+    strength, known = 0.3 * knob.limit, [(0.0, 0.0)]
+    for _ in range(_CALIBRATION_ROUNDS):
+        size = _difference(scene, simulate(scene, (knob.at(strength),), which), plain)
+        known.append((strength, size))
+        if abs(math.log(max(size, 1e-9) / target)) < 0.1:
+            break
+        following = min(knob.limit, max(1e-4 * knob.limit, strength * _step(known, target)))
+        if following == strength:
+            break
+        strength = following
+    # The last step is not simulated again; the nearest that was is.
+    strength, size = min(known[1:], key=lambda pair: abs(math.log(max(pair[1], 1e-9) / target)))
+    return knob.at(strength), size
+
+
+def _step(known: Sequence[tuple[float, float]], target: float) -> float:
+    """Factor on the strength: a secant in logarithms, and at first proportional."""
+    strength, size = known[-1]
+    power = 1.0
+    if len(known) > 2 and min(size, known[-2][1]) > 1e-6 and known[-2][0] != strength:
+        power = math.log(size / known[-2][1]) / math.log(strength / known[-2][0])
+    return float(np.clip((target / max(size, 1e-6)) ** (1.0 / float(np.clip(power, 0.4, 3.0))), 0.02, 30.0))
+
+
+def _difference(scene: Scene, motions: Sequence[Motion], plain: Sequence[Motion]) -> float:
+    """Rms over samples, x, y and yaw, in the tracker's deviations, of motion since the start of each push."""
+    deviations = np.array([scene.noise.position, scene.noise.position, scene.noise.rotation])
+    squares = []
+    for one, other in zip(motions, plain, strict=True):
+        length = max(len(one.poses), len(other.poses))
+        moved, still = (_padded(motion.poses, length) - motion.poses[0] for motion in (one, other))
+        squares.append(((moved - still) / deviations) ** 2)
+    return float(np.sqrt(np.concatenate(squares).mean()))
+
+
+def _padded(poses: Array, length: int) -> Array:
+    """The poses, with the last one repeated: what rests stays."""
+    return np.concatenate([poses, np.repeat(poses[-1:], length - len(poses), axis=0)])
+
+
+# ------------------------------------------------------------------------------------------------------- recordings
+
+
+def _record(rng: Rng, scene: Scene, index: int, motion: Motion) -> tuple[Push, Array]:
+    """A push with noise, and the noise-free poses (n, 3) of its object samples."""
+    noise, count = scene.noise, len(motion.times)
+    # A stamp is late or early; what it stamps is of the true, even times.
+    stamps = np.round(motion.times + noise.jitter * rng.uniform(-1.0, 1.0, count), 7)
+    stamps -= min(0.0, float(stamps[0]))
+    places = np.column_stack([motion.poses[:, :2], np.full(count, height_of(scene.plan.shape) / 2.0)])
+    places += noise.position * _series(rng, count, noise)
+    turns = noise.rotation * _series(rng, count, noise)
+    quaternions = _quaternions(motion.poses[:, 2] + turns[:, 2], turns[:, :2])
+    tips = np.column_stack([motion.tips, np.full(count, scene.plan.tip_height)])
+    tips += noise.hand * rng.standard_normal((count, 3))
+    # The first and the last sample stay: a push needs both ends.
+    kept = np.ones(count, dtype=bool)
+    kept[1:-1] = rng.random(count - 2) >= noise.dropout
+    push = Push(
+        name=f"{index + 1:03d}",
+        object=PoseStream(
+            times=stamps[kept], positions=np.round(places[kept], 8), quaternions=np.round(quaternions[kept], 8)
+        ),
+        hand=PoseStream(
+            times=stamps, positions=np.round(tips, 8), quaternions=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
+        ),
+        force=_forces(rng, scene, stamps, motion),
+    )
+    return push, motion.poses[kept]
+
+
+def _forces(rng: Rng, scene: Scene, stamps: Array, motion: Motion) -> ForceStream | None:
+    if scene.noise.force is None:
+        return None
+    noisy = motion.forces + scene.noise.force * rng.standard_normal(motion.forces.shape)
+    return ForceStream(times=stamps, forces=np.round(noisy, 6))
+
+
+def _series(rng: Rng, count: int, noise: Noise) -> Array:
+    """(count, 3) of unit variance, correlated from sample to sample."""
+    series = rng.standard_normal((count, 3))
+    keep, fresh = noise.correlation, math.sqrt(1.0 - noise.correlation**2)
+    for k in range(1, count if keep else 0):
+        series[k] = keep * series[k - 1] + fresh * series[k]
+    return series
+
+
+def _quaternions(yaw: Array, lean: Array) -> Array:
+    """w, x, y, z (n, 4) of a rotation by small ``lean`` (n, 2) after one by ``yaw`` (n,)."""
+    c, s = np.cos(yaw / 2.0), np.sin(yaw / 2.0)
+    x, y = (lean / 2.0).T
+    turned = np.column_stack([c, x * c + y * s, y * c - x * s, s])
+    normal: Array = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    return normal
+
+
+def _recording(name: str, scene: Scene, pushes: Sequence[Push], lags: bool) -> Recording:
+    noise = scene.noise
+    stated = Sensors(
+        object_position_std=float(f"{noise.position:.3g}"),
+        object_rotation_std=float(f"{noise.rotation:.3g}"),
+        hand_position_std=float(f"{noise.hand:.3g}"),
+        force_std=noise.force,
+    )
+    return Recording(
+        name=name,
+        description="An object pushed on a table.",
+        object=ObjectModel(shape=scene.plan.shape, mass=scene.stated_mass),
+        table=Table(size=TABLE_SIZE),
+        hand=Hand(
+            tip="sphere",
+            radius=round(scene.plan.tip_radius, 6),
+            # Columns that are commanded do not betray a lag: half of all worlds have such.
+            stream="commanded" if scene.commanded or lags else "measured",
+        ),
+        sensors=stated if scene.sensors_stated else Sensors(),
+        pushes=tuple(pushes),
+    )
+
+
+def _truth(
+    chosen: Assignment,
+    seed: int,
+    scene: Scene,
+    effects: Sequence[Effect],
+    sizes: Sequence[float],
+    size: float,
+    motions: Sequence[Motion],
+    poses: Sequence[Array],
+) -> dict[str, object]:
+    plan, noise = scene.plan, scene.noise
+    return {
+        "seed": seed,
+        "index": chosen.index,
+        "kind": chosen.kind,
+        "effects": [
+            {"name": effect.name, "parameters": parameters_of(effect), "calibrated_size_sigma": part}
+            for effect, part in zip(effects, sizes, strict=True)
+        ],
+        "size_sigma": size,
+        "theta": {
+            "mass": plan.mass,
+            "support_friction": plan.support_friction,
+            "hand_friction": plan.hand_friction,
+            "restitution": RESIDUAL_RESTITUTION,
+        },
+        "noise": asdict(noise),
+        "rate_hz": scene.rate,
+        "friction_factors": [push.friction_factor for push in scene.pushes],
+        "rested": [motion.rested for motion in motions],
+        "noise_free_poses": {f"pushes/{k + 1:03d}.csv": np.round(rows, 8).tolist() for k, rows in enumerate(poses)},
+    }
+
+
+# -------------------------------------------------------------------------------------------------------- the folder
+
+
+def make(
+    out: Path,
+    worlds: int,
+    seed: int,
+    kind: Kind | None = None,
+    effect: str | None = None,
+    jobs: int = 1,
+) -> str:
+    """Writes ``worlds`` worlds and their seal; returns the seal's SHA-256. Worlds that exist are skipped.
+
+    Args:
+        out: folder for ``recordings``, ``sealed`` and ``seal.sha256``.
+        worlds: how many.
+        seed: of all of them.
+        kind: only this kind; None: the mix.
+        effect: only this effect.
+        jobs: processes.
+    """
+    missing = [index for index in range(worlds) if not _exists(out, world_id(index, seed))]
+    begin = time.monotonic()
+    for done, identity in enumerate(_made(out, missing, seed, kind, effect, jobs), start=1):
+        left = (time.monotonic() - begin) / done * (len(missing) - done)
+        print(f"{identity}  {done}/{len(missing)}  {left:.0f} s left", file=sys.stderr, flush=True)
+    seal = seal_of(out / "sealed", [world_id(index, seed) for index in range(worlds)])
+    (out / "seal.sha256").write_text(f"{seal}\n", encoding="utf-8")
+    return seal
+
+
+def seal_of(folder: Path, identities: Sequence[str]) -> str:
+    """SHA-256 over names and contents of the sealed files, sorted by name."""
+    total = hashlib.sha256()
+    for identity in sorted(identities):
+        content = (folder / f"{identity}.json").read_bytes()
+        total.update(f"{identity} {hashlib.sha256(content).hexdigest()}\n".encode())
+    return total.hexdigest()
+
+
+def _exists(out: Path, identity: str) -> bool:
+    return (out / "sealed" / f"{identity}.json").is_file() and (out / "recordings" / identity).is_dir()
+
+
+def _made(
+    out: Path, indices: Sequence[int], seed: int, kind: Kind | None, effect: str | None, jobs: int
+) -> Iterator[str]:
+    if jobs <= 1 or len(indices) <= 1:
+        yield from (_write_world(out, index, seed, kind, effect) for index in indices)
+        return
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        futures = [pool.submit(_write_world, out, index, seed, kind, effect) for index in indices]
+        yield from (future.result() for future in as_completed(futures))
+
+
+def _write_world(out: Path, index: int, seed: int, kind: Kind | None, effect: str | None) -> str:
+    """Writes one world, the truth last and at once, so that what was interrupted is made again."""
+    recording, truth = make_world(index, seed, kind, effect)
+    folder, sealed = out / "recordings" / recording.name, out / "sealed" / f"{recording.name}.json"
+    if folder.exists():
+        shutil.rmtree(folder)
+    write_recording(recording, folder)
+    sealed.parent.mkdir(parents=True, exist_ok=True)
+    partial = sealed.with_suffix(".partial")
+    partial.write_text(json.dumps(truth, sort_keys=True) + "\n", encoding="utf-8")
+    partial.rename(sealed)
+    return recording.name
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Command line; returns the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m physid_drake.prove.make", description=__doc__)
+    parser.add_argument("--worlds", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--kind", choices=KINDS, help="only this kind, instead of the mix")
+    parser.add_argument("--effect", choices=[*CATALOGUED, *OTHERS], help="only this effect")
+    parser.add_argument("--jobs", type=int, default=1)
+    given = parser.parse_args(arguments)
+    try:
+        seal = make(given.out, given.worlds, given.seed, given.kind, given.effect, given.jobs)
+    except PhysidError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    print(f"seal  sha256 {seal}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
