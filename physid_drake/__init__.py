@@ -1,1 +1,17 @@
-"""physid_drake: identify what a pushed object is made of, with Drake in the loop."""
+"""Identify an object by pushing it, and find the physics that a simulation leaves out. Built on Drake."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from physid_drake.model import Model, load_model
+
+__all__ = ["Model", "load_model"]
+
+
+def __getattr__(name: str) -> Any:
+    # Drake takes a second to import, which those who only read recordings need not wait for.
+    if name in __all__:
+        from physid_drake import model  # noqa: PLC0415
+
+        return getattr(model, name)
+    raise AttributeError(f"module 'physid_drake' has no attribute '{name}'")

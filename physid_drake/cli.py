@@ -1,4 +1,4 @@
-"""The command line: ``physid_drake inspect``, ``physid_drake convert``."""
+"""The command line: ``inspect``, ``convert``, ``diagnose``."""
 
 from __future__ import annotations
 
@@ -110,7 +110,30 @@ def _run_convert(arguments: argparse.Namespace) -> int:
     return 0
 
 
-COMMANDS: list[Callable[[Subparsers], None]] = [_register_inspect, _register_convert]
+def _register_diagnose(subparsers: Subparsers) -> None:
+    parser = subparsers.add_parser("diagnose", help="say what physics a recording has that the simulation leaves out")
+    parser.add_argument("recording", metavar="RECORDING", help="a folder, or the name of a recording that ships")
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where results go (default: diagnoses/RECORDING)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (default 0)")
+    parser.add_argument("--alpha", type=float, default=0.01, metavar="P", help="false-alarm rate (default 0.01)")
+    parser.add_argument("--effects", nargs="+", metavar="NAME", help="look at these effects only")
+    parser.add_argument("--contact", choices=["point", "hydroelastic"], default="point",
+                        help="contact model of the rollouts; the other one is the numerics guard")  # fmt: skip
+    parser.add_argument(
+        "--time-step", type=float, metavar="S", help="tick in contact (default: 1 ms, or by the speed)"
+    )
+    parser.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: the machine's cores)")
+    parser.set_defaults(run=_run_diagnose)
+
+
+def _run_diagnose(arguments: argparse.Namespace) -> int:
+    # Drake takes a second to import, which the other commands need not wait for.
+    from physid_drake.run_diagnose import run  # noqa: PLC0415
+
+    return run(arguments)
+
+
+COMMANDS: list[Callable[[Subparsers], None]] = [_register_inspect, _register_convert, _register_diagnose]
 """One function for each command; it adds its parser, which sets ``run``: arguments -> exit status."""
 
 

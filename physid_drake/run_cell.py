@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import os
 import platform
 import sys
-import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
@@ -17,7 +14,7 @@ from pydrake.systems.framework import DiagramBuilder
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from physid_drake.errors import OutputError, PhysidError
+from physid_drake.errors import PhysidError
 from physid_drake.identify import Identification, Identifier
 from physid_drake.identify.nuisance import nuisance_of
 from physid_drake.identify.rollouts import Task, simulate
@@ -28,6 +25,7 @@ from physid_drake.report.result import result_json
 from physid_drake.report.stage import Scene, Stage
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
 from physid_drake.resources import shipped
+from physid_drake.run_folder import RunFolder
 from physid_drake.scenario import dump_scenario, load_scenario
 from physid_drake.scenario_schema import Scenario
 
@@ -91,7 +89,7 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     page = result_page(stage.meshcat.StaticHtml(), result, name=recording.name, marks=marks, note=note)
     folder.write("page.html", page)
     folder.write("result.json", result_json(result, recording, scenario.seed, versions()))
-    folder.forget_state()
+    folder.forget("belief.npz")
     console.print(f"written: {folder.path / 'result.json'}, {folder.path / 'page.html'}")
     _keep_serving(arguments.no_view, stage, console)
 
@@ -178,52 +176,6 @@ def _keep_serving(no_view: bool, stage: Stage, console: Console) -> None:
         return
     console.print(f"The animation plays at {stage.meshcat.web_url()}; press Enter to end.")
     sys.stdin.readline()
-
-
-@dataclass(frozen=True, kw_only=True)
-class RunFolder:
-    """A run's folder: its configuration, the state to go on from, the results."""
-
-    path: Path
-
-    @classmethod
-    def open(cls, path: Path, scenario: str) -> RunFolder:
-        """Make the folder, or go on in one; the state of a run with another configuration is dropped.
-
-        Raises:
-            OutputError: if it cannot be written.
-        """
-        folder = cls(path=path)
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            config = path / "config.yaml"
-            if config.exists() and config.read_text(encoding="utf-8") != scenario:
-                folder.forget_state()
-        except (OSError, UnicodeDecodeError) as error:
-            raise OutputError(f"output folder '{path}': cannot be written: {error}.") from error
-        folder.write("config.yaml", scenario)
-        return folder
-
-    def write(self, name: str, text: str) -> None:
-        """Write a file whole or not at all.
-
-        Raises:
-            OutputError: if it cannot be written.
-        """
-        part = None
-        try:
-            with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=self.path, delete=False) as part:
-                part.write(text)
-            Path(part.name).chmod(0o644)
-            os.replace(part.name, self.path / name)  # noqa: PTH105
-        except OSError as error:
-            if part is not None:
-                Path(part.name).unlink(missing_ok=True)
-            raise OutputError(f"'{self.path / name}': cannot be written: {error}.") from error
-
-    def forget_state(self) -> None:
-        """Drop the search's state: the run is done, or it was another run's."""
-        (self.path / "belief.npz").unlink(missing_ok=True)
 
 
 if __name__ == "__main__":

@@ -24,6 +24,10 @@ from physid_drake.recording import Recording
 Array = NDArray[np.float64]
 Tick = Callable[[str, int, int], None]
 
+# Of the hand between two ticks [m]. Measured on forty drawn pushes against ticks of half a millisecond: 0.02 mm and
+# 0.5 mrad for slow pushes, as much as one millisecond costs for fast ones.
+TRAVEL_PER_TICK = 2.5e-4
+PACES = (1.0, 1.5, 2.0, 3.0, 4.0)
 UNIT_SCATTER = 0.025  # of friction, push to push: the columns' unit and the median of its prior
 LEAST_MOTION = 6.0  # standard deviations: an object that moves less in every push does not move
 # A rollout's own error acts like a start that is known no better than this [m, m, rad].
@@ -73,7 +77,7 @@ def case_of(recording: Recording, config: CellConfig, theta: ThetaConfig, jobs: 
         raise RecordingError(f"recording '{recording.name}': there is no push to diagnose; record at least three.")
     noise, sensors = tracker_noise(recording)
     solid = solid_of(recording.object.shape)
-    problems = tuple(_floored(p) for p in problems_of(recording, sensors, solid.height))
+    problems = tuple(_paced(_floored(p), config) for p in problems_of(recording, sensors, solid.height))
     _refuse_still(recording, problems, noise)
     thetas = theta_map(
         recording.object, solid.outline, (config.friction_cells[0], config.friction_cells[1]), theta,
@@ -98,6 +102,15 @@ def _floored(problem: PushProblem) -> PushProblem:
     std = problem.start_std.copy()
     std[:3] = np.hypot(std[:3], START_FLOOR)
     return dc.replace(problem, start_std=std)
+
+
+def _paced(problem: PushProblem, config: CellConfig) -> PushProblem:
+    if problem.path is None:
+        return problem
+    speed = float(np.linalg.norm(problem.path.velocities, axis=1).max())
+    longest = TRAVEL_PER_TICK / max(speed, 1e-6) / config.solver.time_step_s
+    limit = PACES[-1] * 1e-3 / config.solver.time_step_s
+    return dc.replace(problem, pace=max(p for p in PACES if p <= max(1.0, min(longest, limit))))
 
 
 def _refuse_still(recording: Recording, problems: Sequence[PushProblem], noise: TrackerNoise) -> None:

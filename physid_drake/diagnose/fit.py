@@ -55,6 +55,10 @@ class EffectPoint:
             point[j] = float(np.clip(point[j] + step, chart[j].lower, chart[j].upper))
         return dc.replace(self, point=point)
 
+    def freed(self, case: Case) -> EffectPoint:
+        """All coordinates free."""
+        return dc.replace(self, free=tuple(range(len(self.chart(case)))))
+
 
 @dc.dataclass(frozen=True, kw_only=True)
 class State:

@@ -1,7 +1,7 @@
 """Many pushes, linearised: what shared coefficients explain, with each push's own unknowns integrated out.
 
 A push is ``r = A beta + J eta + e`` with eta ~ N(0, I) its own unknowns in units of their priors, e ~ N(0, N)
-noise, and beta what all pushes share: theta and effects. Everything that a diagnosis asks is linear algebra on such pushes.
+noise, and beta what all pushes share: theta and effects. What a diagnosis asks is linear algebra on such pushes.
 """
 
 from __future__ import annotations

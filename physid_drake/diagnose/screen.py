@@ -107,8 +107,8 @@ def signatures(
     present = [e.effect(case) for e in state.effects]
     plan: list[tuple[int, int, int, float]] = []  # signature, push, direction, step's sign and size in steps
     tasks: list[Task] = []
-    wanted = [(kind, family) for kind in kinds for family in kind.families(case.around)]
-    for s, (kind, family) in enumerate(wanted):
+    blank = empty_signatures(fitter, kinds)
+    for s, (kind, family) in enumerate((b.kind, b.family) for b in blank):
         chart = kind.chart(case.around)
         for i in range(len(case.problems)):
             if not _reaches(fitter, kind, family, i):
@@ -124,17 +124,21 @@ def signatures(
         vectors += fitter.vectors(tasks[k : k + 64])
         if tick is not None:
             tick(min(k + 64, len(tasks)), len(tasks))
-    columns = [
-        [np.zeros((len(f.recorded), len(family.free))) for f in case.features] for _, family in wanted
-    ]  # fmt: skip
+    columns = [[np.zeros((len(f.recorded), b.steps)) for f in case.features] for b in blank]
     for (s, i, d, sign), vector in zip(plan, vectors, strict=True):
-        if wanted[s][1].central:
+        if blank[s].family.central:
             columns[s][i][:, d] += 0.5 * sign * vector
         else:
             columns[s][i][:, d] = vector - base[i]
+    return [dc.replace(b, columns=tuple(c)) for b, c in zip(blank, columns, strict=True)]
+
+
+def empty_signatures(fitter: Fitter, kinds: Sequence[type[Effect]]) -> list[Signature]:
+    """All families of the effects, their columns still to be found."""
     return [
-        Signature(kind=kind, family=family, columns=tuple(c), one_sided=_one_sided(fitter, kind, family))
-        for (kind, family), c in zip(wanted, columns, strict=True)
+        Signature(kind=kind, family=family, columns=(), one_sided=_one_sided(fitter, kind, family))
+        for kind in kinds
+        for family in kind.families(fitter.case.around)
     ]
 
 
@@ -274,11 +278,11 @@ def cosine(fitted: Fitted, first: Score, second: Score) -> float:
 
 
 def start_of(fitter: Fitter, one: Score) -> EffectPoint:
-    """The chart point that a score test suggests; a fit may then move all coordinates."""
+    """The chart point that a score test suggests; a fit may then move the leading coordinates."""
     chart = one.kind.chart(fitter.case.around)
     family = one.signature.family
     origin = np.array(family.point)
     point = origin.copy()
     for j, c in zip(family.free, one.coefficients.tolist(), strict=True):
         point[j] = float(np.clip(point[j] + c * chart[j].step, chart[j].lower, chart[j].upper))
-    return EffectPoint(kind=one.kind, point=point, free=tuple(range(len(chart))), origin=origin)
+    return EffectPoint(kind=one.kind, point=point, free=one.kind.leading(fitter.case.around), origin=origin)

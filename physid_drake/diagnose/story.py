@@ -15,11 +15,15 @@ from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.confirm import Candidate, confirm, push_scores, rivals, standard_error
 from physid_drake.diagnose.fit import Fitted, Fitter, State
 from physid_drake.diagnose.linear import left_out_scores
+from physid_drake.diagnose.localise import MissingWrench, locate, missing_wrenches, with_phases
+from physid_drake.diagnose.memory import Memory
+from physid_drake.diagnose.next_push import next_push
 from physid_drake.diagnose.plain import coarse, fit_plain, numerics
 from physid_drake.diagnose.screen import (
     Screening,
     Signature,
     cosine,
+    empty_signatures,
     log_probability,
     projected,
     screen,
@@ -31,6 +35,8 @@ from physid_drake.diagnose.values import (
     Diagnosis,
     EffectFinding,
     FitQuality,
+    Location,
+    NextPush,
     ParameterEstimate,
     Ranked,
     ThetaEstimate,
@@ -52,15 +58,6 @@ IDENTIFIABLE = 0.5  # posterior over prior standard deviation
 
 
 @dc.dataclass(frozen=True, kw_only=True)
-class Model:
-    """A step of the greedy search: effects accepted so far, the fit, its screening, the fitted rivals."""
-
-    fitted: Fitted
-    screening: Screening
-    candidates: tuple[Candidate, ...]
-
-
-@dc.dataclass(frozen=True, kw_only=True)
 class Evidence:
     """Everything that was computed, for the report and the models that leave.
 
@@ -73,6 +70,8 @@ class Evidence:
         steps: one per accepted effect: all candidates of that step.
         final: the model at the end.
         remaining: screening of what it leaves.
+        wrenches: what is missing from the plain cell, window by window.
+        next_push: that would tell the rivals apart.
     """
 
     case: Case
@@ -83,9 +82,13 @@ class Evidence:
     steps: tuple[tuple[Candidate, ...], ...]
     final: Fitted
     remaining: Screening
+    wrenches: tuple[MissingWrench, ...] = ()
+    next_push: NextPush | None = None
 
 
-def gather(case: Case, *, seed: int, alpha: float, effects: Sequence[str] | None, tick: Tick) -> Evidence:
+def gather(
+    case: Case, *, seed: int, alpha: float, effects: Sequence[str] | None, tick: Tick, memory: Memory
+) -> Evidence:
     """Fit, screen, confirm: all that needs rollouts.
 
     Args:
@@ -94,14 +97,13 @@ def gather(case: Case, *, seed: int, alpha: float, effects: Sequence[str] | None
         alpha: false-alarm rate of the detection.
         effects: names of the catalogue to look at; None for all.
         tick: told the stage, steps done, steps in all.
+        memory: of the stages that are done.
     """
     search_rng, screen_rng = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2))
     kinds = applicable(case.around, effects)
-    first = fit_plain(case, search_rng, tick)
-    tick("numerics guard", 0, 0)
-    guard = numerics(case, first.state)
+    first = _first(case, search_rng, tick, memory)
     rough = Fitter(coarse(case))
-    found = signatures(rough, first, kinds, lambda done, total: tick("score tests", done, total))
+    guard, found = _looks(case, first, rough, kinds, tick, memory)
     fitter = Fitter(case, guard, tolerances(rough, found))
     plain = fitter.guard(first)
     screening = screen(plain, found, screen_rng)
@@ -112,7 +114,8 @@ def gather(case: Case, *, seed: int, alpha: float, effects: Sequence[str] | None
         if not candidates or not candidates[0].accepted:
             break
         steps.append(candidates)
-        current = fitter.fit(candidates[0].fitted.state, rounds=2)
+        tick(f"model with {candidates[0].name}", 0, 0)
+        current = fitter.fit(_freed(case, candidates[0].fitted.state), rounds=1)
         # The signatures at the plain cell are near enough to ask whether anything is left.
         left = [s for s in at if s.kind not in {e.kind for e in current.state.effects}]
         remaining = screen(current, left, screen_rng)
@@ -125,6 +128,40 @@ def gather(case: Case, *, seed: int, alpha: float, effects: Sequence[str] | None
         case=case, fitter=fitter, plain=plain, screening=screening, signatures=tuple(found), steps=tuple(steps),
         final=current, remaining=remaining,
     )  # fmt: skip
+
+
+def _first(case: Case, rng: np.random.Generator, tick: Tick, memory: Memory) -> Fitted:
+    """The plain fit, or that of an interrupted run."""
+    kept = memory.recall("plain")
+    if kept is not None:
+        u, scatter, *own = kept
+        return Fitter(case).linearise(State(u=u, effects=(), own=tuple(own), scatter=float(scatter)))
+    first = fit_plain(case, rng, tick)
+    # Linearised again, so that a run that goes on from here has the same bits.
+    memory.keep("plain", [first.state.u, np.array(first.state.scatter), *first.state.own])
+    return first
+
+
+def _looks(
+    case: Case, first: Fitted, rough: Fitter, kinds: Sequence[type[Effect]], tick: Tick, memory: Memory
+) -> tuple[tuple[Array, ...], list[Signature]]:
+    """The guard's directions and the catalogue's signatures, or those of an interrupted run."""
+    guard_kept, kept = memory.recall("guard"), memory.recall("signatures")
+    if guard_kept is None:
+        tick("numerics guard", 0, 0)
+        guard_kept = list(numerics(case, first.state))
+        memory.keep("guard", guard_kept)
+    blank = empty_signatures(rough, kinds)
+    if kept is not None:
+        edges = iter(kept)
+        return tuple(guard_kept), [dc.replace(s, columns=tuple(next(edges) for _ in case.problems)) for s in blank]
+    found = signatures(rough, first, kinds, lambda done, total: tick("score tests", done, total))
+    memory.keep("signatures", [c for s in found for c in s.columns])
+    return tuple(guard_kept), found
+
+
+def _freed(case: Case, state: State) -> State:
+    return dc.replace(state, effects=tuple(e.freed(case) for e in state.effects))
 
 
 def mismatch(fitted: Fitted, screening: Screening) -> float:
@@ -145,11 +182,34 @@ def diagnose(
     alpha: float = 0.01,
     effects: Sequence[str] | None = None,
     tick: Tick | None = None,
+    memory: Memory | None = None,
 ) -> tuple[Diagnosis, Evidence]:
     """Diagnose a recording; arguments as in ``gather``."""
     say = tick or (lambda stage, done, total: None)
-    evidence = gather(case, seed=seed, alpha=alpha, effects=effects, tick=say)
+    evidence = gather(case, seed=seed, alpha=alpha, effects=effects, tick=say, memory=memory or Memory())
+    evidence = _located(evidence, say)
     return conclude(evidence, seed=seed, alpha=alpha), evidence
+
+
+def _located(evidence: Evidence, tick: Tick) -> Evidence:
+    """With the missing wrench, and the push that would tell rivals apart."""
+    rough = Fitter(coarse(evidence.case))
+    tick("the missing wrench", 0, 0)
+    wrenches = with_phases(evidence.case, missing_wrenches(rough, evidence.plain))
+    tick("the next push", 0, 0)
+    push = next_push(rough.case, _rival_states(evidence))
+    evidence.case.pool.count += rough.case.pool.count
+    return dc.replace(evidence, wrenches=wrenches, next_push=push)
+
+
+def _rival_states(evidence: Evidence) -> list[State]:
+    """The models that are still in question: the final one, and the rivals of its last effect."""
+    if not evidence.steps:
+        return []
+    last = evidence.steps[-1]
+    alike = _class_of(evidence, last)
+    others = [c for c in last[1:] if c.name in alike] or [c for c in last[1:] if not c.degenerate][:1]
+    return [evidence.final.state, *(c.fitted.state for c in others)]
 
 
 def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
@@ -167,10 +227,10 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
         p_value=p_value,
         alpha=alpha,
         effects=findings,
-        location=None,
+        location=_location(evidence, verdict, findings, seed),
         fit=_quality(case, plain, after),
         theta=_theta(evidence, after),
-        next_push=None,
+        next_push=evidence.next_push if verdict in ("explained", "ambiguous", "unexplained") else None,
         seed=seed,
         ranking=_ranking(evidence, findings),
         detectable=detectable,
@@ -197,6 +257,16 @@ def _verdict(evidence: Evidence, p_value: float, alpha: float, detectable: Seque
     if not evidence.steps or unexplained(evidence.final):
         return "unexplained"
     return "ambiguous" if any(_class_of(evidence, step) for step in evidence.steps) else "explained"
+
+
+def _location(evidence: Evidence, verdict: str, findings: Sequence[EffectFinding], seed: int) -> Location | None:
+    """Where the mismatch is; the frame is that of the physics found, where some was found."""
+    if verdict in ("consistent", "underpowered"):
+        return None
+    found = locate(evidence.case, evidence.wrenches, np.random.default_rng(seed))
+    if found is None or not findings:
+        return found
+    return dc.replace(found, frame=evidence.steps[0][0].score.kind.frame)
 
 
 def _class_of(evidence: Evidence, step: Sequence[Candidate]) -> tuple[str, ...]:

@@ -69,6 +69,12 @@ class UnevenSupport(Effect):
         return (Family(point=(0.0,) * (3 + GRID * GRID), free=(0, 1, 2), central=True),)
 
     @classmethod
+    def leading(cls, around: Surroundings) -> tuple[int, ...]:
+        """The moments: friction and torque feel little of the rest."""
+        del around
+        return (0, 1, 2)
+
+    @classmethod
     def at(cls, point: Array, around: Surroundings) -> UnevenSupport:
         """From moments and log weights."""
         del around

@@ -181,6 +181,11 @@ class Effect:
         return (Family(point=(0.0,) * count, free=tuple(range(count))),)
 
     @classmethod
+    def leading(cls, around: Surroundings) -> tuple[int, ...]:
+        """Indices of the coordinates that a first fit moves; the others follow once the effect is accepted."""
+        return tuple(range(len(cls.chart(around))))
+
+    @classmethod
     def at(cls, point: Array, around: Surroundings) -> Self:
         """The effect at a chart point (k,); the default takes the coordinates for the parameters."""
         names = [c.name for c in cls.chart(around)]

@@ -102,6 +102,7 @@ class PushProblem:
         force_times: (k,) middles of the force windows [s].
         forces: (k, 2) recorded mean forces on the object, x and y of W [N].
         force_std: (k,) of each [N].
+        pace: ticks longer than the cell's by this factor will do: the hand is slow.
     """
 
     name: str
@@ -117,6 +118,7 @@ class PushProblem:
     force_times: Array
     forces: Array
     force_std: Array
+    pace: float = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)

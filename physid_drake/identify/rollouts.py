@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses as dc
 import os
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
@@ -66,6 +67,7 @@ class Prediction:
 
 def simulate(spec: CellSpec, thetas: ThetaMap, task: Task) -> Motion:
     """One rollout in this process."""
+    spec = _paced(spec, task.problem.pace)
     setting = apply_nuisance(task.problem, task.nuisance, task.values)
     body = thetas.body(task.theta, friction_scale=setting.friction_scale, restitution=setting.restitution)
     push = Rollout(
@@ -77,6 +79,16 @@ def simulate(spec: CellSpec, thetas: ThetaMap, task: Task) -> Motion:
         order=task.problem.order,
     )
     return roll(lambda geometry: cell_of(spec, geometry), Geometry(shape=spec.shape), body, push, task.effects)
+
+
+def _paced(spec: CellSpec, pace: float) -> CellSpec:
+    """The cell with longer ticks."""
+    if pace == 1.0:
+        return spec
+    solver = spec.config.solver
+    tick = pace * solver.time_step_s
+    longer = dc.replace(solver, time_step_s=tick, slide_time_step_s=max(solver.slide_time_step_s, tick))
+    return dc.replace(spec, config=dc.replace(spec.config, solver=longer))
 
 
 def predict(spec: CellSpec, thetas: ThetaMap, task: Task) -> Prediction | None:

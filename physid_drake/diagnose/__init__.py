@@ -1,0 +1,7 @@
+"""Diagnosis: where simulation and recording part, and what physics is missing."""
+
+from physid_drake.diagnose.case import Case, case_of
+from physid_drake.diagnose.story import Evidence, diagnose
+from physid_drake.diagnose.values import Diagnosis
+
+__all__ = ["Case", "Diagnosis", "Evidence", "case_of", "diagnose"]

@@ -1,0 +1,114 @@
+"""The push that would tell rival models apart."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from physid_drake.cell import HandPath, Start
+from physid_drake.cell.solid import solid_of
+from physid_drake.diagnose.case import Case
+from physid_drake.diagnose.fit import Fitter, State
+from physid_drake.diagnose.values import NextPush
+from physid_drake.identify.problem import PushProblem
+from physid_drake.identify.rollouts import Task
+
+Array = NDArray[np.float64]
+
+DIRECTIONS = 8
+SPEEDS = (0.1, 0.4)  # m/s
+OFFSETS = (-0.3, 0.3)  # of the object's half width
+TRAVEL = 0.12  # m of the hand after the touch
+RUN_UP, RAMP, BRAKE = 0.02, 0.05, 0.05  # m, s, s
+AFTER = 1.0  # s
+REPEATS = 0.02  # of the motion: how well a push repeats
+
+
+def next_push(case: Case, states: Sequence[State]) -> NextPush | None:
+    """The push, of a grid of directions, speeds and contact offsets, whose end tells the models apart best.
+
+    Args:
+        case: the recording.
+        states: the rival models.
+
+    Returns:
+        The push and the probability that it settles the question; None without rivals or without a hand.
+    """
+    if len(states) < 2 or case.recording.hand is None:
+        return None
+    pushes = [_problem(case, *choice) for choice in _choices()]
+    fitter = Fitter(case)
+    tasks = []
+    for state in states:
+        for problem in pushes:
+            nuisance = case.nuisances[0]
+            tasks.append(
+                Task(
+                    problem=problem,
+                    theta=np.asarray(case.thetas.space.from_unit(state.u)),
+                    nuisance=nuisance,
+                    values=np.zeros(len(nuisance.names)),
+                    effects=tuple(e.effect(fitter.case) for e in state.effects),
+                )
+            )
+    ends = [None if p is None else p.poses[-1] for p in case.pool.run(tasks)]
+    chances = [_chance(case, ends[k :: len(pushes)], pushes[k]) for k in range(len(pushes))]
+    best = int(np.argmax(chances))
+    direction, speed, offset = _choices()[best]
+    return NextPush(
+        direction_deg=math.degrees(direction), speed_mps=speed, contact_offset_m=offset * 0.5 * _width(case),
+        settles_with_probability=chances[best],
+    )  # fmt: skip
+
+
+def _choices() -> list[tuple[float, float, float]]:
+    directions = [2.0 * math.pi * k / DIRECTIONS for k in range(DIRECTIONS)]
+    return list(itertools.product(directions, SPEEDS, OFFSETS))
+
+
+def _width(case: Case) -> float:
+    return float(case.around.size.min())
+
+
+def _problem(case: Case, direction: float, speed: float, offset: float) -> PushProblem:
+    """A push of the object in the middle of the region, its axes along the table's."""
+    middle = 0.5 * (case.around.region[0] + case.around.region[1])
+    ahead = np.array([math.cos(direction), math.sin(direction)])
+    aside = np.array([-ahead[1], ahead[0]])
+    assert case.recording.hand is not None
+    outline = solid_of(case.recording.object.shape).outline
+    radius = case.recording.hand.radius
+    start = middle + 0.5 * offset * _width(case) * aside
+    reach = 0.0
+    # Step back until the tip is clear of the outline.
+    while outline.nearest(*(start - middle - reach * ahead).tolist())[0] < radius + RUN_UP:
+        reach += 2e-3
+    ramp, brake = min(RAMP, RUN_UP / speed), BRAKE
+    cruise = (RUN_UP + TRAVEL) / speed
+    times = np.cumsum([0.05, ramp, cruise, brake])
+    path = HandPath(times=times, velocities=np.outer([0.0, speed, speed, 0.0], ahead), start=start - reach * ahead)
+    end = float(times[-1]) + AFTER
+    return dc.replace(
+        case.problems[0], name="next", order=len(case.problems), begin=0.0, end=end,
+        start=Start(pose=(float(middle[0]), float(middle[1]), 0.0)), path=path, times=np.array([end]),
+        poses=np.zeros((1, 3)), force_times=np.zeros(0), forces=np.zeros((0, 2)), force_std=np.zeros(0),
+    )  # fmt: skip
+
+
+def _chance(case: Case, ends: Sequence[Array | None], problem: PushProblem) -> float:
+    """Probability that the end pose names the right one of the models, for the pair that is hardest to tell."""
+    if any(e is None for e in ends):
+        return 0.0
+    chances = []
+    for a, b in itertools.combinations([e for e in ends if e is not None], 2):
+        moved = np.abs(a - np.array(problem.start.pose))
+        reach = float(np.hypot(moved[0], moved[1]))
+        std = np.hypot(case.noise.sigmas, REPEATS * np.array([reach, reach, max(moved[2], reach / 0.05)]))
+        chances.append(float(stats.norm.cdf(0.5 * np.linalg.norm((a - b) / std))))
+    return min(chances)

@@ -1,0 +1,211 @@
+"""A model that leaves: ``model.yaml`` holds cell, theta and effects, and builds the augmented diagram again."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+from pydrake.systems.framework import Diagram
+
+from physid_drake.cell import Body, Cell, CellConfig, HandPath, Motion, Start
+from physid_drake.cell.config import ContactConfig, SolverConfig
+from physid_drake.effects import Effect, effect_named
+from physid_drake.effects.rollout import Geometry, Rollout, geometry_with, roll, tracked
+from physid_drake.errors import ConfigError
+from physid_drake.recording import Box, Cylinder, MeshShape, Prism, Shape
+
+Array = NDArray[np.float64]
+
+FORMAT = "physid-model/1"
+_SHAPES: dict[str, type[Box] | type[Cylinder] | type[Prism] | type[MeshShape]] = {
+    "box": Box, "cylinder": Cylinder, "prism": Prism, "mesh": MeshShape,
+}  # fmt: skip
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Model:
+    """An object, a hand and a table with their physics.
+
+    Attributes:
+        recording: the name of what it was learnt from.
+        shape: the object's.
+        hand_radius: of the tip [m]; None without a hand.
+        table: (2, 2) lower and upper corner of the table top [m].
+        config: of the cell.
+        body: theta.
+        effects: physics beyond the plain cell.
+        intervals: 90 % intervals as they were found, by ``theta.<name>`` and ``<effect>.<parameter>``.
+    """
+
+    recording: str
+    shape: Shape
+    hand_radius: float | None
+    table: tuple[tuple[float, float], tuple[float, float]]
+    config: CellConfig
+    body: Body
+    effects: tuple[Effect, ...] = ()
+    intervals: dict[str, Any] = dc.field(default_factory=dict)
+
+    def build(self) -> ModelCell:
+        """The Drake cell with theta in its Context and the effects at their seams."""
+        return ModelCell(self)
+
+    def plain(self) -> Model:
+        """The same without its effects: what is lost without them is what they are worth."""
+        return dc.replace(self, effects=())
+
+    def dump(self, path: Path) -> str:
+        """The text of ``model.yaml`` at a path; a mesh is named relative to it."""
+        content = {
+            "format": FORMAT,
+            "recording": self.recording,
+            "object": _dump_shape(self.shape, path.parent),
+            "hand_radius_m": self.hand_radius,
+            "table_m": [list(corner) for corner in self.table],
+            "cell": dc.asdict(self.config),
+            "theta": {
+                f.name: _plain(getattr(self.body, f.name)) for f in dc.fields(self.body)
+            },
+            "effects": [{"name": e.name, "parameters": _plain(dc.asdict(e))} for e in self.effects],
+            "intervals": _plain(self.intervals),
+        }  # fmt: skip
+        return str(yaml.safe_dump(content, sort_keys=False))
+
+
+class ModelCell:
+    """A model, built: its diagram, and rollouts with all its physics.
+
+    Attributes:
+        model: what it was built from.
+        cell: the cell, in the effects' geometry.
+        diagram: the Drake diagram.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        geometry = geometry_with(model.effects, Geometry(shape=model.shape))
+        self.cell = Cell(
+            geometry.shape, hand_radius=model.hand_radius, config=model.config, table=np.array(model.table),
+            pressure=geometry.pressure,
+        )  # fmt: skip
+        self.cell.set_body(model.body)
+        self.diagram: Diagram = self.cell.diagram
+
+    def rollout(
+        self,
+        *,
+        start: Start,
+        path: HandPath | None,
+        begin: float,
+        end: float,
+        hand_height: float | None = None,
+        order: int = 0,
+    ) -> Motion:
+        """Simulate a push with the model's theta and effects; arguments as in ``Cell.rollout``.
+
+        Args:
+            start: the object's state as the tracker would report it.
+            path: the hand's path; None without a hand.
+            begin: start time [s].
+            end: end time [s].
+            hand_height: of the tip's contact above the table [m].
+            order: number of the push, for physics that changes from push to push.
+        """
+        push = Rollout(start=start, path=path, begin=begin, end=end, hand_height=hand_height, order=order)
+        return roll(lambda _: self.cell, Geometry(shape=self.model.shape), self.model.body, push, self.model.effects)
+
+    def tracked(self, motion: Motion, times: Array) -> Array:
+        """What the recording's tracker would report (n, 3), x, y, yaw, at times (n,) [s]."""
+        return tracked(motion, times, self.model.effects)
+
+
+def load_model(path: Path | str) -> Model:
+    """Read ``model.yaml``.
+
+    Args:
+        path: the file, or the folder of a diagnosis that holds it.
+
+    Raises:
+        ConfigError: if it cannot be read, is of another version, or holds what no model has.
+    """
+    file = Path(path)
+    file = file / "model.yaml" if file.is_dir() else file
+    try:
+        content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise ConfigError(f"model '{file}': there is no such file.") from error
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ConfigError(f"model '{file}': cannot be read: {' '.join(str(error).split())}.") from error
+    found = content.get("format") if isinstance(content, dict) else None
+    if found != FORMAT:
+        raise ConfigError(f"model '{file}': the format must be '{FORMAT}', but is {found!r}; diagnose again.")
+    try:
+        return _model(content, file)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise ConfigError(f"model '{file}': {type(error).__name__}: {' '.join(str(error).split())}.") from error
+
+
+def _model(content: dict[str, Any], file: Path) -> Model:
+    cell = content["cell"]
+    config = CellConfig(
+        **{**cell, "contact": ContactConfig(**cell["contact"]), "solver": SolverConfig(**cell["solver"])}
+    )  # fmt: skip
+    theta: dict[str, Any] = {name: np.array(v) if isinstance(v, list) else v for name, v in content["theta"].items()}
+    (x0, y0), (x1, y1) = content["table_m"]
+    return Model(
+        recording=str(content["recording"]),
+        shape=_load_shape(content["object"], file.parent),
+        hand_radius=content["hand_radius_m"],
+        table=((float(x0), float(y0)), (float(x1), float(y1))),
+        config=config,
+        body=Body(**theta),
+        effects=tuple(_load_effect(e) for e in content["effects"]),
+        intervals=content.get("intervals", {}),
+    )
+
+
+def _load_effect(content: dict[str, Any]) -> Effect:
+    kind = effect_named(str(content["name"]))
+    parameters = {
+        name: tuple(tuple(row) for row in v) if isinstance(v, list) else float(v)
+        for name, v in content["parameters"].items()
+    }
+    return kind(**parameters)
+
+
+def _dump_shape(shape: Shape, folder: Path) -> dict[str, Any]:
+    kind = next(name for name, cls in _SHAPES.items() if isinstance(shape, cls))
+    fields = {f.name: getattr(shape, f.name) for f in dc.fields(shape)}
+    if isinstance(shape, MeshShape):
+        fields["file"] = str(Path(shape.file).resolve())
+    del folder
+    return {"shape": kind, **_plain(fields)}
+
+
+def _load_shape(content: dict[str, Any], folder: Path) -> Shape:
+    fields = {k: _tuples(v) for k, v in content.items() if k != "shape"}
+    if content["shape"] == "mesh":
+        fields["file"] = folder / str(fields["file"])
+    return _SHAPES[content["shape"]](**fields)
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
+
+
+def _plain(value: Any) -> Any:
+    """YAML's own types."""
+    if isinstance(value, dict):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.floating):
+        return float(value)
+    return value

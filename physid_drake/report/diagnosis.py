@@ -1,0 +1,145 @@
+"""``diagnosis.json`` and what a diagnosis prints: it reads, it never computes."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import json
+import math
+from typing import Any
+
+from rich.table import Table
+
+from physid_drake.diagnose import Diagnosis
+from physid_drake.diagnose.values import EffectFinding, Location
+
+FORMAT = "physid-diagnosis/1"
+DIGITS = 6
+
+
+def diagnosis_json(diagnosis: Diagnosis) -> str:
+    """The file's text; the same diagnosis gives the same bytes."""
+    d = diagnosis
+    content: dict[str, Any] = {
+        "format": FORMAT,
+        "recording": d.recording,
+        "verdict": d.verdict,
+        "sentence": d.sentence,
+        "p_value": d.p_value,
+        "alpha": d.alpha,
+        "effects": [_effect(e) for e in d.effects],
+        "location": None if d.location is None else _location(d.location),
+        "fit": {
+            "unit": "standard deviations of the measurement",
+            "held_out_rms_before": d.fit.rms_before,
+            "held_out_rms_after": d.fit.rms_after,
+            "held_out_rms_before_m": d.fit.position_before,
+            "held_out_rms_after_m": d.fit.position_after,
+            "held_out_rms_before_rad": d.fit.rotation_before,
+            "held_out_rms_after_rad": d.fit.rotation_after,
+            "log_score_gain": d.fit.log_score_gain,
+            "log_score_gain_se": d.fit.log_score_gain_se,
+            "per_push": [{"push": name, "before": b, "after": a} for name, b, a in d.fit.per_push],
+        },
+        "theta": {
+            name: {"value": t.value, "unit": t.unit, "ci90": t.ci90, "identifiable": t.identifiable,
+                   "before": t.before}
+            for name, t in d.theta.items()
+        },
+        "next_push": None if d.next_push is None else dc.asdict(d.next_push),
+        "seed": d.seed,
+        "ranking": [dc.asdict(r) for r in d.ranking],
+        "detectable": [dc.asdict(x) for x in d.detectable],
+        "left": d.left,
+        "reduced_chi2_before": d.reduced_chi2_before,
+        "reduced_chi2_after": d.reduced_chi2_after,
+        "friction_scatter": d.friction_scatter,
+        "noise": d.noise,
+        "warnings": list(d.warnings),
+    }  # fmt: skip
+    return json.dumps(_rounded(content), indent=2) + "\n"
+
+
+def _effect(effect: EffectFinding) -> dict[str, Any]:
+    return {
+        "name": effect.name,
+        "element": effect.element,
+        "indistinguishable_from": list(effect.indistinguishable_from),
+        "probability": effect.probability,
+        "statement": effect.statement,
+        "parameters": {
+            name: {"value": p.value, "unit": p.unit, "ci90": p.ci90, "null": p.null}
+            for name, p in effect.parameters.items()
+        },
+    }
+
+
+def _location(location: Location) -> dict[str, Any]:
+    return {
+        "statement": location.statement,
+        "phase": list(location.phase),
+        "dof": list(location.dof),
+        "frame": location.frame,
+        "windows": [{"push": w.push, "start_s": w.start, "end_s": w.end} for w in location.windows],
+    }
+
+
+def _rounded(value: Any) -> Any:
+    """Six significant digits: what comes after them is not knowledge. JSON has no infinity."""
+    if isinstance(value, dict):
+        return {k: _rounded(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(v) for v in value]
+    if isinstance(value, float):
+        return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
+    return value
+
+
+def findings_table(diagnosis: Diagnosis) -> Table:
+    """The effects found, with their parameters."""
+    table = Table(title=f"what is missing in '{diagnosis.recording}'", title_justify="left")
+    for column in ("effect", "parameter", "value", "90 % interval", "cannot be told from", "probability"):
+        table.add_column(column)
+    for effect in diagnosis.effects:
+        for k, (name, p) in enumerate(effect.parameters.items()):
+            first = (effect.name, ", ".join(effect.indistinguishable_from) or "-", f"{effect.probability:.2f}")
+            label, alike, probability = first if k == 0 else ("", "", "")
+            table.add_row(label, name, _shown(p.value, p.unit), _interval(p.ci90), alike, probability)
+    return table
+
+
+def _shown(value: Any, unit: str) -> str:
+    if isinstance(value, list):
+        return "\n".join(" ".join(f"{w:5.2f}" for w in row) for row in value)
+    return f"{value:.4g} {'' if unit == '-' else unit}".strip()
+
+
+def _interval(ci90: Any) -> str:
+    if isinstance(ci90[0], list):
+        return "in diagnosis.json"
+    return f"{ci90[0]:.4g} to {ci90[1]:.4g}"
+
+
+def ranking_table(diagnosis: Diagnosis, most: int = 8) -> Table:
+    """The effects that explain most, and why the others lose."""
+    table = Table(title="the catalogue, best first", title_justify="left")
+    for column in ("effect", "score gain", "p", "held-out gain", "why"):
+        table.add_column(column)
+    for r in diagnosis.ranking[:most]:
+        held_out = "-" if r.held_out_gain is None else f"{r.held_out_gain:.0f} +- {r.held_out_se:.0f}"
+        table.add_row(r.name, f"{r.gain:.1f}", f"{r.p_value:.2g}", held_out, r.why)
+    return table
+
+
+def fit_table(diagnosis: Diagnosis) -> Table:
+    """How well pushes are predicted that were left out, before and after."""
+    table = Table(title="pushes predicted while left out (root mean square)", title_justify="left")
+    for column in ("model", "mm", "deg", "sigmas", "reduced chi-square"):
+        table.add_column(column, justify="right")
+    fit = diagnosis.fit
+    rows = [("plain", fit.position_before, fit.rotation_before, fit.rms_before, diagnosis.reduced_chi2_before)]
+    if diagnosis.effects:
+        after = (fit.position_after, fit.rotation_after, fit.rms_after, diagnosis.reduced_chi2_after)
+        rows.append(("with what is missing", *after))
+    for name, position, rotation, sigmas, chi2 in rows:
+        table.add_row(name, f"{1e3 * position:.2f}", f"{math.degrees(rotation):.2f}", f"{sigmas:.2f}", f"{chi2:.2f}")
+    return table

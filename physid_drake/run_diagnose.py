@@ -1,0 +1,211 @@
+"""The ``diagnose`` command: a recording in, ``diagnosis.json``, a page and ``model.yaml`` out."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses as dc
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from physid_drake.cell import CellConfig
+from physid_drake.diagnose import Case, Diagnosis, Evidence, case_of, diagnose
+from physid_drake.diagnose.fit import Fitted
+from physid_drake.diagnose.memory import Memory
+from physid_drake.effects import effect_named
+from physid_drake.errors import ConfigError
+from physid_drake.identify.config import ThetaConfig
+from physid_drake.model import Model
+from physid_drake.recording import Recording, read_recording
+from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table
+from physid_drake.report.diagnosis_page import ShownPush, diagnosis_page
+from physid_drake.resources import shipped
+from physid_drake.run_folder import RunFolder
+
+STATE = "stages.npz"
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command.
+
+    Raises:
+        PhysidError: one line that says what is wrong.
+        KeyboardInterrupt: when interrupted; the stages that were done are kept.
+    """
+    if not 0.0 < arguments.alpha < 1.0:
+        raise ConfigError(f"--alpha must be between 0 and 1, but is {arguments.alpha:g}.")
+    if arguments.seed < 0:
+        raise ConfigError(f"--seed must be at least 0, but is {arguments.seed}.")
+    for name in arguments.effects or ():
+        effect_named(name)
+    console = Console()
+    recording = read_recording(recording_folder(arguments.recording))
+    config = cell_config(recording, arguments.contact, arguments.time_step)
+    case = case_of(recording, config, ThetaConfig(), jobs=arguments.jobs)
+    settings = {"seed": arguments.seed, "alpha": arguments.alpha, "effects": arguments.effects,
+                "cell": dc.asdict(config), "recording": recording.name, "pushes": _fingerprint(case)}  # fmt: skip
+    out = arguments.out or Path("diagnoses") / recording.name
+    folder = RunFolder.open(out, json.dumps(settings, indent=2) + "\n", name="settings.json", state=STATE)
+    diagnosis, evidence = run_case(
+        case, console, seed=arguments.seed, alpha=arguments.alpha, effects=arguments.effects,
+        memory=Memory(folder.path / STATE),
+    )  # fmt: skip
+    write(folder, diagnosis, evidence)
+    folder.forget(STATE)
+    show(console, diagnosis)
+    console.print(
+        f"written: {', '.join(str(folder.path / n) for n in ('diagnosis.json', 'page.html', 'model.yaml'))}"
+    )
+    return 0
+
+
+def run_case(
+    case: Case,
+    console: Console,
+    *,
+    seed: int,
+    alpha: float,
+    effects: Sequence[str] | None = None,
+    memory: Memory | None = None,
+) -> tuple[Diagnosis, Evidence]:
+    """Diagnose with a progress bar."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        return diagnose(case, seed=seed, alpha=alpha, effects=effects, tick=_bar(progress), memory=memory)
+
+
+def _bar(progress: Progress) -> Callable[[str, int, int], None]:
+    task = progress.add_task("starting", total=None)
+
+    def show_stage(stage: str, done: int, total: int) -> None:
+        progress.update(task, description=stage, completed=done, total=total or None)
+
+    return show_stage
+
+
+def recording_folder(text: str) -> Path:
+    """A folder, or a recording that ships with the project."""
+    path = Path(text)
+    if not path.exists() and path.parent == Path() and (shipped("recordings") / text).is_dir():
+        return shipped("recordings") / text
+    return path
+
+
+def cell_config(recording: Recording, contact: str, time_step: float | None) -> CellConfig:
+    """The cell's configuration: ticks in which nothing moves by more than half a millimetre, at most 10 ms.
+
+    Raises:
+        ConfigError: if the time step is not in (0, 0.05] s.
+    """
+    if time_step is not None and not 0.0 < time_step <= 0.05:
+        raise ConfigError(f"--time-step must be in (0, 0.05] s, but is {time_step:g}.")
+    config = CellConfig()
+    config.contact.model = contact
+    config.solver.time_step_s = time_step or _tick(recording)
+    config.solver.slide_time_step_s = max(config.solver.slide_time_step_s, config.solver.time_step_s)
+    if time_step is not None:
+        config.solver.slide_time_step_s = min(0.05, 2.0 * time_step)
+    return config
+
+
+def _tick(recording: Recording) -> float:
+    """1 ms; longer where the hand is so slow that a tick is a tenth of a millimetre."""
+    fastest = 0.0
+    for push in recording.pushes:
+        if push.hand is None or len(push.hand) < 3:
+            return 1e-3
+        steps = np.linalg.norm(np.diff(push.hand.positions[:, :2], axis=0), axis=1)
+        fastest = max(fastest, float(np.quantile(steps / np.diff(push.hand.times), 0.95)))
+    return float(np.clip(1e-4 / max(fastest, 1e-6), 1e-3, 1e-2)) if fastest < 0.03 else 1e-3
+
+
+def _fingerprint(case: Case) -> list[float]:
+    """What tells one recording from another: the sum of each push's poses."""
+    return [float(p.poses.sum() + p.times.sum()) for p in case.problems]
+
+
+def show(console: Console, diagnosis: Diagnosis) -> None:
+    """Print the diagnosis."""
+    console.print()
+    console.print(f"[bold]{diagnosis.verdict}[/bold] (p = {diagnosis.p_value:.2g}). {diagnosis.sentence}")
+    if diagnosis.location is not None:
+        console.print(f"Where: {diagnosis.location.statement}.")
+    console.print(f"Left over: {diagnosis.left}.")
+    if diagnosis.effects:
+        console.print(findings_table(diagnosis))
+    console.print(fit_table(diagnosis))
+    console.print(ranking_table(diagnosis))
+    push = diagnosis.next_push
+    if push is not None:
+        console.print(
+            f"Next push: towards {push.direction_deg:.0f} degrees at {push.speed_mps:.2g} m/s,"
+            f" {1e3 * push.contact_offset_m:.0f} mm off the middle, would settle it with probability"
+            f" {push.settles_with_probability:.2f}."
+        )
+
+
+def write(folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence) -> None:
+    """Write ``diagnosis.json``, ``page.html`` and ``model.yaml``.
+
+    Raises:
+        OutputError: if one cannot be written.
+    """
+    folder.write("diagnosis.json", diagnosis_json(diagnosis))
+    page = diagnosis_page(diagnosis, evidence.case.recording, shown_pushes(diagnosis, evidence), evidence.wrenches)
+    folder.write("page.html", page)
+    folder.write("model.yaml", model_of(diagnosis, evidence).dump(folder.path / "model.yaml"))
+
+
+def shown_pushes(diagnosis: Diagnosis, evidence: Evidence) -> list[ShownPush]:
+    """All pushes, recorded and as the models before and after have them."""
+    case = evidence.case
+    pushes = []
+    for i, problem in enumerate(case.problems):
+        features = case.features[i]
+        pushes.append(
+            ShownPush(
+                name=problem.name,
+                times=features.middles,
+                recorded=features.poses(features.recorded),
+                before=features.poses(_predicted(evidence.plain, i, features.recorded)),
+                after=(
+                    features.poses(_predicted(evidence.final, i, features.recorded)) if diagnosis.effects else None
+                ),
+                released=next(
+                    (w.start for w in evidence.wrenches if w.push == i and w.phase == "free_slide"), None
+                ),
+            )
+        )  # fmt: skip
+    return pushes
+
+
+def _predicted(fitted: Fitted, i: int, recorded: np.ndarray) -> np.ndarray:
+    """Features that a model predicts with the push's own unknowns at zero: the residual is linear in them."""
+    push = fitted.pushes[i]
+    return np.asarray(recorded - push.residual + push.shared @ fitted.solution.beta)
+
+
+def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
+    """The model that leaves: with the effects if they were found, else plain."""
+    case = evidence.case
+    state = evidence.final.state if diagnosis.effects else evidence.plain.state
+    spec = case.pool.spec
+    intervals: dict[str, object] = {
+        f"theta.{name}": list(t.ci90) for name, t in diagnosis.theta.items() if t.ci90 is not None
+    }
+    for effect in diagnosis.effects:
+        intervals |= {f"{effect.name}.{name}": p.ci90 for name, p in effect.parameters.items()}
+    return Model(
+        recording=case.recording.name,
+        shape=spec.shape,
+        hand_radius=spec.hand_radius,
+        table=spec.table,
+        config=spec.config,
+        body=case.thetas.body(np.asarray(case.thetas.space.from_unit(state.u))),
+        effects=tuple(e.effect(case) for e in state.effects) if diagnosis.effects else (),
+        intervals=intervals,
+    )

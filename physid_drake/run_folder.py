@@ -1,0 +1,64 @@
+"""A run's folder: files that are written whole or not at all, and the state to go on from."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from physid_drake.errors import OutputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunFolder:
+    """A run's folder: its configuration, the state to go on from, the results."""
+
+    path: Path
+
+    @classmethod
+    def open(
+        cls, path: Path, configuration: str, *, name: str = "config.yaml", state: str = "belief.npz"
+    ) -> RunFolder:
+        """Make the folder, or go on in one; the state of a run with another configuration is dropped.
+
+        Args:
+            path: of the folder.
+            configuration: text that says what the run is; kept in the folder.
+            name: of the file that keeps it.
+            state: of the file that an interrupted run goes on from.
+
+        Raises:
+            OutputError: if it cannot be written.
+        """
+        folder = cls(path=path)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            config = path / name
+            if config.exists() and config.read_text(encoding="utf-8") != configuration:
+                folder.forget(state)
+        except (OSError, UnicodeDecodeError) as error:
+            raise OutputError(f"output folder '{path}': cannot be written: {error}.") from error
+        folder.write(name, configuration)
+        return folder
+
+    def write(self, name: str, text: str) -> None:
+        """Write a file whole or not at all.
+
+        Raises:
+            OutputError: if it cannot be written.
+        """
+        part = None
+        try:
+            with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=self.path, delete=False) as part:
+                part.write(text)
+            Path(part.name).chmod(0o644)
+            os.replace(part.name, self.path / name)  # noqa: PTH105
+        except OSError as error:
+            if part is not None:
+                Path(part.name).unlink(missing_ok=True)
+            raise OutputError(f"'{self.path / name}': cannot be written: {error}.") from error
+
+    def forget(self, name: str) -> None:
+        """Drop a file: the run is done, or it was another run's."""
+        (self.path / name).unlink(missing_ok=True)
