@@ -122,6 +122,7 @@ def _register_diagnose(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--time-step", type=float, metavar="S", help="tick in contact (default: 1 ms, or by the speed)"
     )
+    parser.add_argument("--pushes", type=int, default=24, metavar="N", help="look at so many at most (default 24)")
     parser.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: the machine's cores)")
     parser.set_defaults(run=_run_diagnose)
 

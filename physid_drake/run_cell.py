@@ -14,6 +14,8 @@ from pydrake.systems.framework import DiagramBuilder
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from physid_drake.diagnose import case_of
+from physid_drake.diagnose.memory import Memory
 from physid_drake.errors import PhysidError
 from physid_drake.identify import Identification, Identifier
 from physid_drake.identify.nuisance import nuisance_of
@@ -24,7 +26,7 @@ from physid_drake.report.page import result_page
 from physid_drake.report.result import result_json
 from physid_drake.report.stage import Scene, Stage
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
-from physid_drake.resources import shipped
+from physid_drake.run_diagnose import ALPHA, STATE, recording_folder, run_case, show, write
 from physid_drake.run_folder import RunFolder
 from physid_drake.scenario import dump_scenario, load_scenario
 from physid_drake.scenario_schema import Scenario
@@ -57,6 +59,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="where results go (default: runs/<scenario>)")
     parser.add_argument("--seed", type=int, metavar="N", help="of everything random, instead of the scenario's")
     parser.add_argument("--set", dest="override", metavar="YAML", help="such as '{search: {budget: 20}}'")
+    parser.add_argument("--no-diagnosis", action="store_true", help="identify only")
     parser.add_argument("--no-view", action="store_true", help="serve no live Meshcat while working")
     return parser
 
@@ -70,7 +73,7 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     name, scenario = load_scenario(
         arguments.config, arguments.override, recording=arguments.recording, seed=arguments.seed
     )
-    recording = read_recording(_recording_folder(scenario.recording))
+    recording = read_recording(recording_folder(scenario.recording))
     out = arguments.out or Path("runs") / name
     # Everything that can be refused is refused before anything is written.
     identifier = _identifier(scenario, recording, out)
@@ -90,16 +93,21 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     folder.write("page.html", page)
     folder.write("result.json", result_json(result, recording, scenario.seed, versions()))
     folder.forget("belief.npz")
-    console.print(f"written: {folder.path / 'result.json'}, {folder.path / 'page.html'}")
+    console.print(f"written: result.json and page.html in {folder.path}")
+    if not arguments.no_diagnosis:
+        _diagnose(scenario, recording, folder, console)
     _keep_serving(arguments.no_view, stage, console)
 
 
-def _recording_folder(text: str) -> Path:
-    """A folder, or a recording that ships with the project."""
-    path = Path(text)
-    if not path.exists() and path.parent == Path() and (shipped("recordings") / text).is_dir():
-        return shipped("recordings") / text
-    return path
+def _diagnose(scenario: Scenario, recording: Recording, folder: RunFolder, console: Console) -> None:
+    """Say what physics is missing, and keep the model with it."""
+    case = case_of(recording, scenario.cell, scenario.theta, jobs=scenario.search.jobs)
+    memory = Memory(folder.path / STATE)
+    diagnosis, evidence = run_case(case, console, seed=scenario.seed, alpha=ALPHA, memory=memory)
+    write(folder, diagnosis, evidence, page="diagnosis.html")
+    folder.forget(STATE)
+    show(console, diagnosis)
+    console.print(f"written: diagnosis.json, diagnosis.html and model.yaml in {folder.path}")
 
 
 def versions() -> dict[str, str]:

@@ -27,6 +27,7 @@ from physid_drake.resources import shipped
 from physid_drake.run_folder import RunFolder
 
 STATE = "stages.npz"
+ALPHA = 0.01  # false-alarm rate
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -40,12 +41,14 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"--alpha must be between 0 and 1, but is {arguments.alpha:g}.")
     if arguments.seed < 0:
         raise ConfigError(f"--seed must be at least 0, but is {arguments.seed}.")
+    if arguments.pushes < 1:
+        raise ConfigError(f"--pushes must be at least 1, but is {arguments.pushes}.")
     for name in arguments.effects or ():
         effect_named(name)
     console = Console()
     recording = read_recording(recording_folder(arguments.recording))
     config = cell_config(recording, arguments.contact, arguments.time_step)
-    case = case_of(recording, config, ThetaConfig(), jobs=arguments.jobs)
+    case = case_of(recording, config, ThetaConfig(), jobs=arguments.jobs, most=arguments.pushes)
     settings = {"seed": arguments.seed, "alpha": arguments.alpha, "effects": arguments.effects,
                 "cell": dc.asdict(config), "recording": recording.name, "pushes": _fingerprint(case)}  # fmt: skip
     out = arguments.out or Path("diagnoses") / recording.name
@@ -148,15 +151,15 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
         )
 
 
-def write(folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence) -> None:
-    """Write ``diagnosis.json``, ``page.html`` and ``model.yaml``.
+def write(folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, page: str = "page.html") -> None:
+    """Write ``diagnosis.json``, the page and ``model.yaml``.
 
     Raises:
         OutputError: if one cannot be written.
     """
     folder.write("diagnosis.json", diagnosis_json(diagnosis))
-    page = diagnosis_page(diagnosis, evidence.case.recording, shown_pushes(diagnosis, evidence), evidence.wrenches)
-    folder.write("page.html", page)
+    pushes = shown_pushes(diagnosis, evidence)
+    folder.write(page, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches))
     folder.write("model.yaml", model_of(diagnosis, evidence).dump(folder.path / "model.yaml"))
 
 

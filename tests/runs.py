@@ -48,7 +48,7 @@ def write_small(folder: Path, count: int = 3, **changes: object) -> Path:
 def quick(out: Path, *argv: object, recording: Path, **overrides: object) -> int:
     """The exit status of a quick run into ``out``."""
     override = json.dumps(laid_over(QUICK, overrides))
-    arguments = ["--recording", recording, "--out", out, "--set", override, "--no-view", *argv]
+    arguments = ["--recording", recording, "--out", out, "--set", override, "--no-view", "--no-diagnosis", *argv]
     return run_cell.main([str(a) for a in arguments])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,19 @@ SURELY_HELD = 0.5  # of the friction: a resting object under less does not slide
 FALLEN = 0.05  # m below the table top: it does not come back
 PARKED = (0.0, 0.0, 10.0)  # m: a hand that takes no part
 FASTEST = 50.0  # m/s: beyond it a rollout has diverged
+
+
+class _Touch(NamedTuple):
+    """Object and hand at one time: the section's pose and twist, gap, normal, lever from Bo, the gap's rate."""
+
+    pose: tuple[float, float, float]
+    twist: tuple[float, float, float]
+    gap: float
+    nx: float
+    ny: float
+    rx: float
+    ry: float
+    rate: float
 
 
 class Stepper:
@@ -203,6 +217,11 @@ class Stepper:
         rate = nx * (vx - wz * ry - velocity[0]) + ny * (vy + wz * rx - velocity[1])
         return gap, nx, ny, rx, ry, rate
 
+    def _touch(self, hand: list[float], velocity: tuple[float, float]) -> _Touch:
+        """The touch as it is now."""
+        pose, twist = self._section()
+        return _Touch(pose, twist, *self._closing(pose, twist, hand, velocity))
+
     def _resting(self, k: int) -> bool:
         vx, vy, wz = self._twist()
         if math.hypot(vx, vy) + abs(wz) * 0.05 > REST_SPEED or self._scene.solid.rolling_radius is not None:
@@ -242,18 +261,23 @@ class Stepper:
     def _tick(self, k: int, count: int) -> int:
         """Advance by one tick, or by a few in a free slide; returns the new tick."""
         dt = self._solver.time_step_s
-        pose, twist = self._section()
         if self._hand is None:
             m = min(k + self._slide_ticks, count)
-            self._step(m * dt, k * dt, None)
+            self._step(m * dt, k * dt, None, None)
             return m
         m = k + 1
         velocity = self._hand_velocity(self._hand[k], self._hand[m], dt)
-        gap, *_, rate = self._closing(pose, twist, self._hand[k], velocity)
+        touch = self._touch(self._hand[k], velocity)
         reach = dt * NEAR * self._slide_ticks
-        if gap + min(rate, 0.0) * reach > 0.0 and k + self._slide_ticks <= count and self._far(k, count, pose):
+        if (
+            touch.gap + min(touch.rate, 0.0) * reach > 0.0
+            and k + self._slide_ticks <= count
+            and self._far(k, count, touch.pose)
+        ):
             m = k + self._slide_ticks
-        self._cross(k * dt, m * dt, self._hand[k], self._hand[m])
+            velocity = self._hand_velocity(self._hand[k], self._hand[m], (m - k) * dt)
+            touch = self._touch(self._hand[k], velocity)
+        self._cross(k * dt, m * dt, self._hand[k], self._hand[m], velocity, touch)
         return m
 
     def _far(self, k: int, count: int, pose: tuple[float, float, float]) -> bool:
@@ -265,33 +289,44 @@ class Stepper:
     def _hand_velocity(start: list[float], end: list[float], span: float) -> tuple[float, float]:
         return (end[0] - start[0]) / span, (end[1] - start[1]) / span
 
-    def _cross(self, begin: float, end: float, start: list[float], goal: list[float]) -> None:
+    def _cross(
+        self,
+        begin: float,
+        end: float,
+        start: list[float],
+        goal: list[float],
+        velocity: tuple[float, float],
+        touch: _Touch,
+    ) -> None:
         """Advance over one tick, stopping at a touch to apply the impact law."""
         time, hand = begin, start
-        velocity = self._hand_velocity(start, goal, end - begin)
+        seen: _Touch | None = touch  # valid until the object or the hand has moved
         for _ in range(3):
             if not self._solver.impact_law:
                 break
-            until = self._time_to_touch(hand, velocity, end - time)
+            seen = seen or self._touch(hand, velocity)
+            until = self._time_to_touch(seen, hand, velocity, end - time)
             if until is None:
                 break
             if not self._discrete and until > SMALLEST_STEP:
-                touch = [hand[0] + until * velocity[0], hand[1] + until * velocity[1]]
-                self._step(time + until, time, (hand, touch, velocity))
-                time, hand = time + until, touch
+                reached = [hand[0] + until * velocity[0], hand[1] + until * velocity[1]]
+                self._step(time + until, time, (hand, reached, velocity), seen)
+                time, hand = time + until, reached
             self._strike(hand, velocity, until if self._discrete else 0.0)
+            seen = None
             self._log.impacts.append(self._begin + time)
             if end - time < SMALLEST_STEP:
                 return
-        self._step(end, time, (hand, goal, velocity))
+        self._step(end, time, (hand, goal, velocity), seen)
 
-    def _time_to_touch(self, hand: list[float], velocity: tuple[float, float], span: float) -> float | None:
+    def _time_to_touch(
+        self, touch: _Touch, hand: list[float], velocity: tuple[float, float], span: float
+    ) -> float | None:
         """When within ``span`` the gap closes faster than gently, or None."""
-        pose, twist = self._section()
-        gap, *_, rate = self._closing(pose, twist, hand, velocity)
+        pose, twist, gap = touch.pose, touch.twist, touch.gap
         if gap <= 0.0:
             # Already touching: only a blow is an impact (the object swung into a moving face).
-            return 0.0 if rate < -GENTLE and gap > -1e-8 else None
+            return 0.0 if touch.rate < -GENTLE and gap > -1e-8 else None
         low, low_gap = 0.0, gap
         high, high_gap = span, self._gap_after(pose, twist, hand, velocity, span)
         if high_gap > 0.0:
@@ -306,8 +341,8 @@ class Stepper:
             if high - low < 1e-9 or low_gap < 1e-10:
                 break
         later = (pose[0] + low * twist[0], pose[1] + low * twist[1], pose[2] + low * twist[2])
-        touch = [hand[0] + low * velocity[0], hand[1] + low * velocity[1]]
-        return low if self._closing(later, twist, touch, velocity)[-1] < -GENTLE else None
+        reached = [hand[0] + low * velocity[0], hand[1] + low * velocity[1]]
+        return low if self._closing(later, twist, reached, velocity)[-1] < -GENTLE else None
 
     def _gap_after(
         self,
@@ -450,21 +485,32 @@ class Stepper:
     # Drake's step.
 
     def _step(
-        self, end: float, begin: float, move: tuple[list[float], list[float], tuple[float, float]] | None
+        self,
+        end: float,
+        begin: float,
+        move: tuple[list[float], list[float], tuple[float, float]] | None,
+        seen: _Touch | None,
     ) -> None:
-        """Let Drake advance from ``begin`` to ``end``; ``move`` is the tip's start, goal and velocity."""
+        """Let Drake advance from ``begin`` to ``end``.
+
+        Args:
+            end: time [s].
+            begin: time [s].
+            move: the tip's start, goal and velocity.
+            seen: the touch at the start, where it is known already.
+        """
         span = end - begin
-        (pose, twist), old = self._section(), self._twist()
+        old = self._twist()
         touching, before = False, None
         command = (0.0, 0.0)
         if move is not None:
             hand, goal, velocity = move
-            before = self._closing(pose, twist, hand, velocity)
-            touching = before[0] + span * min(before[5], 0.0) <= 1e-6
+            before = seen or self._touch(hand, velocity)
+            touching = before.gap + span * min(before.rate, 0.0) <= 1e-6
             if not touching:
                 self._drift = 0.0
             push = -self._drift / span
-            command = (velocity[0] + push * before[1], velocity[1] + push * before[2])
+            command = (velocity[0] + push * before.nx, velocity[1] + push * before.ny)
             self._x[self._hand_q[0]], self._x[self._hand_q[1]] = hand
             self._x[self._hand_v[0]], self._x[self._hand_v[1]] = command
             self._x[self._hand_v[2]] = 0.0
@@ -524,16 +570,16 @@ class Stepper:
 
     def _learn_drift(
         self,
-        before: tuple[float, float, float, float, float, float],
+        before: _Touch,
         move: tuple[list[float], list[float], tuple[float, float]],
         span: float,
     ) -> None:
         """How much the gap moved beyond Drake's linear prediction, because the face turned: fed forward."""
         if not self._solver.drift_feedforward:
             return
-        gap, nx, ny, rx, ry, _ = before
         _, goal, velocity = move
         pose, after = self._section()
+        nx, ny, rx, ry = before.nx, before.ny, before.rx, before.ry
         rate = nx * (after[0] - after[2] * ry - velocity[0]) + ny * (after[1] + after[2] * rx - velocity[1])
         now, *_ = self._gap_at(*pose, *goal)
-        self._drift = now - (gap + span * rate)
+        self._drift = now - (before.gap + span * rate)

@@ -28,6 +28,7 @@ Tick = Callable[[str, int, int], None]
 # 0.5 mrad for slow pushes, as much as one millisecond costs for fast ones.
 TRAVEL_PER_TICK = 2.5e-4
 PACES = (1.0, 1.5, 2.0, 3.0, 4.0)
+MOST_PUSHES = 24  # more take longer and tell little more
 UNIT_SCATTER = 0.025  # of friction, push to push: the columns' unit and the median of its prior
 LEAST_MOTION = 6.0  # standard deviations: an object that moves less in every push does not move
 # A rollout's own error acts like a start that is known no better than this [m, m, rad].
@@ -67,8 +68,17 @@ class Case:
         return [None if p is None else self.features[i].of(p) for p, i in zip(predictions, owners, strict=True)]
 
 
-def case_of(recording: Recording, config: CellConfig, theta: ThetaConfig, jobs: int = 0) -> Case:
+def case_of(
+    recording: Recording, config: CellConfig, theta: ThetaConfig, *, jobs: int = 0, most: int = MOST_PUSHES
+) -> Case:
     """Prepare a recording.
+
+    Args:
+        recording: the pushes.
+        config: of the cell.
+        theta: the plain cell's unknowns.
+        jobs: processes; 0 takes the machine's cores.
+        most: pushes to look at; of more, so many are taken at equal distances.
 
     Raises:
         RecordingError: if the object never moves, or there is no push.
@@ -76,8 +86,15 @@ def case_of(recording: Recording, config: CellConfig, theta: ThetaConfig, jobs: 
     if not recording.pushes:
         raise RecordingError(f"recording '{recording.name}': there is no push to diagnose; record at least three.")
     noise, sensors = tracker_noise(recording)
+    orders = np.unique(
+        np.linspace(0, len(recording.pushes) - 1, min(most, len(recording.pushes))).round().astype(int)
+    )
+    recording = recording.subset(orders.tolist())
     solid = solid_of(recording.object.shape)
-    problems = tuple(_paced(_floored(p), config) for p in problems_of(recording, sensors, solid.height))
+    problems = tuple(
+        dc.replace(_paced(_floored(p), config), order=int(order))
+        for p, order in zip(problems_of(recording, sensors, solid.height), orders, strict=True)
+    )
     _refuse_still(recording, problems, noise)
     thetas = theta_map(
         recording.object, solid.outline, (config.friction_cells[0], config.friction_cells[1]), theta,
@@ -133,7 +150,7 @@ def _surroundings(recording: Recording, problems: Sequence[PushProblem], thetas:
         height=solid.height,
         region=np.array([places.min(axis=0), places.max(axis=0)]),
         top_speed=max(0.02, float(np.median([_top_speed(p) for p in problems])) * 1.5),
-        pushes=len(problems),
+        pushes=max(p.order for p in problems) + 1,
         has_hand=recording.hand is not None,
         rolls=solid.rolling_radius is not None,
         interval=float(np.median(np.concatenate([np.diff(push.object.times) for push in recording.pushes]))),

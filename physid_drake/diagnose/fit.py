@@ -130,6 +130,7 @@ class Fitter:
         self.case = case
         self.extra = extra
         self.tolerances = tolerances
+        self._places = {problem.name: i for i, problem in enumerate(case.problems)}
 
     def start(self, u: Array) -> State:
         """The plain model at theta ``u`` (d,)."""
@@ -156,7 +157,7 @@ class Fitter:
         predictions: list[Prediction | None] = self.case.pool.run(tasks)
         result = []
         for task, prediction in zip(tasks, predictions, strict=True):
-            features = self.case.features[task.problem.order]
+            features = self.case.features[self._places[task.problem.name]]
             result.append(np.full(len(features.recorded), FAILED) if prediction is None else features.of(prediction))
         return result
 

@@ -56,6 +56,7 @@ class Score:
         signature: the family's.
         kept: indices of its directions that may be used (one-sided ones only if their sign is right).
         coefficients: (p,) best steps; 0 in directions not kept.
+        theta: (d,) change of theta in the unit cube that goes with it.
         gain: twice the gain in log likelihood.
         log_p: of that gain, chi-square with as many degrees of freedom as directions.
     """
@@ -63,6 +64,7 @@ class Score:
     signature: Signature
     kept: tuple[int, ...]
     coefficients: Array
+    theta: Array
     gain: float
     log_p: float
 
@@ -116,7 +118,7 @@ def signatures(
             for d, j in enumerate(family.free):
                 for sign in (1.0, -1.0) if family.central else (1.0,):
                     point = np.array(family.point)
-                    point[j] += sign * chart[j].step
+                    point[j] += sign * family.size * chart[j].step
                     plan.append((s, i, d, sign))
                     tasks.append(fitter.task(state, i, effects=[*present, kind.at(point, case.around)]))
     vectors: list[Array] = []
@@ -165,7 +167,7 @@ def tolerances(fitter: Fitter, found: Sequence[Signature]) -> tuple[Array, ...]:
     for s in found:
         chart = s.kind.chart(fitter.case.around)
         for d, j in enumerate(s.family.free):
-            if chart[j].tolerance > 0.0:
+            if chart[j].tolerance > 0.0 and s.family.size == 1.0:
                 chosen.append((s, d, chart[j].tolerance / chart[j].step))
     count = len(fitter.case.problems)
     empty = [np.zeros((len(f.recorded), 0)) for f in fitter.case.features]
@@ -191,17 +193,19 @@ def score(fitted: Fitted, signature: Signature) -> Score:
         mean = np.concatenate([fitted.prior_mean, np.zeros(len(kept))])
         std = np.concatenate([fitted.prior_std, np.full(len(kept), np.inf)])
         scatter, value = best_scatter(pushes, mean, std)
-        beta = solve(Whitened.of(pushes, scatter), mean, std).beta[len(fitted.prior_mean) :]
+        everything = solve(Whitened.of(pushes, scatter), mean, std).beta
+        theta, beta = everything[: len(fitted.state.u)], everything[len(fitted.prior_mean) :]
         wrong = [k for k, b in zip(kept, beta, strict=True) if signature.one_sided[k] and b < 0.0]
         if not wrong:
             coefficients[kept] = beta
             gain = max(0.0, 2.0 * (value - fitted.score))
             log_p = log_probability(gain, len(kept), len(pushes), fitted.own_dimension)
             return Score(
-                signature=signature, kept=tuple(kept), coefficients=coefficients, gain=gain, log_p=log_p
+                signature=signature, kept=tuple(kept), coefficients=coefficients, theta=theta, gain=gain, log_p=log_p
             )  # fmt: skip
         kept = [k for k in kept if k not in wrong]
-    return Score(signature=signature, kept=(), coefficients=coefficients, gain=0.0, log_p=0.0)
+    nothing = np.zeros(len(fitted.state.u))
+    return Score(signature=signature, kept=(), coefficients=coefficients, theta=nothing, gain=0.0, log_p=0.0)
 
 
 def log_probability(gain: float, directions: int, pushes: int, spent: int) -> float:
@@ -284,5 +288,5 @@ def start_of(fitter: Fitter, one: Score) -> EffectPoint:
     origin = np.array(family.point)
     point = origin.copy()
     for j, c in zip(family.free, one.coefficients.tolist(), strict=True):
-        point[j] = float(np.clip(point[j] + c * chart[j].step, chart[j].lower, chart[j].upper))
+        point[j] = float(np.clip(point[j] + c * family.size * chart[j].step, chart[j].lower, chart[j].upper))
     return EffectPoint(kind=one.kind, point=point, free=one.kind.leading(fitter.case.around), origin=origin)

@@ -53,6 +53,7 @@ SAMPLES = 400  # of an effect's chart, for the intervals of its parameters
 # The cell's own error that guard, floor and tolerances leave: cost per degree of freedom where nothing is missing.
 SLACK = 1.15
 EXPLAINED = 1.5  # cost per degree of freedom, over that slack, above which something is still missing
+HOPELESS = 6.0  # cost per degree of freedom with an effect: no second one of the catalogue will make up for that
 VISIBLE = 10.0  # standard deviations of motion: pushes that would not show such an effect show nothing
 IDENTIFIABLE = 0.5  # posterior over prior standard deviation
 
@@ -68,6 +69,7 @@ class Evidence:
         screening: of the catalogue at the plain cell.
         signatures: of the catalogue at the plain cell.
         steps: one per accepted effect: all candidates of that step.
+        rejected: candidates of a step in which none was accepted.
         final: the model at the end.
         remaining: screening of what it leaves.
         wrenches: what is missing from the plain cell, window by window.
@@ -80,6 +82,7 @@ class Evidence:
     screening: Screening
     signatures: tuple[Signature, ...]
     steps: tuple[tuple[Candidate, ...], ...]
+    rejected: tuple[Candidate, ...]
     final: Fitted
     remaining: Screening
     wrenches: tuple[MissingWrench, ...] = ()
@@ -109,13 +112,17 @@ def gather(
     screening = screen(plain, found, screen_rng)
     current, remaining, at = plain, screening, found
     steps: list[tuple[Candidate, ...]] = []
+    rejected: tuple[Candidate, ...] = ()
     while len(steps) < min(MOST_EFFECTS, len(kinds)) and mismatch(current, remaining) < alpha:
         candidates = confirm(fitter, current, remaining.scores, tick)
         if not candidates or not candidates[0].accepted:
+            rejected = candidates
             break
         steps.append(candidates)
         tick(f"model with {candidates[0].name}", 0, 0)
         current = fitter.fit(_freed(case, candidates[0].fitted.state), rounds=1)
+        if current.reduced_chi2 > HOPELESS:
+            break
         # The signatures at the plain cell are near enough to ask whether anything is left.
         left = [s for s in at if s.kind not in {e.kind for e in current.state.effects}]
         remaining = screen(current, left, screen_rng)
@@ -126,6 +133,7 @@ def gather(
     case.pool.count += rough.case.pool.count
     return Evidence(
         case=case, fitter=fitter, plain=plain, screening=screening, signatures=tuple(found), steps=tuple(steps),
+        rejected=rejected,
         final=current, remaining=remaining,
     )  # fmt: skip
 
@@ -428,7 +436,7 @@ def smallest(evidence: Evidence, alpha: float) -> tuple[Detectable, ...]:
             steps = math.sqrt(threshold) / norm
             coordinate = signature.kind.chart(case.around)[j]
             point = np.array(signature.family.point)
-            point[j] += steps * coordinate.step
+            point[j] += steps * signature.family.size * coordinate.step
             moved = steps * _rms(np.concatenate([c[:, d] for c in signature.columns]))
             one = _detectable(case, signature.kind, point, moved)
             if one.name not in best or moved < best[one.name].sigmas:
@@ -459,7 +467,8 @@ def _gain_needed(pushes: int, spent: int, looks: float, alpha: float) -> float:
 def _ranking(evidence: Evidence, findings: Sequence[EffectFinding]) -> tuple[Ranked, ...]:
     named = {f.name for f in findings}
     classes = {name for f in findings for name in f.indistinguishable_from}
-    fitted = {c.name: c for step in reversed(evidence.steps) for c in step}
+    steps = (*evidence.steps, evidence.rejected)
+    fitted = {c.name: c for step in reversed(steps) for c in step}
     rows = []
     for one in evidence.screening.scores:
         candidate = fitted.get(one.kind.name)

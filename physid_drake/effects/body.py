@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from physid_drake.cell import Body
 from physid_drake.cell.support import PressureGrid
-from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
+from physid_drake.effects.effect import (
+    Coordinate,
+    Effect,
+    Family,
+    PushFacts,
+    Surroundings,
+    families_of_sizes,
+    parameter,
+)
 from physid_drake.recording import Box, Cylinder, MeshShape, Prism, Shape
 
 Array = NDArray[np.float64]
@@ -178,6 +186,12 @@ class Restitution(Effect):
         del around
         # A bounce is caught up by the hand, so that what is seen of it grows with the coefficient's square.
         return (Coordinate(name="coefficient", step=0.1, lower=0.0, upper=0.95),)
+
+    @classmethod
+    def families(cls, around: Surroundings) -> tuple[Family, ...]:
+        """Small and large."""
+        del around
+        return families_of_sizes(1.0, 4.0)
 
     def body(self, body: Body, facts: PushFacts) -> Body:
         """The body with its bounce."""

@@ -97,11 +97,18 @@ class Family:
         free: indices of the coordinates that leave it.
         central: take central differences, since the effect builds another cell, whose quadrature differs by more
             than a step does.
+        size: steps to take: more than one where a large effect looks different from a small one.
     """
 
     point: tuple[float, ...]
     free: tuple[int, ...]
     central: bool = False
+    size: float = 1.0
+
+
+def families_of_sizes(*sizes: float) -> tuple[Family, ...]:
+    """Families of a chart with one coordinate: small and large amplitudes."""
+    return tuple(Family(point=(0.0,), free=(0,), size=size) for size in sizes)
 
 
 @dc.dataclass(frozen=True, kw_only=True)

@@ -284,7 +284,8 @@ class Sloshing(Effect):
         """A few frequencies."""
         del around
         return tuple(
-            Family(point=(0.0, math.log(frequency), math.log(0.05)), free=(0,)) for frequency in (1.5, 3.0, 5.0, 9.0)
+            Family(point=(0.0, math.log(frequency), math.log(0.05)), free=(0,), size=3.0)
+            for frequency in (1.5, 3.0, 5.0, 9.0)
         )
 
     @classmethod

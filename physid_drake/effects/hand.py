@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import HandPath, Motion
-from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
+from physid_drake.effects.effect import (
+    Coordinate,
+    Effect,
+    Family,
+    PushFacts,
+    Surroundings,
+    families_of_sizes,
+    parameter,
+)
 
 Array = NDArray[np.float64]
 FINE = 2e-3  # s between knots of a path that was changed
@@ -57,6 +65,12 @@ class HandCompliance(_HandEffect):
         """The compliance; the damping is hardly seen and keeps its value."""
         force = around.friction * around.weight
         return (Coordinate(name="compliance", step=2e-4 / force, lower=0.0, upper=0.05 / force),)
+
+    @classmethod
+    def families(cls, around: Surroundings) -> tuple[Family, ...]:
+        """Small and large."""
+        del around
+        return families_of_sizes(1.0, 5.0, 25.0)
 
     def hand(self, path: HandPath, facts: PushFacts, before: Motion | None) -> HandPath:
         """The path less what the spring gives."""
@@ -173,6 +187,12 @@ class ActuatorLag(_HandEffect):
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """The time constant."""
         return (Coordinate(name="time_constant", step=2e-3, lower=0.0, upper=0.3, tolerance=2e-4),)
+
+    @classmethod
+    def families(cls, around: Surroundings) -> tuple[Family, ...]:
+        """Small and large."""
+        del around
+        return families_of_sizes(1.0, 8.0, 30.0)
 
     def hand(self, path: HandPath, facts: PushFacts, before: Motion | None) -> HandPath:
         """The path, lagged."""

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.effects.effect import Coordinate, Effect, Pose, Surroundings, parameter
+from physid_drake.effects.effect import Coordinate, Effect, Family, Pose, Surroundings, families_of_sizes, parameter
 
 Array = NDArray[np.float64]
 
@@ -31,6 +31,12 @@ class TrackerLatency(Effect):
         """The delay."""
         del around
         return (Coordinate(name="delay", step=2e-3, lower=0.0, upper=0.5, tolerance=2e-4),)
+
+    @classmethod
+    def families(cls, around: Surroundings) -> tuple[Family, ...]:
+        """Small and large."""
+        del around
+        return families_of_sizes(1.0, 8.0, 30.0)
 
     def lateness(self) -> float:
         """By how much."""

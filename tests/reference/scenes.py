@@ -159,6 +159,7 @@ def simulate(
     time_step: float = TIME_STEP,
     support_points: int = 600,
     friction_of_points: np.ndarray | None = None,
+    force: tuple[float, float] = (0.0, 0.0),
 ) -> Motion:
     """The reference motion of one push.
 
@@ -170,6 +171,7 @@ def simulate(
         time_step: Longest step, s.
         support_points: About how many points carry the object.
         friction_of_points: One coefficient per point of `body.support(support_points)`, else uniform.
+        force: A constant force in W, N: the table is not level.
     """
     hand = Hand(
         path=push.path,
@@ -188,6 +190,7 @@ def simulate(
         times,
         hand=hand,
         pose=push.pose,
+        force=force,
         support=true_body.support(support_points),
         time_step=time_step,
     )

@@ -1,0 +1,118 @@
+"""A diagnosis of worlds that the planar reference made: what is missing is named, and nothing else."""
+
+import json
+
+import numpy as np
+import pytest
+from reference.scenes import OBJECTS, Theta
+from rich.console import Console
+from worlds import endpoints, pushes_of, recorded
+
+from physid_drake import load_model
+from physid_drake.cell import CellConfig
+from physid_drake.diagnose import case_of, diagnose
+from physid_drake.diagnose.memory import Memory
+from physid_drake.errors import RecordingError
+from physid_drake.identify.config import ThetaConfig
+from physid_drake.report.diagnosis import diagnosis_json
+from physid_drake.run_diagnose import model_of, show
+
+ERASER = OBJECTS["eraser"]
+THETA = Theta(support_friction=0.3, hand_friction=0.25)
+LOOKED_AT = ("viscous_drag", "table_tilt", "tether", "friction_gradient", "friction_drift", "com_offset")
+
+
+def case(recording):
+    config = CellConfig()
+    config.contact.model = "point"
+    return case_of(recording, config, ThetaConfig())
+
+
+def world(count=8, seed=11, **more):
+    return recorded(ERASER, THETA, pushes_of(ERASER, count, seed), seed, **more)
+
+
+@pytest.fixture(scope="module")
+def tilted():
+    """The table leans by 12 mrad along x, 4 % of the friction."""
+    recording = world(force=(ERASER.mass * 9.81 * 0.012, 0.0))
+    made = case(recording)
+    return (made, *diagnose(made, effects=LOOKED_AT))
+
+
+def test_nothing_is_found_where_nothing_is_missing():
+    diagnosis, _ = diagnose(case(world()), effects=LOOKED_AT)
+    assert diagnosis.verdict == "consistent"
+    assert diagnosis.effects == () and diagnosis.location is None
+    assert diagnosis.theta["support_friction"].value == pytest.approx(0.3, rel=0.02)
+    assert not diagnosis.theta["mass"].identifiable
+
+
+def test_a_tilt_is_found_named_and_measured(tilted):
+    _, diagnosis, _ = tilted
+    assert diagnosis.verdict in ("explained", "ambiguous")
+    (found,) = diagnosis.effects
+    assert "table_tilt" in (found.name, *found.indistinguishable_from)
+    assert len(found.indistinguishable_from) <= 1
+    if found.name == "table_tilt":
+        assert found.parameters["x"].value == pytest.approx(0.012, rel=0.1)
+        assert abs(found.parameters["y"].value) < 0.0015
+    assert diagnosis.fit.rms_after < 0.8 * diagnosis.fit.rms_before
+    assert diagnosis.location is not None and diagnosis.location.frame == "world"
+
+
+def test_the_model_that_leaves_predicts_what_the_diagnosis_says(tilted, tmp_path):
+    made, diagnosis, evidence = tilted
+    model = model_of(diagnosis, evidence)
+    file = tmp_path / "model.yaml"
+    file.write_text(model.dump(file), encoding="utf-8")
+    loaded = load_model(file)
+    assert loaded.effects == model.effects
+    problem = made.problems[0]
+    run = {"start": problem.start, "path": problem.path, "begin": problem.begin, "end": problem.end,
+           "hand_height": problem.hand_height}  # fmt: skip
+    again, first, plain = (m.build().rollout(**run).poses for m in (loaded, model, model.plain()))
+    np.testing.assert_array_equal(again, first)
+    assert np.abs(first[-1] - plain[-1]).max() > 1e-4
+
+
+def test_the_same_recording_and_seed_give_the_same_bytes_also_after_an_interruption(tilted, tmp_path):
+    made, diagnosis, _ = tilted
+    memory = Memory(tmp_path / "stages.npz")
+
+    def stop(stage, done, total):
+        if stage.startswith("fit with"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        diagnose(made, effects=LOOKED_AT, tick=stop, memory=memory)
+    again, _ = diagnose(made, effects=LOOKED_AT, memory=Memory(tmp_path / "stages.npz"))
+    assert diagnosis_json(again) == diagnosis_json(diagnosis)
+
+
+def test_a_diagnosis_prints_and_is_json(tilted, capsys):
+    _, diagnosis, _ = tilted
+    show(Console(), diagnosis)
+    assert diagnosis.verdict in capsys.readouterr().out
+    content = json.loads(diagnosis_json(diagnosis))
+    keys = {"format", "recording", "verdict", "p_value", "alpha", "effects", "location", "fit", "theta", "next_push",
+            "seed"}  # fmt: skip
+    assert keys <= content.keys() and content["format"] == "physid-diagnosis/1"
+
+
+def test_two_pushes_of_which_only_the_ends_are_known_cannot_tell():
+    diagnosis, _ = diagnose(case(endpoints(world(count=2))), effects=LOOKED_AT)
+    assert diagnosis.verdict == "underpowered"
+
+
+def test_an_object_that_never_moves_is_refused():
+    recording = world(count=1)
+    push = recording.pushes[0]
+    still = type(push.object)(
+        times=push.object.times,
+        positions=np.tile(push.object.positions[0], (len(push.object), 1)),
+        quaternions=np.tile(push.object.quaternions[0], (len(push.object), 1)),
+    )
+    frozen = type(push)(name=push.name, object=still, hand=push.hand, force=None)
+    with pytest.raises(RecordingError, match="never moves"):
+        case(type(recording)(**{**vars(recording), "pushes": (frozen,)}))

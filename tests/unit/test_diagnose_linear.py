@@ -1,0 +1,99 @@
+"""The linear algebra of a diagnosis, against brute force."""
+
+import dataclasses as dc
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, left_out_scores, own_unknowns, solve
+from physid_drake.diagnose.screen import log_probability
+
+FRICTION = 1  # column of the pushes' own unknowns
+
+
+def made(rng, pushes=10, m=12, shared=3, own=4, beta=None, scatter=1.0):
+    beta = np.zeros(shared) if beta is None else beta
+    result = []
+    for _ in range(pushes):
+        x, j = rng.standard_normal((m, shared)), rng.standard_normal((m, own))
+        noise = np.diag(rng.uniform(0.5, 2.0, m))
+        unknowns = rng.standard_normal(own)
+        unknowns[FRICTION] *= scatter
+        residual = x @ beta + j @ unknowns + np.sqrt(np.diag(noise)) * rng.standard_normal(m)
+        result.append(LinearPush(residual=residual, shared=x, own=j, noise=noise, friction=FRICTION))
+    return result
+
+
+def test_whitened_residuals_are_white():
+    rng = np.random.default_rng(0)
+    pushes = made(rng, pushes=400)
+    white = Whitened.of(pushes, 1.0)
+    assert np.var(white.y) == pytest.approx(1.0, abs=0.05)
+    assert np.abs(np.cov(np.array(white.residuals).T) - np.eye(12)).max() < 0.25
+
+
+def test_the_marginal_likelihood_is_that_of_the_full_covariance():
+    pushes = made(np.random.default_rng(1))
+    solution = solve(Whitened.of(pushes, 1.3), np.zeros(3), np.full(3, np.inf))
+    expected = sum(
+        stats.multivariate_normal(p.shared @ solution.beta, p.covariance(1.3)).logpdf(p.residual) for p in pushes
+    )
+    assert solution.log_likelihood - 60.0 * np.log(2.0 * np.pi) == pytest.approx(expected, rel=1e-9)
+
+
+def test_leaving_a_push_out_is_the_same_as_fitting_without_it():
+    pushes = made(np.random.default_rng(2), beta=np.array([0.3, -0.2, 0.5]))
+    mean, std = np.array([0.1, 0.0, 0.0]), np.array([1.0, np.inf, np.inf])
+    scores, residuals = left_out_scores(pushes, 1.0, mean, std)
+    for k, push in enumerate(pushes):
+        others = solve(Whitened.of(pushes[:k] + pushes[k + 1 :], 1.0), mean, std)
+        spread = push.covariance(1.0) + push.shared @ np.linalg.inv(others.precision) @ push.shared.T
+        expected = stats.multivariate_normal(push.shared @ others.beta, spread).logpdf(push.residual)
+        assert scores[k] == pytest.approx(expected, rel=1e-6)
+        np.testing.assert_allclose(residuals[k], push.residual - push.shared @ others.beta, atol=1e-7)
+
+
+@pytest.mark.parametrize("scatter", [0.6, 1.0, 3.0])
+def test_the_scatter_of_friction_is_learnt(scatter):
+    pushes = made(np.random.default_rng(3), pushes=80, scatter=scatter)
+    found, _ = best_scatter(pushes, np.zeros(3), np.full(3, np.inf))
+    assert found == pytest.approx(scatter, rel=0.35)
+
+
+def test_a_pushs_own_unknowns_are_the_posterior_mean():
+    (push,) = made(np.random.default_rng(4), pushes=1)
+    joint = np.linalg.solve(
+        push.own.T @ np.linalg.solve(push.noise, push.own) + np.eye(4),
+        push.own.T @ np.linalg.solve(push.noise, push.residual),
+    )
+    np.testing.assert_allclose(own_unknowns(push, 1.0, np.zeros(3)), joint, atol=1e-10)
+
+
+def test_a_push_that_is_not_there_tells_nothing():
+    pushes = made(np.random.default_rng(5))
+    blind = [dc.replace(p, shared=np.zeros_like(p.shared)) for p in pushes]
+    solution = solve(Whitened.of(blind, 1.0), np.array([0.2, 0.0, 0.0]), np.ones(3))
+    np.testing.assert_allclose(solution.beta, [0.2, 0.0, 0.0], atol=1e-9)
+
+
+def test_gains_of_pushes_without_an_effect_are_uniform_in_p():
+    """Friction that scatters, an effect that acts like friction: the push is the unit, not the sample."""
+    rng, p_values = np.random.default_rng(6), []
+    for _ in range(400):
+        n, d = 10, 2
+        x, y = rng.standard_normal((n, d + 1)), rng.standard_normal(n)
+        left = [_left(a, y) for a in (x[:, :d], x)]
+        gain = n * np.log(left[0] / left[1])
+        p_values.append(np.exp(log_probability(gain, 1, n, d)))
+    assert stats.kstest(p_values, "uniform").pvalue > 0.01
+
+
+def _left(design, y):
+    fit = design @ np.linalg.lstsq(design, y, rcond=None)[0]
+    return float((y - fit) @ (y - fit))
+
+
+def test_more_gain_is_less_probable_and_more_directions_need_more_of_it():
+    assert log_probability(30.0, 1, 10, 3) < log_probability(10.0, 1, 10, 3) < 0.0
+    assert log_probability(30.0, 3, 10, 3) > log_probability(30.0, 1, 10, 3)

@@ -1,0 +1,67 @@
+"""Noise of the tracker as seen at rest, and the windows that pushes are compared in."""
+
+import dataclasses as dc
+
+import numpy as np
+import pytest
+from recovery.worlds import POSITION_STD, pushes_of, recorded
+from reference.scenes import OBJECTS, Theta
+
+from physid_drake.diagnose.features import features_of
+from physid_drake.diagnose.noise import _reml, tracker_noise
+from physid_drake.identify.problem import problems_of
+
+ERASER = OBJECTS["eraser"]
+
+
+def rests(rng, count, length, rho, sigma=2.0):
+    """Rests of first-order autoregressive noise about means of their own, at 100 Hz."""
+    pieces = []
+    for _ in range(count):
+        noise = np.empty(length)
+        noise[0] = rng.standard_normal()
+        for k in range(1, length):
+            noise[k] = rho * noise[k - 1] + np.sqrt(1 - rho**2) * rng.standard_normal()
+        pieces.append((0.01 * np.arange(length), 5.0 * rng.standard_normal() + sigma * noise))
+    return pieces
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.85])
+def test_short_rests_tell_a_slow_noise(rho):
+    sigma, constant = _reml(rests(np.random.default_rng(1), 40, 20, rho))
+    assert sigma == pytest.approx(2.0, rel=0.25 if rho > 0.8 else 0.08)
+    found = np.exp(-0.01 / constant) if constant > 0.0 else 0.0
+    assert found == pytest.approx(rho, abs=0.12)
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return recorded(ERASER, Theta(), pushes_of(ERASER, 4, 3), 5)
+
+
+def test_a_stated_noise_is_taken_where_it_is_seen(recording):
+    noise, plain = tracker_noise(recording)
+    assert noise.stated and noise.position == POSITION_STD == plain.position
+
+
+def test_a_stated_noise_that_the_rests_contradict_is_not_believed(recording):
+    wrong = dc.replace(recording, sensors=dc.replace(recording.sensors, object_position_std=POSITION_STD / 5))
+    noise, _ = tracker_noise(wrong)
+    assert noise.position == pytest.approx(POSITION_STD, rel=0.15)
+    assert "position" in noise.warnings[0]
+
+
+def test_features_of_pure_noise_have_the_covariance_that_is_written_down(recording):
+    noise, plain = tracker_noise(recording)
+    push = recording.pushes[0]
+    problem = problems_of(recording, plain, 0.03)[0]
+    features = features_of(push, problem, noise)
+    rng, n = np.random.default_rng(2), len(problem.times)
+    vectors = [
+        features._vector(noise.sigmas * rng.standard_normal((n, 3)), np.zeros((0, 2))) for _ in range(4000)
+    ]  # fmt: skip
+    spread = np.cov(np.array(vectors).T)
+    floor = features.noise - spread
+    # What is written down beyond the tracker's noise is the cell's own error: smooth and small.
+    assert np.abs(np.diag(floor)).max() < 0.2
+    assert (np.linalg.eigvalsh(features.noise) > 0).all()

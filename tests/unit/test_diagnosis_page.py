@@ -1,0 +1,241 @@
+"""The page of a diagnosis: well-formed, complete, escaped, the same bytes twice."""
+
+import dataclasses as dc
+import math
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from physid_drake.diagnose.localise import MissingWrench
+from physid_drake.diagnose.values import (
+    Detectable,
+    Diagnosis,
+    EffectFinding,
+    FitQuality,
+    Location,
+    NextPush,
+    ParameterEstimate,
+    Ranked,
+    ThetaEstimate,
+    Window,
+)
+from physid_drake.recording import Box, Cylinder, Hand, ObjectModel, PoseStream, Push, Recording, Sensors, Table
+from physid_drake.report.diagnosis_page import ShownPush, diagnosis_page
+
+NAMES = ("pushes/<b>1</b>.csv", "pushes/$2$ & co.csv")
+VOID = {"meta", "br", "link", "img", "hr", "input"}
+
+
+def estimate(value, unit="-", null=None):
+    return ParameterEstimate(value=value, unit=unit, ci90=[value - 0.1, value + 0.1], null=null)
+
+
+def effect(name, **parameters):
+    return EffectFinding(
+        name=name, element="table", indistinguishable_from=("a <i>rival</i>",), probability=0.8,
+        parameters=parameters, statement="a statement",
+    )  # fmt: skip
+
+
+def ranked(name, **figures):
+    return Ranked(name=name, **figures)
+
+
+LAWS = {
+    "stribeck_friction": {"excess": estimate(0.4, null=0.0), "speed": estimate(0.05, "m/s")},
+    "viscous_drag": {"coefficient": estimate(0.2, "N*s/m", 0.0)},
+    "quadratic_drag": {"coefficient": estimate(0.2, "N*s^2/m^2", 0.0)},
+    "anisotropic_table": {"ratio": estimate(1.3), "angle": estimate(0.5, "rad")},
+    "anisotropic_object": {"ratio": estimate(1.3), "angle": estimate(0.5, "rad")},
+    "friction_patch": {n: estimate(v) for n, v in (("ratio", 0.6), ("x", 0.05), ("y", 0.0), ("radius", 0.04))},
+    "friction_gradient": {"slope_x": estimate(0.5, "1/m"), "slope_y": estimate(-0.2, "1/m")},
+    "table_tilt": {"x": estimate(0.01, "rad"), "y": estimate(-0.02, "rad")},
+    "tether": {n: estimate(v) for n, v in (("stiffness", 1.0), ("x", 40.0), ("y", 0.0), ("rest_length", 0.1))},
+    "magnet": {n: estimate(v) for n, v in (("strength", 1e-4), ("x", 0.05), ("y", 0.0), ("core", 0.03))},
+    "uneven_support": {
+        "weights": ParameterEstimate(
+            value=[[1.0, 2.0], [0.5, 0.5]], unit="-", ci90=[[[0.9, 1.8], [0.4, 0.4]], [[1.1, 2.2], [0.6, 0.6]]],
+            null=[[1.0]],
+        )
+    },
+}  # fmt: skip
+
+
+def diagnosis_with(**changes):
+    d = Diagnosis(
+        recording="eraser <u>",
+        verdict="explained",
+        sentence="What is missing: stribeck_friction.",
+        p_value=1e-9,
+        alpha=0.01,
+        effects=(effect("stribeck_friction", **LAWS["stribeck_friction"]),),
+        location=Location(
+            statement="in its free slide: about 0.1 N", phase=("free_slide",), dof=("along_motion",),
+            frame="object_velocity", windows=(Window(push=NAMES[0], start=0.5, end=1.0),),
+        ),
+        fit=FitQuality(
+            rms_before=3.0, rms_after=1.0, position_before=2e-3, position_after=5e-4, rotation_before=0.02,
+            rotation_after=0.01, log_score_gain=20.0, log_score_gain_se=4.0,
+            per_push=((NAMES[0], 2.0, 1.0), (NAMES[1], math.inf, 0.9)),
+        ),
+        theta={
+            "mass": ThetaEstimate(value=None, unit="kg", ci90=None, identifiable=False, before=0.1),
+            "support_friction": ThetaEstimate(
+                value=0.25, unit="-", ci90=(0.2, 0.3), identifiable=True, before=0.24
+            ),
+        },
+        next_push=NextPush(direction_deg=45.0, speed_mps=0.2, contact_offset_m=-0.01, settles_with_probability=0.9),
+        seed=3,
+        ranking=(
+            ranked("stribeck_friction", gain=40.0, p_value=0.0, held_out_gain=20.0, held_out_se=4.0, why="found"),
+            ranked("table_tilt", gain=math.nan, p_value=1.0, held_out_gain=None, held_out_se=None, why="too little"),
+        ),
+        detectable=(
+            Detectable(name="uneven_support", parameter="weights", value=math.nan, unit="-", sigmas=math.inf),
+            Detectable(name="table_tilt", parameter="x", value=2e-3, unit="rad", sigmas=0.7),
+        ),
+        left="nothing beyond noise",
+        reduced_chi2_before=4.0,
+        reduced_chi2_after=1.1,
+        friction_scatter=0.02,
+        noise={"position_m": 3e-4, "rotation_rad": 3e-3, "correlation_time_s": [0.0, 0.01], "jitter_s": 0.0},
+        warnings=("a <script>warning</script>",),
+        rollouts=100,
+    )  # fmt: skip
+    return dc.replace(d, **changes)
+
+
+def recording_of(shape=None):
+    times = np.array([0.0, 1.0])
+    stream = PoseStream(times=times, positions=np.zeros((2, 3)), quaternions=np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)))
+    return Recording(
+        name="eraser",
+        description="",
+        object=ObjectModel(shape=shape or Box(size=(0.1, 0.06, 0.03))),
+        table=Table(size=(1.0, 1.0)),
+        hand=Hand(tip="sphere"),
+        sensors=Sensors(),
+        pushes=tuple(Push(name=name, object=stream, hand=stream, force=None) for name in NAMES),
+    )
+
+
+def shown_pushes(*, after=True):
+    times = np.linspace(0.0, 1.0, 9)
+    path = np.column_stack([0.1 * times, 0.02 * times**2, 0.3 * times])
+    broken = path + 0.01
+    broken[4:] = np.nan  # a rollout that diverged
+    return [
+        ShownPush(
+            name=name, times=times, recorded=path, before=before, after=path + 1e-3 if after else None, released=0.5
+        )
+        for name, before in zip(NAMES, (path + 5e-3, broken), strict=True)
+    ]  # fmt: skip
+
+
+def missing(push, start, phase):
+    return MissingWrench(
+        push=push, start=start, end=start + 0.5, wrench=np.array([-0.1, 0.05, 1e-3]), std=np.array([0.02, 0.1, 2e-4]),
+        phase=phase, speed=0.2, heading=0.3, yaw=0.1, place=np.array([0.05, 0.01]),
+    )  # fmt: skip
+
+
+WRENCHES = [missing(k, start, phase) for k in (0, 1) for start, phase in ((0.0, "contact"), (0.5, "free_slide"))]
+
+
+class Tags(HTMLParser):
+    """Collects what is open, and refuses an end that does not fit."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.open, self.seen, self.ids, self.words = [], [], [], []
+        self.feed(page)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.handle_startendtag(tag, attrs)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.seen.append(tag)
+        self.ids += [value for name, value in attrs if name == "id"]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+@pytest.fixture(scope="module")
+def page():
+    return diagnosis_page(diagnosis_with(), recording_of(), shown_pushes(), WRENCHES)
+
+
+def test_a_page_is_well_formed_and_complete(page):
+    tags = Tags(page)
+    text = " ".join(tags.words)
+    assert page.startswith("<!DOCTYPE html>") and not tags.open
+    assert len(tags.ids) == len(set(tags.ids))
+    # Law, next push, two views, arrows, and for each push its errors and its strip.
+    assert tags.seen.count("svg") == 1 + 1 + 2 + 1 + 2 + 2
+    for words in (
+        "explained", "What is missing: stribeck_friction.", "1 × 10⁻⁹", "not told by these pushes", "0.2 to 0.3",
+        "In its free slide: about 0.1 N", "too little", "< 10⁻³⁰⁰", "nothing beyond noise",
+    ):  # fmt: skip
+        assert words in text
+
+
+def test_names_are_escaped(page):
+    tags = Tags(page)
+    assert "script" not in tags.seen and "u" not in tags.seen and "i" in tags.seen
+    assert "<b>1</b>" not in page and "pushes/<b>1</b>.csv" in tags.words
+    assert "pushes/$2$ & co.csv" in tags.words
+    assert "<i>rival</i>" not in page and "<script>" not in page
+
+
+def test_a_page_needs_no_network(page):
+    assert "http" not in page and "@import" not in page
+    assert all(target.startswith("#") for target in re.findall(r'(?:href|src)="([^"]*)"', page))
+    assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", page))
+
+
+def test_the_same_diagnosis_gives_the_same_bytes(page):
+    assert diagnosis_page(diagnosis_with(), recording_of(), shown_pushes(), WRENCHES) == page
+
+
+@pytest.mark.parametrize("verdict", ["consistent", "underpowered", "unexplained", "of another day"])
+def test_a_page_of_little(verdict):
+    bare = diagnosis_with(verdict=verdict, effects=(), location=None, next_push=None, ranking=(), detectable=(),
+                          theta={}, warnings=())  # fmt: skip
+    tags = Tags(diagnosis_page(bare, recording_of(), (), ()))
+    assert verdict in tags.words and not tags.open and "svg" not in tags.seen
+
+
+def test_where_nothing_was_found_only_the_plain_cell_is_shown():
+    bare = diagnosis_with(verdict="unexplained", effects=())
+    text = diagnosis_page(bare, recording_of(), shown_pushes(after=False)[:1], WRENCHES[:2])
+    assert "with what is missing" not in text and 'class="after"' not in text
+    assert "No effect of the catalogue is claimed." in text
+
+
+def test_what_is_not_a_number_is_a_dash(page):
+    cells = [re.sub(r"<.*?>", "", row) for row in re.findall(r"<tr>(.*?)</tr>", page, flags=re.S)]
+    weights = next(c for c in cells if "uneven_support" in c)
+    assert "–" in weights and "∞" in weights and not re.search(r"\b(nan|inf)\b", " ".join(Tags(page).words))
+
+
+def test_every_law_is_drawn():
+    effects = tuple(effect(name, **parameters) for name, parameters in LAWS.items())
+    text = diagnosis_page(diagnosis_with(effects=effects), recording_of(), shown_pushes()[:1], ())
+    assert text.count('aria-label="Law of ') == len(LAWS)
+    unknown = (effect("size_error", ratio=estimate(1.01)), effect("magnet", strength=estimate(1.0)))
+    text = diagnosis_page(diagnosis_with(effects=unknown), recording_of(), (), ())
+    assert 'aria-label="Law of ' not in text and "size_error" in text
+
+
+def test_a_standing_cylinder_is_round():
+    shape = Cylinder(radius=0.03, length=0.05, axis="z")
+    assert "Table from above" in diagnosis_page(diagnosis_with(), recording_of(shape), shown_pushes()[:1], ())
