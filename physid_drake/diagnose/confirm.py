@@ -85,7 +85,8 @@ def confirm(
 ) -> tuple[Candidate, ...]:
     """Fit the best few effects of a screening, each added to the model ``before``; best held-out gain first."""
     best = max((s.gain for s in scores), default=0.0)
-    chosen = [s for s in scores if s.kept and s.gain >= WORTH_A_FIT * best][:most]
+    worth = [s for s in scores if s.kept and s.gain >= WORTH_A_FIT * best]
+    chosen = sorted(worth, key=lambda s: -s.gain)[:most]
     plain = push_scores(before)
     found = []
     for k, one in enumerate(chosen):

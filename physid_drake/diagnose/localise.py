@@ -170,25 +170,30 @@ def _solved(plain: Fitted, i: int, windows: Sequence[_Spell], columns: Array, un
 
 
 def with_phases(case: Case, wrenches: Sequence[MissingWrench]) -> tuple[MissingWrench, ...]:
-    """The phase of each window: in contact while the recorded hand's tip is at the object's outline."""
+    """The phase of each window: a free slide begins when the recorded tip is last at the object's outline."""
+    released = {i: _released(case, i) for i in {w.push for w in wrenches}}
+    return tuple(
+        dc.replace(w, phase="contact" if 0.5 * (w.start + w.end) <= released[w.push] else "free_slide")
+        for w in wrenches
+    )
+
+
+def _released(case: Case, i: int) -> float:
+    """When the tip was last within a millimetre, and the tracker's noise, of the object's outline [s]."""
+    problem, radius = case.problems[i], 0.0 if case.recording.hand is None else case.recording.hand.radius
+    if problem.path is None or len(problem.times) < 2:
+        return -np.inf
     outline = solid_of(case.recording.object.shape).outline
-    radius = 0.0 if case.recording.hand is None else case.recording.hand.radius
-    result = []
-    for w in wrenches:
-        problem = case.problems[w.push]
-        phase = "free_slide"
-        if problem.path is not None:
-            middle = 0.5 * (w.start + w.end)
-            hand = problem.path.positions(np.array([middle]))[0]
-            features = case.features[w.push]
-            poses = features.poses(features.recorded)
-            x, y, yaw = (float(np.interp(middle, features.middles, poses[:, k])) for k in range(3))
-            c, s = math.cos(yaw), math.sin(yaw)
-            dx, dy = hand[0] - x, hand[1] - y
-            gap = outline.nearest(c * dx + s * dy, c * dy - s * dx)[0] - radius
-            phase = "contact" if gap < 1e-3 + 4.0 * case.noise.position else "free_slide"
-        result.append(dc.replace(w, phase=phase))
-    return tuple(result)
+    near = 1e-3 + 4.0 * case.noise.position
+    last = -np.inf
+    for time, (x, y, yaw), hand in zip(
+        problem.times, problem.poses, problem.path.positions(problem.times), strict=True
+    ):
+        c, s = math.cos(yaw), math.sin(yaw)
+        dx, dy = hand[0] - x, hand[1] - y
+        if outline.nearest(c * dx + s * dy, c * dy - s * dx)[0] - radius < near:
+            last = float(time)
+    return last
 
 
 def locate(case: Case, wrenches: Sequence[MissingWrench], rng: np.random.Generator) -> Location | None:
@@ -254,6 +259,9 @@ def _looks(case: Case, wrenches: Sequence[MissingWrench]) -> dict[str, Array]:
     return looks
 
 
+_SAID = {"along_motion": "along the motion", "across_motion": "across the motion", "rotation": "as a torque"}
+
+
 def _location(
     case: Case, wrenches: Sequence[MissingWrench], values: Array, told: Sequence[tuple[float, str]]
 ) -> Location:
@@ -273,7 +281,7 @@ def _location(
     if told:
         frame, direction, _ = told[0][1].split("|")
         detail = {
-            "object_velocity": f"{direction.replace('_', ' ')}, wherever the object heads",
+            "object_velocity": f"{_SAID[direction]}, wherever the object heads",
             "world": f"along {direction} of the table",
             "object": f"along {direction} of the object",
             "push_order": "along the motion, changing from push to push",

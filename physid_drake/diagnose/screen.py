@@ -227,7 +227,7 @@ def screen(fitted: Fitted, found: Sequence[Signature], rng: np.random.Generator)
         name = signature.kind.name
         if name not in best or one.log_p < best[name].log_p:
             best[name] = one
-    scores = tuple(sorted(best.values(), key=lambda s: s.log_p))
+    scores = tuple(sorted(best.values(), key=lambda s: (s.log_p, -s.gain)))
     null = _null_draws(fitted, found, rng)
     # As many independent looks as give the draws' median of the smallest p.
     looks = max(1.0, float(np.log(2.0) / np.exp(np.median(null))))

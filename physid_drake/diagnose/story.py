@@ -258,10 +258,11 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
 
 
 def _verdict(evidence: Evidence, p_value: float, alpha: float, detectable: Sequence[Detectable]) -> str:
+    if len(evidence.case.problems) < FEWEST_PUSHES:
+        return "underpowered"  # nothing can be confirmed on pushes that were left out
     if p_value >= alpha:
         blind = float(np.median([d.sigmas for d in detectable])) > VISIBLE if detectable else True
-        few = len(evidence.case.problems) < FEWEST_PUSHES
-        return "underpowered" if few or blind else "consistent"
+        return "underpowered" if blind else "consistent"
     if not evidence.steps or unexplained(evidence.final):
         return "unexplained"
     return "ambiguous" if any(_class_of(evidence, step) for step in evidence.steps) else "explained"
@@ -429,7 +430,8 @@ def smallest(evidence: Evidence, alpha: float) -> tuple[Detectable, ...]:
     _, blocks = projected(plain, [s.columns for s in found])
     best: dict[str, Detectable] = {}
     for signature, block in zip(found, blocks, strict=True):
-        for d, j in enumerate(signature.family.free):
+        amplitudes = signature.family.free[:1] if signature.one_sided[0] else signature.family.free
+        for d, j in enumerate(amplitudes):
             norm = float(np.linalg.norm(block[:, d]))
             if norm < 1e-9:
                 continue
@@ -438,22 +440,24 @@ def smallest(evidence: Evidence, alpha: float) -> tuple[Detectable, ...]:
             point = np.array(signature.family.point)
             point[j] += steps * signature.family.size * coordinate.step
             moved = steps * _rms(np.concatenate([c[:, d] for c in signature.columns]))
-            one = _detectable(case, signature.kind, point, moved)
+            one = _detectable(case, signature.kind, point, j, moved)
             if one.name not in best or moved < best[one.name].sigmas:
                 best[one.name] = one
     return tuple(best.values())
 
 
-def _detectable(case: Case, kind: type[Effect], point: Array, sigmas: float) -> Detectable:
+def _detectable(case: Case, kind: type[Effect], point: Array, j: int, sigmas: float) -> Detectable:
+    """The effect at a chart point that left its null along coordinate j."""
     chart = kind.chart(case.around)
     within = np.array([np.clip(p, c.lower, c.upper) for p, c in zip(point, chart, strict=True)])
     effect = kind.at(within, case.around)
-    values = {n: getattr(effect, n) for n in kind.amplitudes}
-    numbers = {n: v for n, v in values.items() if isinstance(v, float)}
-    name = max(numbers, key=lambda n: abs(numbers[n] - kind.nulls()[n]), default=next(iter(values)))
-    return Detectable(
-        name=kind.name, parameter=name, value=numbers.get(name, float("nan")), unit=kind.units()[name], sigmas=sigmas
-    )  # fmt: skip
+    numbers = {n: getattr(effect, n) for n in kind.amplitudes if isinstance(getattr(effect, n), float)}
+    if not numbers:
+        return Detectable(
+            name=kind.name, parameter=chart[j].name, value=float(within[j]), unit="-", sigmas=sigmas
+        )  # fmt: skip
+    name = max(numbers, key=lambda n: abs(numbers[n] - kind.nulls()[n]))
+    return Detectable(name=kind.name, parameter=name, value=numbers[name], unit=kind.units()[name], sigmas=sigmas)
 
 
 def _gain_needed(pushes: int, spent: int, looks: float, alpha: float) -> float:
@@ -493,7 +497,11 @@ def _why(name: str, candidate: Candidate | None, named: set[str], classes: set[s
     if candidate is None:
         score = evidence.screening.score_of(name)
         backwards = score is not None and not score.kept
-        return "would have to act the other way round" if backwards else "explains too little to be worth a fit"
+        return (
+            "would have to act the other way round"
+            if backwards
+            else "explains less than a third of what the best does"
+        )
     if candidate.degenerate:
         return "its fit ran to nothing"
     if not candidate.accepted:

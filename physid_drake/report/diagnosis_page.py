@@ -52,6 +52,7 @@ MEANING = {
 PHASES = {"contact": "while it is pushed", "free_slide": "in its free slide"}
 DOFS = {"along_motion": "along the motion", "across_motion": "across the motion", "rotation": "in rotation"}
 MOST_ERRORS, MOST_STRIPS, MOST_RANKED = 4, 8, 8  # shown before the reader asks for more
+MOST_DRAWN = 40  # strips in all, so that the page stays small
 MOST_POINTS = 160  # of a path
 MANY_PUSHES = 12
 MM = 1e3
@@ -159,12 +160,13 @@ def _content(diagnosis: Diagnosis, recording: Recording, scene: _Scene) -> dict[
         "found": [_finding(e, k, scene) for k, e in enumerate(diagnosis.effects)],
         "phases": [] if diagnosis.location is None else [PHASES.get(p, p) for p in diagnosis.location.phase],
         "dofs": [] if diagnosis.location is None else [DOFS.get(x, x) for x in diagnosis.location.dof],
-        "frame": "" if diagnosis.location is None else diagnosis.location.frame.replace("_", " "),
+        "frame": "" if diagnosis.location is None else _frame(diagnosis.location.frame),
         "views": _views(scene),
         "errors": [_error_figure(scene, k, diagnosis.noise) for k in order[:MOST_ERRORS]],
         "arrows": _arrows(scene),
         "strips": strips[:MOST_STRIPS],
         "more_strips": strips[MOST_STRIPS:],
+        "left_out": len({w.push for w in scene.wrenches}) - len(strips),
         "fits": _fits(diagnosis),
         "bars": _bars(diagnosis),
         "ranking": _ranking(diagnosis)[:MOST_RANKED],
@@ -236,6 +238,10 @@ def _interval(ends: Sequence[float] | None, unit: str) -> str:
         return "–"
     scale = f" ({_number(math.degrees(ends[0]))}° to {_number(math.degrees(ends[1]))}°)" if unit == "rad" else ""
     return f"{_number(ends[0])} to {_number(ends[1])} {_unit(unit)}".strip() + scale
+
+
+def _frame(frame: str) -> str:
+    return "no one frame" if frame == "none" else f"of the {frame.replace('_', ' ')}"
 
 
 def _told(theta: ThetaEstimate) -> float:
@@ -442,7 +448,7 @@ def _views(scene: _Scene) -> list[tuple[str, Markup]]:
     if not scene.shown:
         return []
     box = _box(scene, scene.shown)
-    alpha = 0.5 if len(scene.shown) > MANY_PUSHES else 0.9
+    alpha = 0.7 if len(scene.shown) > MANY_PUSHES else 0.9
     views = []
     for kind, colour, title in (("before", BEFORE, "plain cell"), ("after", AFTER, "with what is missing")):
         motions = [push.before if kind == "before" else push.after for push in scene.shown]
@@ -508,7 +514,9 @@ def _strips(diagnosis: Diagnosis, scene: _Scene) -> list[tuple[str, Markup]]:
     reach = 1.2 * np.max([np.abs(np.nan_to_num(w.wrench)) for w in scene.wrenches], axis=0) * scale
     most = set() if diagnosis.location is None else {(w.push, w.start) for w in diagnosis.location.windows}
     figures = []
-    for push in sorted({w.push for w in scene.wrenches}):
+    marked = {owner for owner, _ in most}
+    every = sorted({w.push for w in scene.wrenches}, key=lambda push: (scene.name(push) not in marked, push))
+    for push in sorted(every[:MOST_DRAWN]):
         name = scene.name(push)
         mine = [w for w in scene.wrenches if w.push == push]
         figure = Figure(figsize=(3.3, 3.1))
@@ -894,7 +902,7 @@ p { margin: 6px 0 10px; max-width: 46em; } .muted, figcaption, .note { color: va
 .found { display: grid; grid-template-columns: minmax(0, 1fr) minmax(0, 370px); gap: 26px; align-items: start; }
 .found.plain { grid-template-columns: minmax(0, 1fr); }
 .columns { display: grid; grid-template-columns: repeat(2, minmax(0, 1fr)); gap: 24px; margin-top: 12px; }
-.columns.single { grid-template-columns: minmax(0, 720px); }
+.columns.single { grid-template-columns: minmax(0, 620px); }
 .grid { display: grid; grid-template-columns: repeat(4, minmax(0, 1fr)); gap: 22px 18px; margin-top: 14px; }
 .chip { display: inline-block; background: var(--paper); border: 1px solid var(--rule); border-radius: 20px;
   font-size: 12.5px; line-height: 1.4; padding: 1px 10px; margin: 2px 4px 2px 0; }
@@ -903,7 +911,8 @@ p { margin: 6px 0 10px; max-width: 46em; } .muted, figcaption, .note { color: va
 .probability i { display: block; height: 100%; background: var(--after); }
 figure { margin: 0; min-width: 0; } svg { display: block; width: 100%; height: auto; }
 svg * { stroke-linejoin: round; } svg text { font-family: inherit !important; }
-.key { font-size: 13px; color: var(--muted); margin: 4px 0 0; max-width: none; } .key span { margin-right: 16px; }
+.key { font-size: 13px; color: var(--muted); margin: 4px 0 0; max-width: none; }
+.key span { display: inline-block; margin-right: 16px; }
 .key i { display: inline-block; width: 18px; height: 4px; border-radius: 2px; vertical-align: middle;
   margin-right: 6px; }
 .key i.square { width: 12px; height: 12px; } .key i.thin { height: 2px; }
@@ -1043,7 +1052,8 @@ it is within two standard deviations. Thin lines: recorded paths, and the object
 {% endfor %}
 </div></details>{% endif %}
 <p class="note">Along and across the object's motion (positive: forwards, to its left), and torque (positive:
-anticlockwise), on the same scales in all pushes.</p>
+anticlockwise), on the same scales in all pushes.
+{% if left_out %}{{ left_out }} more pushes are not drawn.{% endif %}</p>
 {% endif %}
 </section>
 

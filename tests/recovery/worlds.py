@@ -38,7 +38,7 @@ def recorded(
     friction_changes: Sequence[float] = (),
     forces: bool = False,
     friction_of_points: np.ndarray | None = None,
-    force: tuple[float, float] = (0.0, 0.0),
+    pull: tuple[float, float] = (0.0, 0.0),
 ) -> Recording:
     """Pushes at 100 Hz with white noise; the recording does not say the mass.
 
@@ -50,7 +50,7 @@ def recorded(
         friction_changes: Friction of each push with the table over theta's, less 1.
         forces: Whether the hand's force is recorded.
         friction_of_points: One coefficient per point of `body.support(POINTS)`.
-        force: A constant force in W, N: the table is not level.
+        pull: A constant force in W, N: the table is not level.
     """
     rng = np.random.default_rng(seed)
     made = []
@@ -58,7 +58,7 @@ def recorded(
         friction = theta.support_friction * (1.0 + (friction_changes[number] if len(friction_changes) else 0.0))
         motion = simulate(
             body, replace(theta, support_friction=friction), push, np.arange(0.0, push.path.times[-1] + 0.6, 0.01),
-            time_step=TIME_STEP, support_points=POINTS, friction_of_points=friction_of_points, force=force,
+            time_step=TIME_STEP, support_points=POINTS, friction_of_points=friction_of_points, force=pull,
         )  # fmt: skip
         hand = push.path.position(motion.times) + HAND_STD * rng.standard_normal((len(motion.times), 2))
         force = None
