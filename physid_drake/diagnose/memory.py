@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ class Memory:
             try:
                 with np.load(path, allow_pickle=False) as stored:
                     self._kept = {name: stored[name] for name in stored.files}
-            except (OSError, ValueError, EOFError, KeyError):
+            except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
                 self._kept = {}  # cut off while it was written: begin again
 
     def recall(self, name: str) -> list[Array] | None:

@@ -1,0 +1,102 @@
+"""The ``diagnose`` command's refusals, and models that cannot be read: one clear line, nothing half-written."""
+
+import numpy as np
+import pytest
+import yaml
+
+from physid_drake import load_model
+from physid_drake.cell import Body, CellConfig
+from physid_drake.cli import main
+from physid_drake.diagnose.memory import Memory
+from physid_drake.effects.body import UnevenSupport
+from physid_drake.effects.forces import ViscousDrag
+from physid_drake.errors import ConfigError
+from physid_drake.model import Model
+from physid_drake.recording import Prism
+
+
+@pytest.mark.parametrize(
+    ("argv", "named"),
+    [
+        (["no_such_folder"], "no_such_folder"),
+        (["eraser_reference", "--alpha", "2"], "--alpha"),
+        (["eraser_reference", "--seed", "-1"], "--seed"),
+        (["eraser_reference", "--pushes", "0"], "--pushes"),
+        (["eraser_reference", "--time-step", "1"], "--time-step"),
+        (["eraser_reference", "--effects", "phlogiston"], "phlogiston"),
+    ],
+)
+def test_what_cannot_be_diagnosed_is_refused_in_one_line(argv, named, tmp_path, capsys):
+    assert main(["diagnose", *argv, "--out", str(tmp_path / "out")]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("error: ") and error.count("\n") == 1 and named in error
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_output_folder_that_cannot_be_written_is_refused(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert main(["diagnose", "eraser_reference", "--out", str(tmp_path / "file" / "out")]) == 1
+    assert "cannot be written" in capsys.readouterr().err
+
+
+@pytest.fixture
+def model():
+    return Model(
+        recording="triangle",
+        shape=Prism(polygon=((-0.05, -0.03), (0.07, -0.03), (-0.02, 0.06)), height=0.04),
+        hand_radius=0.01,
+        table=((-1.0, -1.0), (1.0, 1.0)),
+        config=CellConfig(),
+        body=Body(
+            mass=0.2, p_BBcm=np.array([0.001, 0.0]), inertia_ratio=1.0, hand_friction=0.2,
+            support_friction=np.array([0.3]),
+        ),
+        effects=(ViscousDrag(coefficient=0.4), UnevenSupport(weights=((1.0, 2.0), (0.5, 0.5)))),
+        intervals={"viscous_drag.coefficient": [0.3, 0.5]},
+    )  # fmt: skip
+
+
+def test_a_model_survives_its_file(model, tmp_path):
+    file = tmp_path / "model.yaml"
+    file.write_text(model.dump(file), encoding="utf-8")
+    loaded = load_model(tmp_path)
+    assert loaded.effects == model.effects and loaded.shape == model.shape and loaded.config == model.config
+    assert loaded.intervals == model.intervals and loaded.body.support_friction[0] == 0.3
+    assert loaded.build().diagram.HasSubsystemNamed("plant")
+    assert loaded.plain().effects == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"format": "physid-model/0"}, "physid-model/1"),
+        ({"effects": [{"name": "phlogiston", "parameters": {}}]}, "phlogiston"),
+        ({"effects": [{"name": "viscous_drag", "parameters": {"colour": 1.0}}]}, "colour"),
+        ({"theta": {"mass": 1.0}}, "model"),
+        ({"object": {"shape": "sphere"}}, "sphere"),
+    ],
+)
+def test_a_model_of_another_kind_is_refused_by_name(model, tmp_path, change, named):
+    file = tmp_path / "model.yaml"
+    file.write_text(yaml.safe_dump({**yaml.safe_load(model.dump(file)), **change}), encoding="utf-8")
+    with pytest.raises(ConfigError, match=named):
+        load_model(file)
+
+
+def test_a_model_that_is_not_there_or_no_yaml_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="no such file"):
+        load_model(tmp_path / "model.yaml")
+    (tmp_path / "model.yaml").write_text("{", encoding="utf-8")
+    with pytest.raises(ConfigError, match="cannot be read"):
+        load_model(tmp_path)
+
+
+def test_a_memory_that_was_cut_off_begins_again(tmp_path):
+    path = tmp_path / "stages.npz"
+    memory = Memory(path)
+    memory.keep("plain", [np.arange(3.0), np.array(2.0)])
+    kept = Memory(path).recall("plain")
+    assert kept is not None and kept[0].tolist() == [0.0, 1.0, 2.0] and float(kept[1]) == 2.0
+    assert Memory(path).recall("guard") is None
+    path.write_bytes(path.read_bytes()[:40])
+    assert Memory(path).recall("plain") is None
