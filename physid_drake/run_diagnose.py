@@ -134,7 +134,8 @@ def _fingerprint(case: Case) -> list[float]:
 def show(console: Console, diagnosis: Diagnosis) -> None:
     """Print the diagnosis."""
     console.print()
-    console.print(f"[bold]{diagnosis.verdict}[/bold] (p = {diagnosis.p_value:.2g}). {diagnosis.sentence}")
+    p_value = f"p = {diagnosis.p_value:.2g}" if diagnosis.p_value > 0.0 else "p < 1e-300"
+    console.print(f"[bold]{diagnosis.verdict}[/bold] ({p_value}). {diagnosis.sentence}")
     if diagnosis.location is not None:
         console.print(f"Where: {diagnosis.location.statement}.")
     console.print(f"Left over: {diagnosis.left}.")

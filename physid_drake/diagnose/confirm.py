@@ -100,10 +100,10 @@ def _candidate(fitter: Fitter, before: Fitted, one: Score, plain: Array, *, pers
     state = dc.replace(before.state, effects=(*before.state.effects, start))
     fitted = fitter.fit(state, rounds=4, like=before)
     if persistent and fitted.reduced_chi2 > STUCK:
-        # Far from the plain cell its derivatives mislead: from the score test's theta, all derivatives anew.
+        # Far from the plain cell its derivatives mislead: from the score test's theta, with derivatives taken there.
         u = np.clip(before.state.u + np.clip(one.theta, -FAR, FAR), 1e-3, 1.0 - 1e-3)
         fresh = dc.replace(state, u=u, own=tuple(np.zeros_like(o) for o in state.own), scatter=1.0)
-        again = fitter.fit(fresh, rounds=4, careful=1)
+        again = fitter.fit(fresh, rounds=4, careful=1, like=fitter.linearise(fresh, learn_scatter=False))
         fitted = again if again.score > fitted.score else fitted
     point = fitted.state.effects[-1]
     return Candidate(

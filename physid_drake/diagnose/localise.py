@@ -29,8 +29,7 @@ WINDOWS = 6  # per push, over its motion
 PULSE = 0.05  # of the friction force: the size of a pulse
 LARGEST = 1.0  # of the friction force: prior standard deviation of what is missing
 FLIPS = 999
-TOUCHING = 1e-6  # N
-SLOW, FAST = 0.15, 0.3  # m/s
+SURE = 2.5  # standard deviations
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -259,6 +258,15 @@ def _looks(case: Case, wrenches: Sequence[MissingWrench]) -> dict[str, Array]:
     return looks
 
 
+def _amount(wrenches: Sequence[MissingWrench]) -> str:
+    """How much is missing, where it stands out of its standard deviation."""
+    forces = [float(np.abs(w.wrench[:2]).max()) for w in wrenches if (np.abs(w.wrench[:2]) > SURE * w.std[:2]).any()]
+    torques = [abs(float(w.wrench[2])) for w in wrenches if abs(w.wrench[2]) > SURE * w.std[2]]
+    parts = [f"{np.median(forces):.2g} N"] if forces else []
+    parts += [f"{1e3 * np.median(torques):.2g} N mm"] if torques else []
+    return f": about {' and '.join(parts)} missing" if parts else ", too little in any one window to be seen there"
+
+
 _SAID = {"along_motion": "along the motion", "across_motion": "across the motion", "rotation": "as a torque"}
 
 
@@ -289,7 +297,5 @@ def _location(
         }[frame]
         frame = "object_velocity" if frame == "speed" else frame
     where = " and ".join({"contact": "while it is pushed", "free_slide": "in its free slide"}[p] for p in phase)
-    mean = float(np.median([math.hypot(*w.wrench[:2].tolist()) for w in wrenches]))
-    torque = float(np.median([abs(float(w.wrench[2])) for w in wrenches]))
-    statement = f"{where}: about {mean:.2g} N and {1e3 * torque:.2g} N mm are missing, {detail}"
+    statement = f"{where}{_amount(wrenches)}, {detail}"
     return Location(statement=statement, phase=phase, dof=dof, frame=frame, windows=windows)

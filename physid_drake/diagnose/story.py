@@ -172,10 +172,17 @@ def _freed(case: Case, state: State) -> State:
     return dc.replace(state, effects=tuple(e.freed(case) for e in state.effects))
 
 
-def mismatch(fitted: Fitted, screening: Screening) -> float:
-    """P-value of "this model explains the pushes": the better of the catalogue's and the cost's, for two looks."""
+def mismatch(fitted: Fitted, screening: Screening | None) -> float:
+    """P-value of "this model explains the pushes": the better of the catalogue's and the cost's, for two looks.
+
+    Args:
+        fitted: the model.
+        screening: of the catalogue; None where pushes that were left out confirm nothing of it, so that only the cost
+            speaks: one odd push is no physics.
+    """
     cost = float(stats.chi2.sf(fitted.solution.chi2 / SLACK, fitted.degrees))
-    return float(-np.expm1(2.0 * np.log1p(-min(screening.p_value, cost, 1.0 - 1e-16))))
+    best = cost if screening is None else min(screening.p_value, cost)
+    return float(-np.expm1(2.0 * np.log1p(-min(best, 1.0 - 1e-16))))
 
 
 def unexplained(fitted: Fitted) -> bool:
@@ -223,7 +230,7 @@ def _rival_states(evidence: Evidence) -> list[State]:
 def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
     """The verdict and all figures, from evidence; no rollouts."""
     case, plain, final = evidence.case, evidence.plain, evidence.final
-    p_value = mismatch(plain, evidence.screening)
+    p_value = mismatch(plain, evidence.screening if evidence.steps else None)
     detectable = smallest(evidence, alpha)
     verdict = _verdict(evidence, p_value, alpha, detectable)
     findings = _findings(evidence) if verdict in ("explained", "ambiguous") else ()
@@ -497,11 +504,7 @@ def _why(name: str, candidate: Candidate | None, named: set[str], classes: set[s
     if candidate is None:
         score = evidence.screening.score_of(name)
         backwards = score is not None and not score.kept
-        return (
-            "would have to act the other way round"
-            if backwards
-            else "explains less than a third of what the best does"
-        )
+        return "would have to act the other way round" if backwards else "explains far less"
     if candidate.degenerate:
         return "its fit ran to nothing"
     if not candidate.accepted:
