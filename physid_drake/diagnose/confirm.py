@@ -15,7 +15,6 @@ from physid_drake.diagnose.screen import Score, start_of
 Array = NDArray[np.float64]
 Tick = Callable[[str, int, int], None]
 
-MOST_CANDIDATES = 5
 WORTH_A_FIT = 0.35  # of the best score test's gain
 SURE = 2.0  # standard errors
 CERTAIN = 12.0  # nats of held-out gain, the best push not counted: odds of e^12
@@ -81,7 +80,7 @@ def push_scores(fitted: Fitted) -> Array:
 
 
 def confirm(
-    fitter: Fitter, before: Fitted, scores: Sequence[Score], tick: Tick, *, most: int = MOST_CANDIDATES
+    fitter: Fitter, before: Fitted, scores: Sequence[Score], tick: Tick, *, most: int
 ) -> tuple[Candidate, ...]:
     """Fit the best few effects of a screening, each added to the model ``before``; best held-out gain first."""
     best = max((s.gain for s in scores), default=0.0)

@@ -53,6 +53,8 @@ SAMPLES = 400  # of an effect's chart, for the intervals of its parameters
 # The cell's own error that guard, floor and tolerances leave: cost per degree of freedom where nothing is missing.
 SLACK = 1.15
 EXPLAINED = 1.5  # cost per degree of freedom, over that slack, above which something is still missing
+LEAST_SHARE = 0.25  # of the cost beyond noise that an effect must take away unless nothing is left
+CANDIDATES = 4  # fitted in the first step, one less in each that follows
 HOPELESS = 6.0  # cost per degree of freedom with an effect: no second one of the catalogue will make up for that
 VISIBLE = 10.0  # standard deviations of motion: pushes that would not show such an effect show nothing
 IDENTIFIABLE = 0.5  # posterior over prior standard deviation
@@ -114,13 +116,14 @@ def gather(
     steps: list[tuple[Candidate, ...]] = []
     rejected: tuple[Candidate, ...] = ()
     while len(steps) < min(MOST_EFFECTS, len(kinds)) and mismatch(current, remaining) < alpha:
-        candidates = confirm(fitter, current, remaining.scores, tick)
-        if not candidates or not candidates[0].accepted:
+        candidates = confirm(fitter, current, remaining.scores, tick, most=CANDIDATES - len(steps))
+        if not candidates or not candidates[0].accepted or not _worthwhile(current, candidates[0].fitted):
             rejected = candidates
             break
         steps.append(candidates)
         tick(f"model with {candidates[0].name}", 0, 0)
-        current = fitter.fit(_freed(case, candidates[0].fitted.state), rounds=1)
+        freed = _freed(case, candidates[0].fitted.state)
+        current = fitter.fit(freed, rounds=3, like=fitter.linearise(freed))
         if current.reduced_chi2 > HOPELESS:
             break
         # The signatures at the plain cell are near enough to ask whether anything is left.
@@ -136,6 +139,12 @@ def gather(
         rejected=rejected,
         final=current, remaining=remaining,
     )  # fmt: skip
+
+
+def _worthwhile(before: Fitted, after: Fitted) -> bool:
+    """Whether an effect takes away a good part of what noise does not account for, where much is left."""
+    excess = after.reduced_chi2 - 1.0
+    return after.reduced_chi2 <= EXPLAINED or excess <= (1.0 - LEAST_SHARE) * (before.reduced_chi2 - 1.0)
 
 
 def _first(case: Case, rng: np.random.Generator, tick: Tick, memory: Memory) -> Fitted:
