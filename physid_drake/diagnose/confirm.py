@@ -17,6 +17,7 @@ Tick = Callable[[str, int, int], None]
 
 WORTH_A_FIT = 0.35  # of the best score test's gain
 SURE = 2.0  # standard errors
+LEAST = 4.0  # nats of held-out gain
 CERTAIN = 12.0  # nats of held-out gain, the best push not counted: odds of e^12
 STUCK = 1.6  # cost per degree of freedom after which a fit is tried again from elsewhere
 PERSISTENT = 2  # candidates that are worth that
@@ -65,7 +66,7 @@ class Candidate:
             return False
         some = np.sort(self.gains)[:-1]
         local = some.sum() > CERTAIN and (self.gains > CERTAIN / 4.0).sum() >= 2
-        return bool(self.gain > max(SURE * self.standard_error, 1.0) or local)
+        return bool(self.gain > max(SURE * self.standard_error, LEAST) or local)
 
 
 def standard_error(values: Array) -> float:
