@@ -511,14 +511,20 @@ def _why(name: str, candidate: Candidate | None, named: set[str], classes: set[s
     if name in classes:
         return "these pushes cannot tell it from what was found"
     if candidate is None:
-        score = evidence.screening.score_of(name)
-        backwards = score is not None and not score.kept
-        return "would have to act the other way round" if backwards else "explains far less"
+        return _why_not_fitted(name, evidence)
     if candidate.degenerate:
         return "its fit ran to nothing"
     if not candidate.accepted:
         return "pushes that were left out do not confirm it"
     return "predicts pushes that were left out worse"
+
+
+def _why_not_fitted(name: str, evidence: Evidence) -> str:
+    score = evidence.screening.score_of(name)
+    if score is None or not score.kept:
+        return "would have to act the other way round"
+    chance = evidence.screening.looks * math.exp(score.log_p) > 0.05
+    return "explains no more than chance would" if chance else "explains far less"
 
 
 def _left(evidence: Evidence, after: Fitted) -> str:
