@@ -1,7 +1,8 @@
 """Diagnosis: where simulation and recording part, and what physics is missing."""
 
 from physid_drake.diagnose.case import Case, case_of
-from physid_drake.diagnose.story import Evidence, diagnose
+from physid_drake.diagnose.evidence import Evidence
+from physid_drake.diagnose.story import diagnose
 from physid_drake.diagnose.values import Diagnosis
 
 __all__ = ["Case", "Diagnosis", "Evidence", "case_of", "diagnose"]

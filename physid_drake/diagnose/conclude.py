@@ -1,0 +1,234 @@
+"""From evidence to the answer: the verdict and all figures, without a rollout."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from physid_drake.diagnose.case import UNIT_SCATTER, Case
+from physid_drake.diagnose.confirm import Candidate, push_scores, rivals, standard_error
+from physid_drake.diagnose.estimates import parameters_of, rms, smallest, theta_of
+from physid_drake.diagnose.evidence import EXPLAINED, Evidence, mismatch, unexplained
+from physid_drake.diagnose.fit import Fitted
+from physid_drake.diagnose.linear import left_out_scores
+from physid_drake.diagnose.localise import locate
+from physid_drake.diagnose.screen import (
+    cosine,
+)
+from physid_drake.diagnose.values import (
+    Detectable,
+    Diagnosis,
+    EffectFinding,
+    FitQuality,
+    Location,
+    Ranked,
+)
+
+Array = NDArray[np.float64]
+Tick = Callable[[str, int, int], None]
+
+ALIKE = 0.95  # cosine of two projected signatures that these pushes cannot tell apart
+FEWEST_PUSHES = 3
+VISIBLE = 10.0  # standard deviations of motion: pushes that would not show such an effect show nothing
+
+
+def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
+    """The verdict and all figures, from evidence; no rollouts."""
+    case, plain, final = evidence.case, evidence.plain, evidence.final
+    p_value = mismatch(plain, evidence.screening if evidence.steps else None)
+    detectable = smallest(evidence, alpha)
+    verdict = _verdict(evidence, p_value, alpha, detectable)
+    findings = _findings(evidence) if verdict in ("explained", "ambiguous") else ()
+    after = final if findings else plain
+    return Diagnosis(
+        recording=case.recording.name,
+        verdict=verdict,
+        sentence=_sentence(verdict, findings, evidence, detectable),
+        p_value=p_value,
+        alpha=alpha,
+        effects=findings,
+        location=_location(evidence, verdict, findings, seed),
+        fit=_quality(case, plain, after),
+        theta=theta_of(evidence, after),
+        next_push=evidence.next_push if verdict in ("explained", "ambiguous", "unexplained") else None,
+        seed=seed,
+        ranking=_ranking(evidence, findings),
+        detectable=detectable,
+        left=_left(evidence, after),
+        reduced_chi2_before=plain.reduced_chi2,
+        reduced_chi2_after=after.reduced_chi2,
+        friction_scatter=UNIT_SCATTER * after.state.scatter,
+        noise={
+            "position_m": case.noise.position,
+            "rotation_rad": case.noise.rotation,
+            "correlation_time_s": list(case.noise.correlation_time),
+            "jitter_s": case.noise.jitter,
+        },
+        warnings=case.noise.warnings,
+        rollouts=case.pool.count,
+    )
+
+
+def _verdict(evidence: Evidence, p_value: float, alpha: float, detectable: Sequence[Detectable]) -> str:
+    if len(evidence.case.problems) < FEWEST_PUSHES:
+        return "underpowered"  # nothing can be confirmed on pushes that were left out
+    if p_value >= alpha:
+        blind = float(np.median([d.sigmas for d in detectable])) > VISIBLE if detectable else True
+        return "underpowered" if blind else "consistent"
+    if not evidence.steps or unexplained(evidence.final):
+        return "unexplained"
+    return "ambiguous" if any(class_of(evidence, step) for step in evidence.steps) else "explained"
+
+
+def _location(evidence: Evidence, verdict: str, findings: Sequence[EffectFinding], seed: int) -> Location | None:
+    """Where the mismatch is; the frame is that of the physics found, where some was found."""
+    if verdict in ("consistent", "underpowered"):
+        return None
+    found = locate(evidence.case, evidence.wrenches, np.random.default_rng(seed))
+    if found is None or not findings:
+        return found
+    return dc.replace(found, frame=evidence.steps[0][0].score.kind.frame)
+
+
+def class_of(evidence: Evidence, step: Sequence[Candidate]) -> tuple[str, ...]:
+    """Names that explain these pushes as well as the best of a step."""
+    best = step[0]
+    close = {c.name for c in rivals(best, step)}
+    for other in step[1:]:
+        if other.accepted and abs(cosine(evidence.plain, best.score, other.score)) > ALIKE:
+            difference = best.gains - other.gains
+            if difference.sum() < 3.0 * standard_error(difference):
+                close.add(other.name)
+    return tuple(sorted(close))
+
+
+def _probability(step: Sequence[Candidate]) -> float:
+    """That the best of a step is the right one: odds of each rival from its held-out deficit and standard error."""
+    best, total = step[0], 1.0
+    for other in step[1:]:
+        if other.degenerate:
+            continue
+        difference = best.gains - other.gains
+        # Some error of the scores themselves, so that few pushes do not make sure.
+        spread = math.hypot(standard_error(difference), 2.0)
+        worse = float(stats.norm.sf(difference.sum() / spread))
+        total += worse / max(1.0 - worse, 1e-9)
+    return 1.0 / total
+
+
+def _findings(evidence: Evidence) -> tuple[EffectFinding, ...]:
+    found = []
+    for k, step in enumerate(evidence.steps):
+        kind = step[0].score.kind
+        found.append(
+            EffectFinding(
+                name=kind.name,
+                element=kind.element,
+                indistinguishable_from=class_of(evidence, step),
+                probability=_probability(step),
+                parameters=parameters_of(evidence, k),
+                statement=kind.statement,
+            )
+        )
+    return tuple(found)
+
+
+def _quality(case: Case, plain: Fitted, after: Fitted) -> FitQuality:
+    gains = push_scores(after) - push_scores(plain)
+    figures = []
+    per_push: list[list[float]] = []
+    for fitted in (plain, after):
+        _, residuals = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std)
+        poses = [f.poses(r) for f, r in zip(case.features, residuals, strict=True)]
+        sigmas = [p / f.sigmas for p, f in zip(poses, case.features, strict=True)]
+        every, scaled = np.concatenate(poses), np.concatenate(sigmas)
+        per_push.append([rms(s) for s in sigmas])
+        figures.append((rms(scaled), math.sqrt(2.0) * rms(every[:, :2]), rms(every[:, 2])))
+    (rms0, position0, rotation0), (rms1, position1, rotation1) = figures
+    return FitQuality(
+        rms_before=rms0, rms_after=rms1, position_before=position0, position_after=position1,
+        rotation_before=rotation0, rotation_after=rotation1,
+        log_score_gain=float(gains.sum()), log_score_gain_se=standard_error(gains) if len(gains) > 1 else 0.0,
+        per_push=tuple((p.name, b, a) for p, b, a in zip(case.problems, *per_push, strict=True)),
+    )  # fmt: skip
+
+
+def _ranking(evidence: Evidence, findings: Sequence[EffectFinding]) -> tuple[Ranked, ...]:
+    named = {f.name for f in findings}
+    classes = {name for f in findings for name in f.indistinguishable_from}
+    steps = (*evidence.steps, evidence.rejected)
+    fitted = {c.name: c for step in reversed(steps) for c in step}
+    rows = []
+    for one in evidence.screening.scores:
+        candidate = fitted.get(one.kind.name)
+        rows.append(
+            Ranked(
+                name=one.kind.name,
+                gain=one.gain,
+                p_value=float(min(1.0, evidence.screening.looks * math.exp(one.log_p))),
+                held_out_gain=None if candidate is None else candidate.gain,
+                held_out_se=None if candidate is None else candidate.standard_error,
+                why=_why(one.kind.name, candidate, named, classes, evidence),
+            )
+        )
+    return tuple(rows)
+
+
+def _why(name: str, candidate: Candidate | None, named: set[str], classes: set[str], evidence: Evidence) -> str:
+    if name in named:
+        return "found"
+    if name in classes:
+        return "these pushes cannot tell it from what was found"
+    if candidate is None:
+        return _why_not_fitted(name, evidence)
+    if candidate.degenerate:
+        return "its fit ran to nothing"
+    if not candidate.accepted:
+        return "pushes that were left out do not confirm it"
+    return "predicts pushes that were left out worse"
+
+
+def _why_not_fitted(name: str, evidence: Evidence) -> str:
+    score = evidence.screening.score_of(name)
+    if score is None or not score.kept:
+        return "would have to act the other way round"
+    chance = evidence.screening.looks * math.exp(score.log_p) > 0.05
+    return "explains no more than chance would" if chance else "explains far less"
+
+
+def _left(evidence: Evidence, after: Fitted) -> str:
+    ratio = after.reduced_chi2
+    if ratio <= EXPLAINED:
+        return "nothing beyond noise, scatter and the simulator's own error"
+    best = evidence.remaining.scores[0].kind.name if evidence.remaining.scores else "none"
+    return (
+        f"{math.sqrt(ratio):.1f} times what noise and the simulator's own error would leave;"
+        f" the nearest of the catalogue is {best}, which does not account for it"
+    )
+
+
+def _sentence(
+    verdict: str, findings: Sequence[EffectFinding], evidence: Evidence, detectable: Sequence[Detectable]
+) -> str:
+    match verdict:
+        case "consistent":
+            return "The plain cell explains these pushes: nothing is missing that they could show."
+        case "underpowered":
+            return "These pushes cannot tell: an effect would have to be large to show in them."
+        case "unexplained":
+            return "Simulation and recording differ, and nothing in the catalogue accounts for it."
+    names = [
+        f"{f.name} ({f.statement})"
+        + (f", or {' or '.join(f.indistinguishable_from)}" if f.indistinguishable_from else "")
+        for f in findings
+    ]
+    return "What is missing: " + "; and ".join(names) + "."
+
+
+def _or(names: Sequence[str]) -> str:
+    return f", or {' or '.join(names)}, which these pushes cannot tell from it" if names else ""

@@ -1,0 +1,160 @@
+"""Values with intervals: of effects, of theta, and of the smallest effect that would have shown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from physid_drake.diagnose.case import Case
+from physid_drake.diagnose.evidence import Evidence
+from physid_drake.diagnose.fit import Fitted
+from physid_drake.diagnose.screen import (
+    log_probability,
+    projected,
+)
+from physid_drake.diagnose.values import (
+    Detectable,
+    ParameterEstimate,
+    ThetaEstimate,
+)
+from physid_drake.effects import Effect
+
+Array = NDArray[np.float64]
+Tick = Callable[[str, int, int], None]
+
+SAMPLES = 400  # of an effect's chart, for the intervals of its parameters
+IDENTIFIABLE = 0.5  # posterior over prior standard deviation
+
+
+def shared_covariance(fitted: Fitted) -> Array:
+    """Covariance (d, d) of theta and the effects' coordinates, widened where the model does not fit."""
+    covariance: Array = np.asarray(np.linalg.pinv(fitted.solution.precision), dtype=np.float64)
+    widened: Array = covariance * max(1.0, fitted.reduced_chi2)
+    return widened
+
+
+def _t_factor(fitted: Fitted) -> float:
+    """How much wider than a normal interval one is with so few pushes."""
+    free = max(2, len(fitted.pushes) - fitted.own_dimension)
+    return float(stats.t.ppf(0.95, free) / stats.norm.ppf(0.95))
+
+
+def parameters_of(evidence: Evidence, k: int) -> dict[str, ParameterEstimate]:
+    """Values and intervals of the k-th effect, by drawing its chart point."""
+    final, case = evidence.final, evidence.case
+    here = final.state.effects[k]
+    at = len(final.state.u) + sum(len(e.free) for e in final.state.effects[:k])
+    part = slice(at, at + len(here.free))
+    covariance = shared_covariance(final)[part, part]
+    rng = np.random.default_rng(0)
+    draws = rng.multivariate_normal(np.zeros(len(here.free)), covariance, SAMPLES, method="eigh") * _t_factor(final)
+    drawn = [here.moved(case, d).effect(case) for d in draws]
+    effect = here.effect(case)
+    return {
+        name: ParameterEstimate(
+            value=_plain(getattr(effect, name)),
+            unit=unit,
+            ci90=_interval(effect, name, [getattr(d, name) for d in drawn]),
+            null=_plain(effect.nulls()[name]),
+        )
+        for name, unit in effect.units().items()
+    }
+
+
+def _plain(value: Any) -> Any:
+    return [list(row) for row in value] if isinstance(value, tuple) else value
+
+
+def _interval(effect: Effect, name: str, values: Sequence[Any]) -> Any:
+    if name == "angle":
+        # An axis: the draws are turned to within a quarter turn of the value.
+        here = float(getattr(effect, name))
+        turned = here + (np.asarray(values) - here + 0.5 * math.pi) % math.pi - 0.5 * math.pi
+        return [float(q) for q in np.quantile(turned, [0.05, 0.95])]
+    low, high = np.quantile(np.asarray(values, dtype=np.float64), [0.05, 0.95], axis=0)
+    return [low.tolist(), high.tolist()]
+
+
+def theta_of(evidence: Evidence, fitted: Fitted) -> dict[str, ThetaEstimate]:
+    """Theta under a model, and which of it these pushes tell."""
+    space = evidence.case.thetas.space
+    covariance = shared_covariance(fitted)
+    _, prior = evidence.fitter.priors(fitted.state)
+    reach = float(stats.norm.ppf(0.95)) * _t_factor(fitted)
+    before = np.asarray(space.from_unit(evidence.plain.state.u))
+    here = np.asarray(space.from_unit(fitted.state.u))
+    result = {}
+    for j, parameter in enumerate(space.parameters):
+        std = math.sqrt(covariance[j, j])
+        told = std < IDENTIFIABLE * prior[j]
+        ends = []
+        for sign in (-1.0, 1.0):
+            u = fitted.state.u.copy()
+            u[j] = float(np.clip(u[j] + sign * reach * std, 0.0, 1.0))
+            ends.append(float(space.from_unit(u)[j]))
+        result[parameter.name] = ThetaEstimate(
+            value=float(here[j]) if told else None,
+            unit=parameter.unit,
+            ci90=(ends[0], ends[1]) if told else None,
+            identifiable=bool(told),
+            before=float(before[j]),
+        )
+    return result
+
+
+def smallest(evidence: Evidence, alpha: float) -> tuple[Detectable, ...]:
+    """The smallest effect of each kind that the score tests would have shown, in its own unit and in motion."""
+    plain, case = evidence.plain, evidence.case
+    found = list(evidence.signatures)
+    if not found:
+        return ()
+    threshold = _gain_needed(len(plain.pushes), plain.own_dimension, evidence.screening.looks, alpha)
+    _, blocks = projected(plain, [s.columns for s in found])
+    best: dict[str, Detectable] = {}
+    for signature, block in zip(found, blocks, strict=True):
+        amplitudes = signature.family.free[:1] if signature.one_sided[0] else signature.family.free
+        for d, j in enumerate(amplitudes):
+            norm = float(np.linalg.norm(block[:, d]))
+            if norm < 1e-9:
+                continue
+            steps = math.sqrt(threshold) / norm
+            coordinate = signature.kind.chart(case.around)[j]
+            point = np.array(signature.family.point)
+            point[j] += steps * signature.family.size * coordinate.step
+            moved = steps * rms(np.concatenate([c[:, d] for c in signature.columns]))
+            one = _detectable(case, signature.kind, point, j, moved)
+            if one.name not in best or moved < best[one.name].sigmas:
+                best[one.name] = one
+    return tuple(best.values())
+
+
+def _detectable(case: Case, kind: type[Effect], point: Array, j: int, sigmas: float) -> Detectable:
+    """The effect at a chart point that left its null along coordinate j."""
+    chart = kind.chart(case.around)
+    within = np.array([np.clip(p, c.lower, c.upper) for p, c in zip(point, chart, strict=True)])
+    effect = kind.at(within, case.around)
+    numbers = {n: getattr(effect, n) for n in kind.amplitudes if isinstance(getattr(effect, n), float)}
+    if not numbers:
+        return Detectable(
+            name=kind.name, parameter=chart[j].name, value=float(within[j]), unit="-", sigmas=sigmas
+        )  # fmt: skip
+    name = max(numbers, key=lambda n: abs(numbers[n] - kind.nulls()[n]))
+    return Detectable(name=kind.name, parameter=name, value=numbers[name], unit=kind.units()[name], sigmas=sigmas)
+
+
+def _gain_needed(pushes: int, spent: int, looks: float, alpha: float) -> float:
+    """Gain at which an effect of one direction is seen with even odds."""
+    wanted = math.log(alpha / (2.0 * looks))
+    gains = np.linspace(0.0, 400.0, 2001)
+    seen = [log_probability(float(g), 1, pushes, spent) <= wanted for g in gains]
+    return float(gains[int(np.argmax(seen))]) if any(seen) else float(gains[-1])
+
+
+def rms(values: Array) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))

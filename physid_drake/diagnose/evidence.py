@@ -1,0 +1,78 @@
+"""Everything that a diagnosis rests on, and when a model explains it."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from physid_drake.diagnose.case import Case
+from physid_drake.diagnose.confirm import Candidate
+from physid_drake.diagnose.fit import Fitted, Fitter
+from physid_drake.diagnose.localise import MissingWrench
+from physid_drake.diagnose.screen import (
+    Screening,
+    Signature,
+)
+from physid_drake.diagnose.values import (
+    NextPush,
+)
+
+Array = NDArray[np.float64]
+Tick = Callable[[str, int, int], None]
+
+# The cell's own error that guard, floor and tolerances leave: cost per degree of freedom where nothing is missing.
+SLACK = 1.15
+EXPLAINED = 1.5  # cost per degree of freedom, over that slack, above which something is still missing
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """Everything that was computed, for the report and the models that leave.
+
+    Attributes:
+        case: the recording.
+        fitter: with guard and tolerances.
+        plain: the plain cell, fitted.
+        screening: of the catalogue at the plain cell.
+        signatures: of the catalogue at the plain cell.
+        steps: one per accepted effect: all candidates of that step.
+        rejected: candidates of a step in which none was accepted.
+        final: the model at the end.
+        remaining: screening of what it leaves.
+        wrenches: what is missing from the plain cell, window by window.
+        next_push: that would tell the rivals apart.
+    """
+
+    case: Case
+    fitter: Fitter
+    plain: Fitted
+    screening: Screening
+    signatures: tuple[Signature, ...]
+    steps: tuple[tuple[Candidate, ...], ...]
+    rejected: tuple[Candidate, ...]
+    final: Fitted
+    remaining: Screening
+    wrenches: tuple[MissingWrench, ...] = ()
+    next_push: NextPush | None = None
+
+
+def mismatch(fitted: Fitted, screening: Screening | None) -> float:
+    """P-value of "this model explains the pushes": the better of the catalogue's and the cost's, for two looks.
+
+    Args:
+        fitted: the model.
+        screening: of the catalogue; None where pushes that were left out confirm nothing of it, so that only the cost
+            speaks: one odd push is no physics.
+    """
+    cost = float(stats.chi2.sf(fitted.solution.chi2 / SLACK, fitted.degrees))
+    best = cost if screening is None else min(screening.p_value, cost)
+    return float(-np.expm1(2.0 * np.log1p(-min(best, 1.0 - 1e-16))))
+
+
+def unexplained(fitted: Fitted) -> bool:
+    """Whether what is left is more than noise and the cell's own error."""
+    return fitted.reduced_chi2 > EXPLAINED
