@@ -1,0 +1,74 @@
+"""Scores of diagnoses against sealed truths."""
+
+import json
+
+import pytest
+
+from physid_drake.prove.score import outcome, read_outcomes, table
+
+
+def truth(kind="effect", names=("viscous_drag",), size=8.0, value=0.4):
+    effects = [{"name": n, "parameters": {"coefficient": value}} for n in names]
+    return {"id": "0a", "kind": kind, "effects": effects, "size_sigma": size}
+
+
+def said(verdict="explained", names=("viscous_drag",), alike=(), value=0.42, ci90=(0.38, 0.46)):
+    parameter = {"value": value, "unit": "N*s/m", "ci90": list(ci90), "null": 0.0}
+    effects = [
+        {
+            "name": n,
+            "indistinguishable_from": list(alike),
+            "probability": 0.9,
+            "parameters": {"coefficient": parameter},
+        }
+        for n in names
+    ]
+    fit = {"held_out_rms_before": 5.0, "held_out_rms_after": 1.1}
+    return {"verdict": verdict, "effects": effects, "fit": fit, "reduced_chi2_after": 1.0}
+
+
+def test_a_right_name_is_right_and_its_parameter_is_compared():
+    o = outcome(truth(), said())
+    assert o.found and o.right and o.both and not o.wrong_name
+    assert o.errors == (pytest.approx(0.05),) and o.covered == (True,)
+
+
+@pytest.mark.parametrize(
+    ("alike", "right"), [(("viscous_drag",), True), (("viscous_drag", "magnet"), False), (("magnet",), False)]
+)
+def test_a_class_of_two_that_holds_the_truth_counts_and_a_larger_one_does_not(alike, right):
+    o = outcome(truth(), said(names=("quadratic_drag",), alike=alike))
+    assert o.right is right
+    assert o.wrong_name is ("viscous_drag" not in alike)
+
+
+def test_names_that_come_with_abstention_do_not_count():
+    o = outcome(truth(kind="other", names=("other_swirl",)), said(verdict="unexplained"))
+    assert o.found and not o.classes and not o.wrong_name
+
+
+def test_a_pair_needs_both_names():
+    pair = truth(kind="pair", names=("viscous_drag", "table_tilt"))
+    assert not outcome(pair, said()).both
+    assert outcome(pair, said(names=("table_tilt", "viscous_drag"))).both
+
+
+def test_the_table_counts_worlds(tmp_path):
+    worlds = [
+        ("none", (), "consistent", ()), ("none", (), "unexplained", ()),
+        ("effect", ("viscous_drag",), "explained", ("viscous_drag",)),
+        ("other", ("other_swirl",), "explained", ("magnet",)),
+    ]  # fmt: skip
+    (tmp_path / "sealed").mkdir()
+    for k, (kind, names, verdict, found) in enumerate(worlds):
+        (tmp_path / "sealed" / f"{k}.json").write_text(json.dumps(truth(kind, names)))
+        (tmp_path / "diagnoses" / str(k)).mkdir(parents=True)
+        (tmp_path / "diagnoses" / str(k) / "diagnosis.json").write_text(json.dumps(said(verdict, found)))
+    (tmp_path / "sealed" / "not_diagnosed.json").write_text(json.dumps(truth()))
+    outcomes = read_outcomes(tmp_path / "sealed", tmp_path / "diagnoses")
+    rows = {what.strip(): figure for what, figure, _ in table(outcomes)}
+    assert len(outcomes) == 4
+    assert rows["no effect: called a mismatch"] == "1 of 2 (50 %)"
+    assert rows["named rightly, or in a class of two"].startswith("0 of 0")  # of the faint ones: there are none
+    assert rows["not in the catalogue: unexplained"] == "0 of 1 (0 %)"
+    assert rows["90 % intervals that hold the truth"] == "1 of 1 (100 %)"
