@@ -59,12 +59,12 @@ class Model:
         """The same without its effects: what is lost without them is what they are worth."""
         return dc.replace(self, effects=())
 
-    def dump(self, path: Path) -> str:
-        """The text of ``model.yaml`` at a path; a mesh is named relative to it."""
+    def dump(self) -> str:
+        """The text of ``model.yaml``; a mesh is named by its absolute path."""
         content = {
             "format": FORMAT,
             "recording": self.recording,
-            "object": _dump_shape(self.shape, path.parent),
+            "object": _dump_shape(self.shape),
             "hand_radius_m": self.hand_radius,
             "table_m": [list(corner) for corner in self.table],
             "cell": dc.asdict(self.config),
@@ -178,12 +178,11 @@ def _load_effect(content: dict[str, Any]) -> Effect:
     return kind(**parameters)
 
 
-def _dump_shape(shape: Shape, folder: Path) -> dict[str, Any]:
+def _dump_shape(shape: Shape) -> dict[str, Any]:
     kind = next(name for name, cls in _SHAPES.items() if isinstance(shape, cls))
     fields = {f.name: getattr(shape, f.name) for f in dc.fields(shape)}
     if isinstance(shape, MeshShape):
         fields["file"] = str(Path(shape.file).resolve())
-    del folder
     return {"shape": kind, **_plain(fields)}
 
 

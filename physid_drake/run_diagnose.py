@@ -161,7 +161,7 @@ def write(folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, page: 
     folder.write("diagnosis.json", diagnosis_json(diagnosis))
     pushes = shown_pushes(diagnosis, evidence)
     folder.write(page, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches))
-    folder.write("model.yaml", model_of(diagnosis, evidence).dump(folder.path / "model.yaml"))
+    folder.write("model.yaml", model_of(diagnosis, evidence).dump())
 
 
 def shown_pushes(diagnosis: Diagnosis, evidence: Evidence) -> list[ShownPush]:

@@ -13,20 +13,15 @@ from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.confirm import Candidate
 from physid_drake.diagnose.fit import Fitted, Fitter
 from physid_drake.diagnose.localise import MissingWrench
-from physid_drake.diagnose.screen import (
-    Screening,
-    Signature,
-)
-from physid_drake.diagnose.values import (
-    NextPush,
-)
+from physid_drake.diagnose.screen import Screening, Signature
+from physid_drake.diagnose.values import NextPush
 
 Array = NDArray[np.float64]
 Tick = Callable[[str, int, int], None]
 
 # The cell's own error that guard, floor and tolerances leave: cost per degree of freedom where nothing is missing.
 SLACK = 1.15
-EXPLAINED = 1.5  # cost per degree of freedom, over that slack, above which something is still missing
+EXPLAINED = 1.5  # cost per degree of freedom above which something is still missing
 
 
 @dc.dataclass(frozen=True, kw_only=True)

@@ -24,9 +24,7 @@ from physid_drake.diagnose.screen import (
     signatures,
     tolerances,
 )
-from physid_drake.diagnose.values import (
-    Diagnosis,
-)
+from physid_drake.diagnose.values import Diagnosis
 from physid_drake.effects import Effect, applicable
 
 Array = NDArray[np.float64]

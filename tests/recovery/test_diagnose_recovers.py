@@ -65,7 +65,7 @@ def test_the_model_that_leaves_predicts_what_the_diagnosis_says(tilted, tmp_path
     made, diagnosis, evidence = tilted
     model = model_of(diagnosis, evidence)
     file = tmp_path / "model.yaml"
-    file.write_text(model.dump(file), encoding="utf-8")
+    file.write_text(model.dump(), encoding="utf-8")
     loaded = load_model(file)
     assert loaded.effects == model.effects
     problem = made.problems[0]

@@ -58,7 +58,7 @@ def model():
 
 def test_a_model_survives_its_file(model, tmp_path):
     file = tmp_path / "model.yaml"
-    file.write_text(model.dump(file), encoding="utf-8")
+    file.write_text(model.dump(), encoding="utf-8")
     loaded = load_model(tmp_path)
     assert loaded.effects == model.effects and loaded.shape == model.shape and loaded.config == model.config
     assert loaded.intervals == model.intervals and loaded.body.support_friction[0] == 0.3
@@ -78,7 +78,7 @@ def test_a_model_survives_its_file(model, tmp_path):
 )
 def test_a_model_of_another_kind_is_refused_by_name(model, tmp_path, change, named):
     file = tmp_path / "model.yaml"
-    file.write_text(yaml.safe_dump({**yaml.safe_load(model.dump(file)), **change}), encoding="utf-8")
+    file.write_text(yaml.safe_dump({**yaml.safe_load(model.dump()), **change}), encoding="utf-8")
     with pytest.raises(ConfigError, match=named):
         load_model(file)
 
