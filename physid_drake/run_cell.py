@@ -5,14 +5,13 @@ from __future__ import annotations
 import argparse
 import platform
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from physid_drake.diagnose import case_of
 from physid_drake.diagnose.memory import Memory
@@ -23,6 +22,7 @@ from physid_drake.identify.rollouts import Task, simulate
 from physid_drake.identify.system import PUSH_PERIOD, IdentificationSystem, RecordingPlayer
 from physid_drake.recording import Recording, read_recording
 from physid_drake.report.page import result_page
+from physid_drake.report.progress import progress_bar
 from physid_drake.report.result import result_json
 from physid_drake.report.stage import Scene, Stage
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
@@ -136,9 +136,7 @@ def _identifier(scenario: Scenario, recording: Recording, out: Path) -> Identifi
 
 def _identify(identifier: Identifier, recording: Recording, console: Console) -> Identification:
     """Wire and run the diagram: the recording's player, and the system that learns from its pushes."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
-        bar = _bar(progress)
+    with progress_bar(console) as bar:
         builder = DiagramBuilder()
         player = builder.AddSystem(RecordingPlayer(recording.pushes))
         system = builder.AddSystem(
@@ -155,15 +153,6 @@ def _identify(identifier: Identifier, recording: Recording, console: Console) ->
         result: Identification | None = system.identification(system.GetMyContextFromRoot(simulator.get_context()))
     assert result is not None
     return result
-
-
-def _bar(progress: Progress) -> Callable[[str, int, int], None]:
-    task = progress.add_task("starting", total=None)
-
-    def show(stage: str, done: int, total: int) -> None:
-        progress.update(task, description=stage, completed=done, total=total or None)
-
-    return show
 
 
 def _scenes(result: Identification, identifier: Identifier, recording: Recording) -> list[Scene]:

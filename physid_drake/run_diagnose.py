@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import dataclasses as dc
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from physid_drake.cell import CellConfig
 from physid_drake.diagnose import Case, Diagnosis, Evidence, case_of, diagnose
@@ -23,6 +22,7 @@ from physid_drake.model import Model
 from physid_drake.recording import Recording, read_recording
 from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table
 from physid_drake.report.diagnosis_page import ShownPush, diagnosis_page
+from physid_drake.report.progress import progress_bar
 from physid_drake.resources import shipped
 from physid_drake.run_folder import RunFolder
 
@@ -76,18 +76,8 @@ def run_case(
     memory: Memory | None = None,
 ) -> tuple[Diagnosis, Evidence]:
     """Diagnose with a progress bar."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
-        return diagnose(case, seed=seed, alpha=alpha, effects=effects, tick=_bar(progress), memory=memory)
-
-
-def _bar(progress: Progress) -> Callable[[str, int, int], None]:
-    task = progress.add_task("starting", total=None)
-
-    def show_stage(stage: str, done: int, total: int) -> None:
-        progress.update(task, description=stage, completed=done, total=total or None)
-
-    return show_stage
+    with progress_bar(console) as tick:
+        return diagnose(case, seed=seed, alpha=alpha, effects=effects, tick=tick, memory=memory)
 
 
 def recording_folder(text: str) -> Path:
