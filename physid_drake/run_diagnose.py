@@ -20,7 +20,7 @@ from physid_drake.errors import ConfigError
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.model import Model
 from physid_drake.recording import Recording, read_recording
-from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table
+from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
 from physid_drake.report.diagnosis_page import ShownPush, diagnosis_page
 from physid_drake.report.progress import progress_bar
 from physid_drake.resources import shipped
@@ -132,6 +132,8 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
     if diagnosis.effects:
         console.print(findings_table(diagnosis))
     console.print(fit_table(diagnosis))
+    if diagnosis.fit.regimes:
+        console.print(regime_table(diagnosis))
     console.print(ranking_table(diagnosis))
     push = diagnosis.next_push
     if push is not None:

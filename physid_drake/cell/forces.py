@@ -7,44 +7,135 @@ holds against it as against any force, since the tick's contact is solved after 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from physid_drake.cell.diagram import GRAVITY
+
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True)
+class Underside:
+    """The support points of a rollout.
+
+    Attributes:
+        points: (n,) in B, as x + iy [m].
+        weights: (n,) shares of the area.
+        friction: (n,) the kinetic coefficient of each point's friction cell, without any law [-].
+    """
+
+    points: Complex
+    weights: Array
+    friction: Array
+
+
+@dataclass(kw_only=True)
 class ObjectState:
     """The object at the start of a tick, seen from above.
 
+    What concerns the support points is computed when a law asks for it: most laws do not, and ticks are many. Plane
+    vectors of points are complex numbers x + iy inside, for one numpy call instead of several.
+
     Attributes:
         time: since the rollout's start [s].
-        p_WBcm: (2,) centre of mass [m].
-        v_WBcm: (2,) its velocity [m/s].
+        p_WBo: x + iy [m].
+        v_WBo: x + iy [m/s].
+        p_BoBcm_W: from Bo to the centre of mass, x + iy in W [m].
         yaw: heading of B [rad].
         yaw_rate: [rad/s].
         mass: kg.
         inertia: about the vertical through the centre of mass [kg m^2].
-        p_WQ: (n, 2) support points [m].
-        v_WQ: (n, 2) their velocities [m/s].
-        loads: (n,) their normal forces [N].
-        friction: (n,) the kinetic coefficient of each point's friction cell, without any law [-].
+        underside: the support points.
+        lean: depth of Bo's foot in the table [m], and how it grows along x and y of B [-].
     """
 
     time: float
-    p_WBcm: Array
-    v_WBcm: Array
+    p_WBo: complex
+    v_WBo: complex
+    p_BoBcm_W: complex
     yaw: float
     yaw_rate: float
     mass: float
     inertia: float
-    p_WQ: Array
-    v_WQ: Array
-    loads: Array
-    friction: Array
+    underside: Underside
+    lean: tuple[float, float, float]
+
+    @cached_property
+    def p_WBcm(self) -> Array:
+        """Centre of mass (2,) [m]."""
+        p = self.p_WBo + self.p_BoBcm_W
+        return np.array([p.real, p.imag])
+
+    @cached_property
+    def v_WBcm(self) -> Array:
+        """Its velocity (2,) [m/s]."""
+        v = self.v_WBo + 1j * self.yaw_rate * self.p_BoBcm_W
+        return np.array([v.real, v.imag])
+
+    @cached_property
+    def arms(self) -> Complex:
+        """From Bo to the support points (n,), x + iy in W [m]."""
+        return self.underside.points * complex(math.cos(self.yaw), math.sin(self.yaw))
+
+    @cached_property
+    def places(self) -> Complex:
+        """Support points (n,), x + iy in W [m]."""
+        return self.arms + self.p_WBo
+
+    @cached_property
+    def slips(self) -> Complex:
+        """Velocities (n,) of the support points, x + iy in W [m/s]."""
+        return self.arms * (1j * self.yaw_rate) + self.v_WBo
+
+    @property
+    def p_WQ(self) -> Array:
+        """Support points (n, 2) in W [m]."""
+        return as_plane(self.places)
+
+    @property
+    def v_WQ(self) -> Array:
+        """Their velocities (n, 2) in W [m/s]."""
+        return as_plane(self.slips)
+
+    @property
+    def friction(self) -> Array:
+        """The kinetic coefficient (n,) of each point's friction cell, without any law [-]."""
+        return self.underside.friction
+
+    @cached_property
+    def loads(self) -> Array:
+        """Normal forces (n,) on the support points [N]: in proportion to depth, carrying the weight together."""
+        foot, along_x, along_y = self.lean
+        points = self.underside.points
+        shares = self.underside.weights * np.maximum(foot + along_x * points.real + along_y * points.imag, 0.0)
+        total = float(shares.sum())
+        loads: Array = shares * (self.mass * GRAVITY / total) if total > 0.0 else shares
+        return loads
+
+    @cached_property
+    def holding(self) -> Array:
+        """Largest friction (n,) of each support point without any law [N]."""
+        held: Array = self.loads * self.underside.friction
+        return held
+
+
+def as_plane(vectors: Complex) -> Array:
+    """Vectors x + iy (n,) as an array (n, 2), without a copy."""
+    plane: Array = vectors.view(np.float64).reshape(-1, 2)
+    return plane
+
+
+def as_complex(vectors: Array) -> Complex:
+    """Vectors (n, 2) as x + iy (n,)."""
+    flat: Complex = np.ascontiguousarray(vectors).view(np.complex128)[:, 0]
+    return flat
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +185,14 @@ class FrictionLaw(Protocol):
 
 def refund_wrench(state: ObjectState, forces: Array) -> Wrench:
     """The wrench of forces (n, 2) at the support points."""
-    arms = state.p_WQ - state.p_WBcm
-    torque = float((arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum())
-    fx, fy = forces.sum(axis=0).tolist()
-    return Wrench(fx=fx, fy=fy, torque=torque, at_table=True)
+    pushes = as_complex(forces)
+    whole = complex(pushes.sum())
+    # Imaginary part of conj(arm) force: the moment about Bo; then about the centre of mass.
+    moment = complex(np.vdot(state.arms, pushes)).imag
+    lever = state.p_BoBcm_W
+    return Wrench(
+        fx=whole.real,
+        fy=whole.imag,
+        torque=moment - (lever.real * whole.imag - lever.imag * whole.real),
+        at_table=True,
+    )

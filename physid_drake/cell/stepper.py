@@ -11,8 +11,17 @@ from numpy.typing import NDArray
 from pydrake.systems.analysis import Simulator
 
 from physid_drake.cell.config import SolverConfig
-from physid_drake.cell.diagram import GRAVITY, HAND_MASS, Scene
-from physid_drake.cell.forces import ForceLaw, FrictionLaw, ObjectState, Swinging, Wrench, refund_wrench
+from physid_drake.cell.diagram import HAND_MASS, Scene
+from physid_drake.cell.forces import (
+    ForceLaw,
+    FrictionLaw,
+    ObjectState,
+    Swinging,
+    Underside,
+    Wrench,
+    as_complex,
+    refund_wrench,
+)
 from physid_drake.cell.hand_path import HandPath
 from physid_drake.cell.impact import routh_impulse
 from physid_drake.cell.motion import Log, Motion, Outcome, Start, planar_pose
@@ -104,6 +113,13 @@ class Stepper:
         count = max(1, math.ceil((end - begin) / dt - 1e-6))
         self._body, self._begin, self._height = body, begin, height
         self._inertia = body.mass * body.inertia_ratio * self._scene.solid.gyration[2]
+        self._p_BBcm = complex(float(body.p_BBcm[0]), float(body.p_BBcm[1]))
+        support = self._scene.support
+        self._underside = Underside(
+            points=as_complex(support.points),
+            weights=support.weights,
+            friction=body.support_friction[support.cells],
+        )
         self._hand = (
             None
             if path is None
@@ -425,46 +441,38 @@ class Stepper:
     def _object_state(self, time: float) -> ObjectState:
         px, py, yaw = self._pose()
         vx, vy, wz = self._twist()
-        c, s = math.cos(yaw), math.sin(yaw)
-        body, support = self._body, self._scene.support
-        R_WB = np.array([[c, -s], [s, c]])
-        arms = support.points @ R_WB.T
-        to_cm = R_WB @ body.p_BBcm
+        body = self._body
         return ObjectState(
             time=time,
-            p_WBcm=np.array([px, py]) + to_cm,
-            v_WBcm=np.array([vx - wz * to_cm[1], vy + wz * to_cm[0]]),
+            p_WBo=complex(px, py),
+            v_WBo=complex(vx, vy),
+            p_BoBcm_W=self._p_BBcm * complex(math.cos(yaw), math.sin(yaw)),
             yaw=yaw,
             yaw_rate=wz,
             mass=body.mass,
             inertia=self._inertia,
-            p_WQ=arms + np.array([px, py]),
-            v_WQ=np.column_stack([vx - wz * arms[:, 1], vy + wz * arms[:, 0]]),
-            loads=self._loads(),
-            friction=body.support_friction[support.cells],
+            underside=self._underside,
+            lean=self._lean(),
         )
 
-    def _depths(self) -> Array:
-        """How deep the support points (n,) are in the table [m]; 0 where they hang over it."""
+    def _lean(self) -> tuple[float, float, float]:
+        """The plane of the underside: depth of Bo's foot in the table [m], and how it grows along x and y of B."""
         w, i, j, k, _, _, z = self._x[self._q : self._q + 7].tolist()
-        # The plane of the underside, in B: depth = d0 + pitch x - roll y.
-        pitch, roll = 2.0 * (w * j - i * k), 2.0 * (w * i + j * k)
-        plane: Array = (0.5 * self._scene.solid.height - z) + self._scene.support.points @ np.array([pitch, -roll])
-        depths: Array = np.maximum(plane, 0.0)
-        return depths
+        return 0.5 * self._scene.solid.height - z, 2.0 * (w * j - i * k), -2.0 * (w * i + j * k)
 
-    def _loads(self) -> Array:
-        """Normal forces (n,) on the support points [N]: in proportion to depth, carrying the weight together."""
-        shares: Array = self._scene.support.weights * self._depths()
-        total = float(shares.sum())
-        return shares * (self._body.mass * GRAVITY / total) if total > 0.0 else shares
+    def _mean_depth(self) -> float:
+        """How deep the support points are in the table on average [m]; those that hang over it not at all."""
+        foot, along_x, along_y = self._lean()
+        support = self._scene.support
+        plane = foot + support.points @ np.array([along_x, along_y])
+        return float(support.weights @ np.maximum(plane, 0.0))
 
     def _holds(self, time: float) -> bool:
         """Whether friction surely holds a resting object against the laws' forces."""
         if not self._laws:
             return True
         state = self._object_state(time)
-        limit = float((state.loads * state.friction).sum())
+        limit = float(state.holding.sum())
         reach = math.sqrt(self._inertia / self._body.mass)
         pull = sum(math.hypot(w.fx, w.fy) + abs(w.torque) / reach for w in self._wrenches(state))
         pull += sum(law.strongest() for law in self._laws if isinstance(law, Swinging))
@@ -551,7 +559,7 @@ class Stepper:
         not flat; equilibrium makes up for it by sinking deeper, and CENIC's lagged friction follows the
         depth: too large by v n dt / depth. Measured: -2.5 % of a slide at 1 m/s and 2 ms.
         """
-        excess = float(self._scene.support.weights @ self._depths()) * self._tilt_gain - 1.0
+        excess = self._mean_depth() * self._tilt_gain - 1.0
         if not 0.0 < excess < 0.5:  # lighter than at rest, or a bounce: nothing of the kind
             return after
         factor = 1.0 / (1.0 + excess)

@@ -17,6 +17,7 @@ from physid_drake.diagnose.evidence import EXPLAINED, Evidence, mismatch, unexpl
 from physid_drake.diagnose.fit import Fitted
 from physid_drake.diagnose.linear import left_out_scores
 from physid_drake.diagnose.localise import locate
+from physid_drake.diagnose.regimes import regime_gains
 from physid_drake.diagnose.screen import (
     cosine,
 )
@@ -155,6 +156,7 @@ def _quality(case: Case, plain: Fitted, after: Fitted) -> FitQuality:
         rotation_before=rotation0, rotation_after=rotation1,
         log_score_gain=float(gains.sum()), log_score_gain_se=standard_error(gains) if len(gains) > 1 else 0.0,
         per_push=tuple((p.name, b, a) for p, b, a in zip(case.problems, *per_push, strict=True)),
+        regimes=() if after is plain else regime_gains(case, plain, after),
     )  # fmt: skip
 
 

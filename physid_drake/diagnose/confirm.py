@@ -21,6 +21,7 @@ LEAST = 4.0  # nats of held-out gain
 CERTAIN = 12.0  # nats of held-out gain, the best push not counted: odds of e^12
 STUCK = 1.6  # cost per degree of freedom after which a fit is tried again from elsewhere
 PERSISTENT = 2  # candidates that are worth that
+FELL_SHORT = 0.8  # of the gain that the score test promised
 FAR = 0.3  # of theta's unit cube
 
 
@@ -99,7 +100,8 @@ def _candidate(fitter: Fitter, before: Fitted, one: Score, plain: Array, *, pers
     start = start_of(fitter, one)
     state = dc.replace(before.state, effects=(*before.state.effects, start))
     fitted = fitter.fit(state, rounds=4, like=before)
-    if persistent and fitted.reduced_chi2 > STUCK:
+    promised = 0.5 * one.gain
+    if persistent and fitted.reduced_chi2 > STUCK and fitted.score - before.score < FELL_SHORT * promised:
         # Far from the plain cell its derivatives mislead: from the score test's theta, with derivatives taken there.
         u = np.clip(before.state.u + np.clip(one.theta, -FAR, FAR), 1e-3, 1.0 - 1e-3)
         fresh = dc.replace(state, u=u, own=tuple(np.zeros_like(o) for o in state.own), scatter=1.0)

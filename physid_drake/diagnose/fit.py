@@ -163,29 +163,32 @@ class Fitter:
 
     # Linearisation.
 
-    def linearise(self, state: State, *, learn_scatter: bool = True, like: Fitted | None = None) -> Fitted:
+    def linearise(
+        self, state: State, *, learn_scatter: bool = True, like: Fitted | None = None, fresh_theta: bool = False
+    ) -> Fitted:
         """All derivatives at a state, by differences.
 
         Args:
             state: where.
+            learn_scatter: choose the scatter of friction anew, instead of keeping the state's.
             like: a fitted model whose derivatives with respect to theta and the pushes' unknowns are near enough:
                 only those of the effects are taken.
-            learn_scatter: choose the scatter of friction anew, instead of keeping the state's.
+            fresh_theta: take those of theta nevertheless.
         """
+        theta, own = like is None or fresh_theta, like is None
         tasks: list[Task] = []
         owners: list[int] = []
         for i in range(len(self.case.problems)):
-            mine = self._tasks_of(state, i, everything=like is None)
+            mine = self._tasks_of(state, i, theta=theta, own=own)
             tasks += mine
             owners += [i] * len(mine)
         vectors = self.vectors(tasks)
         pushes, predicted = [], []
         for i in range(len(self.case.problems)):
             mine_vectors = [v for v, owner in zip(vectors, owners, strict=True) if owner == i]
-            if like is None:
-                pushes.append(self._linear_push(state, i, mine_vectors))
-            else:
-                pushes.append(self._chord_push(state, i, mine_vectors, like.pushes[i]))
+            pushes.append(
+                self._linear_push(state, i, mine_vectors, None if like is None else like.pushes[i], theta=theta)
+            )
             predicted.append(mine_vectors[0])
         return self._fitted(state, tuple(pushes), tuple(predicted), learn_scatter)
 
@@ -212,54 +215,51 @@ class Fitter:
                 steps.append((step, tuple(moved)))
         return steps
 
-    def _tasks_of(self, state: State, i: int, everything: bool) -> list[Task]:
+    def _tasks_of(self, state: State, i: int, *, theta: bool, own: bool) -> list[Task]:
         tasks = [self.task(state, i)]
-        if everything:
+        if theta:
             tasks += [self.task(state, i, u=u) for u in self._theta_steps(state)]
         tasks += [self.task(state, i, effects=effects) for _, effects in self._effect_steps(state)]
-        if not everything:
-            return tasks
-        for j in range(len(state.own[i])):
-            own = np.clip(state.own[i], -MOST_OWN, MOST_OWN)
-            own[j] += OWN_STEP if own[j] <= 0.0 else -OWN_STEP
-            tasks.append(self.task(state, i, own=own))
+        if own:
+            tasks += [self.task(state, i, own=values) for _, values in self._own_steps(state, i)]
         return tasks
 
-    def _linear_push(self, state: State, i: int, vectors: list[Array]) -> LinearPush:
-        base, rest = vectors[0], vectors[1:]
-        columns = []
-        for u in self._theta_steps(state):
-            columns.append((rest.pop(0) - base) / float((u - state.u)[np.argmax(np.abs(u - state.u))]))
-        for step, _ in self._effect_steps(state):
-            columns.append((rest.pop(0) - base) / step)
-        own_columns = []
-        at = np.clip(state.own[i], -MOST_OWN, MOST_OWN)
-        for j in range(len(at)):
-            own_columns.append((rest.pop(0) - base) / (OWN_STEP if at[j] <= 0.0 else -OWN_STEP))
-        own = np.column_stack(own_columns)
-        residual = self.case.features[i].recorded - base + own @ at
-        friction = self.case.nuisances[i].index("friction")
-        if self.extra is not None:
-            own = np.column_stack([own, self.extra[i]])
-        return LinearPush(
-            residual=residual,
-            shared=self._with_tolerances(i, columns),
-            own=own,
-            noise=self.case.features[i].noise,
-            friction=friction,
-        )
+    def _own_steps(self, state: State, i: int) -> list[tuple[float, Array]]:
+        """For each unknown of a push: the step and the unknowns with it taken."""
+        here = np.clip(state.own[i], -MOST_OWN, MOST_OWN)
+        steps = []
+        for j in range(len(here)):
+            step = OWN_STEP if here[j] <= 0.0 else -OWN_STEP
+            values = here.copy()
+            values[j] += step
+            steps.append((step, values))
+        return steps
 
-    def _chord_push(self, state: State, i: int, vectors: list[Array], like: LinearPush) -> LinearPush:
-        """The push with the derivatives of ``like`` for theta and its unknowns."""
-        base = vectors[0]
-        steps = [step for step, _ in self._effect_steps(state)]
-        columns = [(v - base) / step for v, step in zip(vectors[1:], steps, strict=True)]
-        at = np.clip(state.own[i], -MOST_OWN, MOST_OWN)
-        theta = like.shared[:, : len(state.u)]
-        return dc.replace(
-            like,
-            residual=self.case.features[i].recorded - base + like.own[:, : len(at)] @ at,
-            shared=self._with_tolerances(i, [theta, *columns]),
+    def _linear_push(
+        self, state: State, i: int, vectors: list[Array], like: LinearPush | None, *, theta: bool
+    ) -> LinearPush:
+        """A push from its rollouts, in the order of ``_tasks_of``; what is not among them is that of ``like``."""
+        base, rest = vectors[0], iter(vectors[1:])
+        d = len(state.u)
+        if theta:
+            steps = [float((u - state.u)[j]) for j, u in enumerate(self._theta_steps(state))]
+            columns = [(next(rest) - base) / step for step in steps]
+        else:
+            assert like is not None
+            columns = [like.shared[:, :d]]
+        columns += [(next(rest) - base) / step for step, _ in self._effect_steps(state)]
+        if like is None:
+            own = np.column_stack([(next(rest) - base) / step for step, _ in self._own_steps(state, i)])
+            all_own = own if self.extra is None else np.column_stack([own, self.extra[i]])
+        else:
+            all_own = like.own
+            own = like.own[:, : len(state.own[i])]
+        return LinearPush(
+            residual=self.case.features[i].recorded - base + own @ np.clip(state.own[i], -MOST_OWN, MOST_OWN),
+            shared=self._with_tolerances(i, columns),
+            own=all_own,
+            noise=self.case.features[i].noise,
+            friction=self.case.nuisances[i].index("friction"),
         )
 
     def _with_tolerances(self, i: int, columns: Sequence[Array]) -> Array:
@@ -360,6 +360,12 @@ class Fitter:
             if gained < 0.5 and k >= careful:
                 break
         return best
+
+    def refine(self, rough: Fitted) -> Fitted:
+        """What another cell's fit left, here: theta's and effects' derivatives anew, then a step if it helps."""
+        start = self.linearise(rough.state, like=rough, fresh_theta=True)
+        moved = self.linearise(self.stepped(start), like=start)
+        return moved if actual_cost(moved) < actual_cost(start) else start
 
     def stepped(self, fitted: Fitted, share: float = 1.0) -> State:
         """The state after a Gauss-Newton step."""

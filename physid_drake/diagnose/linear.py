@@ -143,32 +143,49 @@ def own_unknowns(push: LinearPush, scatter: float, beta: Array) -> Array:
 
 
 def left_out_scores(
-    pushes: Sequence[LinearPush], scatter: float, prior_mean: Array, prior_std: Array
+    pushes: Sequence[LinearPush],
+    scatter: float,
+    prior_mean: Array,
+    prior_std: Array,
+    folds: Sequence[Sequence[int]] | None = None,
 ) -> tuple[Array, tuple[Array, ...]]:
-    """Leave one push out: fit on the others, predict it.
+    """Predict pushes by a fit to those of the other folds.
+
+    Args:
+        pushes: linearised.
+        scatter: of friction, in units of the columns'.
+        prior_mean: (d,) of beta.
+        prior_std: (d,).
+        folds: indices of pushes that are left out together; None leaves out one at a time.
 
     Returns:
         (n,) log predictive densities, and the residuals (m_i,) of the predictions with the push's unknowns at zero.
     """
-    weight = 1.0 / prior_std**2
-    pieces = []
-    for push in pushes:
-        factor = cho_factor(push.covariance(scatter), lower=True)
-        solved = cho_solve(factor, push.shared)
-        pieces.append((push.shared.T @ solved, solved.T @ push.residual))
-    information = sum((p[0] for p in pieces), np.diag(weight))
-    right = sum((p[1] for p in pieces), weight * prior_mean)
-    scores, residuals = [], []
-    for push, (own_information, own_right) in zip(pushes, pieces, strict=True):
-        others = information - own_information
-        others = others + 1e-10 * np.trace(information) * np.eye(len(others))
-        beta = np.linalg.solve(others, right - own_right)
-        spread = push.covariance(scatter) + push.shared @ np.linalg.solve(others, push.shared.T)
-        lower = np.linalg.cholesky(0.5 * (spread + spread.T))
-        left = push.residual - push.shared @ beta
-        white = solve_triangular(lower, left, lower=True)
-        scores.append(
-            -0.5 * float(white @ white) - float(np.log(np.diag(lower)).sum()) - 0.5 * len(left) * np.log(2.0 * np.pi)
-        )
-        residuals.append(left)
-    return np.array(scores), tuple(residuals)
+    pieces = [_information(push, scatter) for push in pushes]
+    information = sum((p[0] for p in pieces), np.diag(1.0 / prior_std**2))
+    right = sum((p[1] for p in pieces), prior_mean / prior_std**2)
+    ridge = 1e-10 * np.trace(information) * np.eye(len(right))
+    scores = np.zeros(len(pushes))
+    residuals: list[Array] = [np.zeros(0)] * len(pushes)
+    for fold in folds or [(i,) for i in range(len(pushes))]:
+        others = information - sum(pieces[i][0] for i in fold) + ridge
+        beta = np.linalg.solve(others, right - sum(pieces[i][1] for i in fold))
+        for i in fold:
+            scores[i], residuals[i] = _predicted(pushes[i], scatter, beta, others)
+    return scores, tuple(residuals)
+
+
+def _information(push: LinearPush, scatter: float) -> tuple[Array, Array]:
+    """What a push says of beta: precision (d, d) and precision times estimate (d,)."""
+    solved = cho_solve(cho_factor(push.covariance(scatter), lower=True), push.shared)
+    return push.shared.T @ solved, solved.T @ push.residual
+
+
+def _predicted(push: LinearPush, scatter: float, beta: Array, precision: Array) -> tuple[float, Array]:
+    """Log density of a push under beta with its precision (d, d), and the residual (m,) of its mean."""
+    spread = push.covariance(scatter) + push.shared @ np.linalg.solve(precision, push.shared.T)
+    lower = np.linalg.cholesky(0.5 * (spread + spread.T))
+    left = push.residual - push.shared @ beta
+    white = solve_triangular(lower, left, lower=True)
+    log_root = float(np.log(np.diag(lower)).sum())
+    return -0.5 * float(white @ white) - log_root - 0.5 * len(left) * np.log(2.0 * np.pi), left

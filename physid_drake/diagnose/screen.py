@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import EffectPoint, Fitted, Fitter
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve
 from physid_drake.effects import Effect, Family
@@ -161,16 +162,16 @@ def _reaches(fitter: Fitter, kind: type[Effect], family: Family, i: int) -> bool
     return bool(away.min() < getattr(patch, "radius") * 1.3 + half_diagonal + 0.02)  # noqa: B009
 
 
-def tolerances(fitter: Fitter, found: Sequence[Signature]) -> tuple[Array, ...]:
+def tolerances(case: Case, found: Sequence[Signature]) -> tuple[Array, ...]:
     """Per push (m, t): what all pushes may share without its being physics, one standard deviation each."""
     chosen = []
     for s in found:
-        chart = s.kind.chart(fitter.case.around)
+        chart = s.kind.chart(case.around)
         for d, j in enumerate(s.family.free):
             if chart[j].tolerance > 0.0 and s.family.size == 1.0:
                 chosen.append((s, d, chart[j].tolerance / chart[j].step))
-    count = len(fitter.case.problems)
-    empty = [np.zeros((len(f.recorded), 0)) for f in fitter.case.features]
+    count = len(case.problems)
+    empty = [np.zeros((len(f.recorded), 0)) for f in case.features]
     return tuple(
         np.column_stack([empty[i], *(share * s.columns[i][:, d] for s, d, share in chosen)]) for i in range(count)
     )

@@ -57,6 +57,8 @@ def gather(
 ) -> Evidence:
     """Fit, screen, confirm: all that needs rollouts.
 
+    All but the last look is done on ticks twice as long, whose error is one of the guard's directions.
+
     Args:
         case: the recording, ready.
         seed: of everything random.
@@ -67,10 +69,11 @@ def gather(
     """
     search_rng, screen_rng = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2))
     kinds = applicable(case.around, effects)
-    first = _first(case, search_rng, tick, memory)
-    rough = Fitter(coarse(case))
-    guard, found = _looks(case, first, rough, kinds, tick, memory)
-    fitter = Fitter(case, guard, tolerances(rough, found))
+    rough = coarse(case)
+    first = _first(rough, search_rng, tick, memory)
+    guard, found = _looks(rough, first, kinds, tick, memory)
+    allowed = tolerances(rough, found)
+    fitter = Fitter(rough, guard, allowed)
     plain = fitter.guard(first)
     screening = screen(plain, found, screen_rng)
     current, remaining, at = plain, screening, found
@@ -92,13 +95,17 @@ def gather(
         remaining = screen(current, left, screen_rng)
         if mismatch(current, remaining) < alpha and len(steps) < MOST_EFFECTS:
             tick("score tests of what is left", 0, 0)
-            at = signatures(rough, current, [k for k in kinds if k not in {e.kind for e in current.state.effects}])
+            missing = [k for k in kinds if k not in {e.kind for e in current.state.effects}]
+            at = signatures(Fitter(rough), current, missing)
             remaining = screen(current, at, screen_rng)
-    case.pool.count += rough.case.pool.count
+    fine = Fitter(case, guard, allowed)
+    tick("on short ticks", 0, 0)
+    refined = fine.refine(plain)
+    final = fine.refine(current) if steps else refined
+    case.pool.count += rough.pool.count
     return Evidence(
-        case=case, fitter=fitter, plain=plain, screening=screening, signatures=tuple(found), steps=tuple(steps),
-        rejected=rejected,
-        final=current, remaining=remaining,
+        case=case, fitter=fine, plain=refined, screening=screening, signatures=tuple(found), steps=tuple(steps),
+        rejected=rejected, final=final, remaining=remaining,
     )  # fmt: skip
 
 
@@ -121,7 +128,7 @@ def _first(case: Case, rng: np.random.Generator, tick: Tick, memory: Memory) -> 
 
 
 def _looks(
-    case: Case, first: Fitted, rough: Fitter, kinds: Sequence[type[Effect]], tick: Tick, memory: Memory
+    case: Case, first: Fitted, kinds: Sequence[type[Effect]], tick: Tick, memory: Memory
 ) -> tuple[tuple[Array, ...], list[Signature]]:
     """The guard's directions and the catalogue's signatures, or those of an interrupted run."""
     guard_kept, kept = memory.recall("guard"), memory.recall("signatures")
@@ -129,11 +136,12 @@ def _looks(
         tick("numerics guard", 0, 0)
         guard_kept = list(numerics(case, first.state))
         memory.keep("guard", guard_kept)
-    blank = empty_signatures(rough, kinds)
+    fitter = Fitter(case)
+    blank = empty_signatures(fitter, kinds)
     if kept is not None:
         edges = iter(kept)
         return tuple(guard_kept), [dc.replace(s, columns=tuple(next(edges) for _ in case.problems)) for s in blank]
-    found = signatures(rough, first, kinds, lambda done, total: tick("score tests", done, total))
+    found = signatures(fitter, first, kinds, lambda done, total: tick("score tests", done, total))
     memory.keep("signatures", [c for s in found for c in s.columns])
     return tuple(guard_kept), found
 

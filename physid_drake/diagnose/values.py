@@ -65,6 +65,16 @@ class Location:
 
 
 @dc.dataclass(frozen=True, kw_only=True)
+class RegimeGain:
+    """Gain in log predictive density of pushes of one regime when both models are fitted to the other one only."""
+
+    fitted_on: str
+    tested_on: str
+    gain: float
+    standard_error: float
+
+
+@dc.dataclass(frozen=True, kw_only=True)
 class FitQuality:
     """How well pushes are predicted that were left out of the fit, before and after; lengths in m, angles in rad."""
 
@@ -77,6 +87,7 @@ class FitQuality:
     log_score_gain: float
     log_score_gain_se: float
     per_push: tuple[tuple[str, float, float], ...]
+    regimes: tuple[RegimeGain, ...] = ()
 
 
 @dc.dataclass(frozen=True, kw_only=True)

@@ -10,19 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import Body
-from physid_drake.cell.forces import FrictionLaw, ObjectState
+from physid_drake.cell.forces import FrictionLaw, ObjectState, as_complex, as_plane
 from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
 from physid_drake.effects.places import grid_of_places
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 SLOWEST = 5e-4  # m/s: below this slip a point feels the contact's full friction, which holds it at rest
 SLIGHT_SHARE = 0.015  # of the friction
 
 
-def _direction(state: ObjectState) -> tuple[Array, Array]:
-    """Slip speeds (n,) and directions (n, 2) that fade to zero at rest."""
-    speeds = np.sqrt((state.v_WQ**2).sum(axis=1))
-    return speeds, state.v_WQ / np.sqrt(speeds**2 + SLOWEST**2)[:, None]
+def _direction(state: ObjectState) -> tuple[Array, Complex]:
+    """Slip speeds (n,) and directions (n,), x + iy, that fade to zero at rest."""
+    speeds = np.abs(state.slips)
+    return speeds, state.slips / np.sqrt(speeds * speeds + SLOWEST**2)
+
+
+def _along(state: ObjectState, share: Array) -> Array:
+    """Forces (n, 2) along the slip, ``share`` (n,) times what friction holds [N]."""
+    _, along = _direction(state)
+    return as_plane(share * state.holding * along)
 
 
 @dc.dataclass(frozen=True)
@@ -39,17 +46,15 @@ class Together:
     def refund(self, state: ObjectState) -> Array:
         """What the contact's friction, ``largest`` times the plain one, is too much."""
         _, along = _direction(state)
-        plain = (state.loads * state.friction)[:, None] * along
-        whole = plain[:, 0] + 1j * plain[:, 1]
+        whole = state.holding * along
         moving = whole != 0.0
         ratio = np.ones(len(whole), dtype=np.complex128)
         for law in self.laws:
-            true = law.largest * plain - law.refund(state)
-            ratio[moving] *= (true[moving, 0] + 1j * true[moving, 1]) / whole[moving]
+            true = law.largest * whole - as_complex(law.refund(state))
+            ratio[moving] *= true[moving] / whole[moving]
         # Two strong ellipses might turn friction forward.
         ratio = np.maximum(ratio.real, 0.0) + 1j * ratio.imag
-        refund = (self.largest - ratio) * whole
-        return np.column_stack([refund.real, refund.imag])
+        return as_plane((self.largest - ratio) * whole)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -105,10 +110,9 @@ class _StribeckLaw:
         return 1.0 + max(0.0, self.excess)
 
     def refund(self, state: ObjectState) -> Array:
-        speeds, along = _direction(state)
+        speeds = np.abs(state.slips)
         ratio = 1.0 + self.excess * np.exp(-((speeds / self.speed) ** 2))
-        forces: Array = ((self.largest - ratio) * state.loads * state.friction)[:, None] * along
-        return forces
+        return _along(state, self.largest - ratio)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -179,18 +183,16 @@ class _EllipseLaw:
 
     def refund(self, state: ObjectState) -> Array:
         angle = self.angle + (state.yaw if self.fixed_in_object else 0.0)
-        slippery = np.array([math.cos(angle), math.sin(angle)])
-        grippy = np.array([-slippery[1], slippery[0]])
+        slippery = complex(math.cos(angle), math.sin(angle))
         low, high = 1.0 / math.sqrt(self.ratio), math.sqrt(self.ratio)
         _, along = _direction(state)
-        a, b = along @ slippery, along @ grippy
+        own = along * slippery.conjugate()  # in the ellipse's axes
+        a, b = own.real, own.imag
         size = np.sqrt((low * a) ** 2 + (high * b) ** 2)
-        norm = np.sqrt(a * a + b * b)
         # |M v| and |v| fade together, so that their ratio stays what it is.
-        scale = np.where(size > 1e-12, norm / np.maximum(size, 1e-12), 0.0)
-        true = (low**2 * a * scale)[:, None] * slippery + (high**2 * b * scale)[:, None] * grippy
-        forces: Array = (state.loads * state.friction)[:, None] * (self.largest * along - true)
-        return forces
+        scale = np.where(size > 1e-12, np.abs(own) / np.maximum(size, 1e-12), 0.0)
+        true = (low**2 * a + 1j * (high**2 * b)) * scale
+        return as_plane(state.holding * (self.largest * own - true) * slippery)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -249,13 +251,11 @@ class _PatchLaw:
         return max(1.0, self.ratio)
 
     def refund(self, state: ObjectState) -> Array:
-        _, along = _direction(state)
-        away = np.sqrt((state.p_WQ[:, 0] - self.x) ** 2 + (state.p_WQ[:, 1] - self.y) ** 2)
+        away = np.abs(state.places - complex(self.x, self.y))
         # A soft edge, so that a fit's cost has no steps as support points cross it.
         inside = 1.0 / (1.0 + np.exp(np.clip((away - self.radius) / (0.05 * self.radius), -50.0, 50.0)))
         ratio = 1.0 + (self.ratio - 1.0) * inside
-        forces: Array = ((self.largest - ratio) * state.loads * state.friction)[:, None] * along
-        return forces
+        return _along(state, self.largest - ratio)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -295,10 +295,9 @@ class _GradientLaw:
     largest: float
 
     def refund(self, state: ObjectState) -> Array:
-        _, along = _direction(state)
-        ratio = np.clip(1.0 + state.p_WQ @ np.array([self.slope_x, self.slope_y]), 0.0, self.largest)
-        forces: Array = ((self.largest - ratio) * state.loads * state.friction)[:, None] * along
-        return forces
+        places = state.places
+        ratio = np.clip(1.0 + self.slope_x * places.real + self.slope_y * places.imag, 0.0, self.largest)
+        return _along(state, self.largest - ratio)
 
 
 @dc.dataclass(frozen=True, kw_only=True)

@@ -39,6 +39,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> str:
             "log_score_gain": d.fit.log_score_gain,
             "log_score_gain_se": d.fit.log_score_gain_se,
             "per_push": [{"push": name, "before": b, "after": a} for name, b, a in d.fit.per_push],
+            "regimes": [dc.asdict(r) for r in d.fit.regimes],
         },
         "theta": {
             name: {"value": t.value, "unit": t.unit, "ci90": t.ci90, "identifiable": t.identifiable,
@@ -127,6 +128,16 @@ def ranking_table(diagnosis: Diagnosis, most: int = 8) -> Table:
     for r in diagnosis.ranking[:most]:
         held_out = "-" if r.held_out_gain is None else f"{r.held_out_gain:.0f} +- {r.held_out_se:.0f}"
         table.add_row(r.name, f"{r.gain:.1f}", f"{r.p_value:.2g}", held_out, r.why)
+    return table
+
+
+def regime_table(diagnosis: Diagnosis) -> Table:
+    """Whether what one regime teaches holds in the other."""
+    table = Table(title="gain of pushes of another regime than those fitted to", title_justify="left")
+    for column in ("fitted to", "tested on", "gain in log density"):
+        table.add_column(column)
+    for r in diagnosis.fit.regimes:
+        table.add_row(r.fitted_on, r.tested_on, f"{r.gain:.0f} +- {r.standard_error:.0f}")
     return table
 
 

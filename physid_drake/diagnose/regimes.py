@@ -1,0 +1,87 @@
+"""Regimes that a recording spans: does what was learnt on slow pushes hold on fast ones, and across headings?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.diagnose.case import Case
+from physid_drake.diagnose.confirm import standard_error
+from physid_drake.diagnose.fit import Fitted
+from physid_drake.diagnose.linear import left_out_scores
+from physid_drake.diagnose.values import RegimeGain
+
+Array = NDArray[np.float64]
+
+FEWEST = 3  # pushes of a regime
+FASTER = 2.0  # the median of the fast over that of the slow pushes: less is one regime
+APART = 1.0  # rad between the mean headings of two groups: less is one direction
+
+
+def regime_gains(case: Case, before: Fitted, after: Fitted) -> tuple[RegimeGain, ...]:
+    """Fit both models to one half of the pushes, predict the other half, by speed and by heading.
+
+    Args:
+        case: the recording.
+        before: the plain model.
+        after: the model with effects.
+    """
+    found = []
+    for names, halves in ((("slow", "fast"), _by_speed(case)), (("one heading", "the other"), _by_heading(case))):
+        if halves is None:
+            continue
+        gains = _scores(after, halves) - _scores(before, halves)
+        for tested, fitted in ((1, 0), (0, 1)):
+            own = gains[list(halves[tested])]
+            found.append(
+                RegimeGain(
+                    fitted_on=names[fitted], tested_on=names[tested], gain=float(own.sum()),
+                    standard_error=standard_error(own),
+                )
+            )  # fmt: skip
+    return tuple(found)
+
+
+Halves = tuple[tuple[int, ...], tuple[int, ...]]
+
+
+def _scores(fitted: Fitted, halves: Sequence[Sequence[int]]) -> Array:
+    scores, _ = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std, halves)
+    return scores
+
+
+def _by_speed(case: Case) -> Halves | None:
+    """The slow and the fast pushes; None where they are about as fast."""
+    speeds = np.array([_speed(case, i) for i in range(len(case.problems))])
+    order = np.argsort(speeds, kind="stable")
+    slow, fast = np.array_split(order, 2)
+    if len(fast) < FEWEST or np.median(speeds[fast]) < FASTER * np.median(speeds[slow]):
+        return None
+    return tuple(slow.tolist()), tuple(fast.tolist())
+
+
+def _speed(case: Case, i: int) -> float:
+    """Largest speed of the hand [m/s], of the object where there is none."""
+    path = case.problems[i].path
+    if path is not None:
+        return float(np.linalg.norm(path.velocities, axis=1).max())
+    return float(np.hypot(*case.problems[i].start.velocity[:2]))
+
+
+def _by_heading(case: Case) -> Halves | None:
+    """Pushes that went to either side of the axis along which headings spread most; None where all go one way."""
+    moves = np.array([p.poses[-1, :2] - np.array(p.start.pose[:2]) for p in case.problems])
+    headings = moves / np.maximum(np.linalg.norm(moves, axis=1, keepdims=True), 1e-9)
+    centred = headings - headings.mean(axis=0)
+    axis = np.linalg.eigh(centred.T @ centred)[1][:, -1]
+    order = np.argsort(headings @ axis, kind="stable")
+    first, second = np.array_split(order, 2)
+    if len(second) < FEWEST:
+        return None
+    means = [headings[half].mean(axis=0) for half in (first, second)]
+    cosine = float(means[0] @ means[1]) / max(float(np.linalg.norm(means[0]) * np.linalg.norm(means[1])), 1e-9)
+    if np.arccos(np.clip(cosine, -1.0, 1.0)) < APART:
+        return None
+    return tuple(first.tolist()), tuple(second.tolist())
