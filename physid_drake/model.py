@@ -3,19 +3,31 @@
 from __future__ import annotations
 
 import dataclasses as dc
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from pydrake.systems.framework import Diagram
+from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from physid_drake.cell import Body, Cell, CellConfig, HandPath, Motion, Start
+from physid_drake.cell.cell import holding_body
 from physid_drake.cell.config import ContactConfig, SolverConfig
+from physid_drake.cell.diagram import Scene
 from physid_drake.effects import Effect, effect_named
-from physid_drake.effects.rollout import Geometry, Rollout, geometry_with, roll, tracked
+from physid_drake.effects.rollout import (
+    Geometry,
+    Rollout,
+    body_with,
+    facts_of,
+    frictions_of,
+    geometry_with,
+    roll,
+    tracked,
+)
+from physid_drake.effects.system import add_effect_forces
 from physid_drake.errors import ConfigError
 from physid_drake.recording import Box, Cylinder, MeshShape, Prism, Shape
 
@@ -82,19 +94,39 @@ class ModelCell:
 
     Attributes:
         model: what it was built from.
-        cell: the cell, in the effects' geometry.
-        diagram: the Drake diagram.
+        cell: the cell, in the effects' geometry, which rollouts take.
+        scene: the diagram's plant and bodies.
+        simulator: of the diagram, theta in its Context.
+        diagram: the Drake diagram, with the effects' forces as a system.
     """
 
     def __init__(self, model: Model) -> None:
         self.model = model
-        geometry = geometry_with(model.effects, Geometry(shape=model.shape))
-        self.cell = Cell(
-            geometry.shape, hand_radius=model.hand_radius, config=model.config, table=np.array(model.table),
-            pressure=geometry.pressure,
-        )  # fmt: skip
+        self.cell = self._cell_in()
+        effects = [e for e in model.effects if not e.is_null]
+        facts = facts_of(self.cell, model.body, np.array(model.table), order=0)
+        body = body_with(effects, model.body, facts)
+        laws, frictions = [law for e in effects for law in e.laws(facts)], frictions_of(effects, facts)
+        tick = model.config.solver.time_step_s
+        augmented = self._cell_in(
+            lambda builder, scene: (
+                add_effect_forces(builder, scene, body, tick, laws, frictions) if laws or frictions else None
+            )
+        )
+        augmented.set_body(holding_body(body, frictions))
+        self.scene: Scene = augmented.scene
+        self.simulator = augmented.simulator
+        self.diagram: Diagram = augmented.diagram
         self.cell.set_body(model.body)
-        self.diagram: Diagram = self.cell.diagram
+
+    def _cell_in(self, attach: Callable[[DiagramBuilder, Scene], object] | None = None) -> Cell:
+        """The cell in the effects' geometry."""
+        model = self.model
+        geometry = geometry_with(model.effects, Geometry(shape=model.shape))
+        return Cell(
+            geometry.shape, hand_radius=model.hand_radius, config=model.config, table=np.array(model.table),
+            pressure=geometry.pressure, attach=attach,
+        )  # fmt: skip
 
     def rollout(
         self,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,7 @@ class Cell:
         table: Array | None = None,
         with_edge: bool = False,
         pressure: PressureGrid | None = None,
+        attach: Callable[[DiagramBuilder, Scene], object] | None = None,
     ) -> None:
         """Build the diagram.
 
@@ -62,6 +63,7 @@ class Cell:
                 comes to its edge is simulated again in a cell with that edge, from which it can fall.
             with_edge: model the edge from the start: point contact on a box, slower than the endless table.
             pressure: under the object, where it is not even.
+            attach: adds further systems to the diagram; a cell that has some is for a Simulator, not for rollouts.
 
         Raises:
             CellError: if the shape cannot be built.
@@ -84,6 +86,8 @@ class Cell:
         )
         for setter in self.setters:
             builder.AddSystem(setter.system)
+        if attach is not None:
+            attach(builder, self.scene)
         self.diagram: Diagram = builder.Build()
         self.simulator = Simulator(self.diagram)
         solver = self.config.solver
@@ -138,7 +142,7 @@ class Cell:
             laws: forces beyond weight, Coulomb friction and the hand.
             frictions: friction laws; the contact holds the largest friction of each, the law gives back the rest.
         """
-        self.set_body(_holding(body, frictions))
+        self.set_body(holding_body(body, frictions))
         motion = self._stepper.run(
             body=body,
             start=start,
@@ -203,7 +207,7 @@ def _stiffer(solid: Solid) -> float:
     return float(np.clip((SLENDER * radius / solid.height) ** 2, 1.0 / 3.0, 1.0))
 
 
-def _holding(body: Body, frictions: Sequence[FrictionLaw]) -> Body:
+def holding_body(body: Body, frictions: Sequence[FrictionLaw]) -> Body:
     """The body whose contact friction is the largest that the laws reach."""
     if not frictions:
         return body

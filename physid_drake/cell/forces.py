@@ -8,6 +8,7 @@ holds against it as against any force, since the tick's contact is solved after 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol, runtime_checkable
@@ -16,6 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell.diagram import GRAVITY
+from physid_drake.cell.motion import planar_pose
+from physid_drake.cell.setters import Body
+from physid_drake.cell.solid import Solid
+from physid_drake.cell.support import Support
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -124,6 +129,73 @@ class ObjectState:
         """Largest friction (n,) of each support point without any law [N]."""
         held: Array = self.loads * self.underside.friction
         return held
+
+
+@dataclass(frozen=True, kw_only=True)
+class StateReader:
+    """Sees the object from above in plant coordinates.
+
+    Attributes:
+        underside: the support points.
+        mass: kg.
+        inertia: about the vertical through the centre of mass [kg m^2].
+        p_BBcm: x + iy [m].
+        half_height: of the object [m].
+    """
+
+    underside: Underside
+    mass: float
+    inertia: float
+    p_BBcm: complex
+    half_height: float
+
+    def at(self, time: float, X_WB: Sequence[float], V_WB: Sequence[float]) -> ObjectState:
+        """The state.
+
+        Args:
+            time: since the rollout's start [s].
+            X_WB: (7,) quaternion wxyz and position [m].
+            V_WB: (6,) angular and linear velocity in W.
+        """
+        px, py, yaw = planar_pose(*X_WB[:6])
+        return ObjectState(
+            time=time,
+            p_WBo=complex(px, py),
+            v_WBo=complex(V_WB[3], V_WB[4]),
+            p_BoBcm_W=self.p_BBcm * complex(math.cos(yaw), math.sin(yaw)),
+            yaw=yaw,
+            yaw_rate=float(V_WB[2]),
+            mass=self.mass,
+            inertia=self.inertia,
+            underside=self.underside,
+            lean=self.lean(X_WB),
+        )
+
+    def lean(self, X_WB: Sequence[float]) -> tuple[float, float, float]:
+        """The plane of the underside: depth of Bo's foot in the table [m], and how it grows along x and y of B."""
+        w, i, j, k, _, _, z = X_WB
+        return self.half_height - z, 2.0 * (w * j - i * k), -2.0 * (w * i + j * k)
+
+
+def reader_of(body: Body, support: Support, solid: Solid) -> StateReader:
+    """The reader for a body on its support points."""
+    return StateReader(
+        underside=Underside(
+            points=as_complex(support.points),
+            weights=support.weights,
+            friction=body.support_friction[support.cells],
+        ),
+        mass=body.mass,
+        inertia=body.mass * body.inertia_ratio * solid.gyration[2],
+        p_BBcm=complex(float(body.p_BBcm[0]), float(body.p_BBcm[1])),
+        half_height=0.5 * solid.height,
+    )
+
+
+def total_wrenches(state: ObjectState, laws: Sequence[ForceLaw], frictions: Sequence[FrictionLaw]) -> list[Wrench]:
+    """What all laws do at a state; those of friction give back what the contact has too much."""
+    refunds = [refund_wrench(state, law.refund(state)) for law in frictions]
+    return [law.wrench(state) for law in laws] + refunds
 
 
 def as_plane(vectors: Complex) -> Array:

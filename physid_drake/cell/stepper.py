@@ -17,10 +17,9 @@ from physid_drake.cell.forces import (
     FrictionLaw,
     ObjectState,
     Swinging,
-    Underside,
     Wrench,
-    as_complex,
-    refund_wrench,
+    reader_of,
+    total_wrenches,
 )
 from physid_drake.cell.hand_path import HandPath
 from physid_drake.cell.impact import routh_impulse
@@ -113,13 +112,7 @@ class Stepper:
         count = max(1, math.ceil((end - begin) / dt - 1e-6))
         self._body, self._begin, self._height = body, begin, height
         self._inertia = body.mass * body.inertia_ratio * self._scene.solid.gyration[2]
-        self._p_BBcm = complex(float(body.p_BBcm[0]), float(body.p_BBcm[1]))
-        support = self._scene.support
-        self._underside = Underside(
-            points=as_complex(support.points),
-            weights=support.weights,
-            friction=body.support_friction[support.cells],
-        )
+        self._reader = reader_of(body, self._scene.support, self._scene.solid)
         self._hand = (
             None
             if path is None
@@ -424,8 +417,7 @@ class Stepper:
                 self._tip(state.yaw, span * wrench.fx, span * wrench.fy)
 
     def _wrenches(self, state: ObjectState) -> list[Wrench]:
-        refunds = [refund_wrench(state, law.refund(state)) for law in self._frictions]
-        return [law.wrench(state) for law in self._laws] + refunds
+        return total_wrenches(state, self._laws, self._frictions)
 
     def _tip(self, yaw: float, jx: float, jy: float) -> None:
         """The pitch and roll that a horizontal impulse at the table gives, half the height below Bcm."""
@@ -439,30 +431,12 @@ class Stepper:
         self._x[self._v + 1] += s * about_x + c * about_y
 
     def _object_state(self, time: float) -> ObjectState:
-        px, py, yaw = self._pose()
-        vx, vy, wz = self._twist()
-        body = self._body
-        return ObjectState(
-            time=time,
-            p_WBo=complex(px, py),
-            v_WBo=complex(vx, vy),
-            p_BoBcm_W=self._p_BBcm * complex(math.cos(yaw), math.sin(yaw)),
-            yaw=yaw,
-            yaw_rate=wz,
-            mass=body.mass,
-            inertia=self._inertia,
-            underside=self._underside,
-            lean=self._lean(),
-        )
-
-    def _lean(self) -> tuple[float, float, float]:
-        """The plane of the underside: depth of Bo's foot in the table [m], and how it grows along x and y of B."""
-        w, i, j, k, _, _, z = self._x[self._q : self._q + 7].tolist()
-        return 0.5 * self._scene.solid.height - z, 2.0 * (w * j - i * k), -2.0 * (w * i + j * k)
+        q, v = self._q, self._v
+        return self._reader.at(time, self._x[q : q + 7].tolist(), self._x[v : v + 6].tolist())
 
     def _mean_depth(self) -> float:
         """How deep the support points are in the table on average [m]; those that hang over it not at all."""
-        foot, along_x, along_y = self._lean()
+        foot, along_x, along_y = self._reader.lean(self._x[self._q : self._q + 7].tolist())
         support = self._scene.support
         plane = foot + support.points @ np.array([along_x, along_y])
         return float(support.weights @ np.maximum(plane, 0.0))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from physid_drake.cell import Body, Cell, HandPath, Motion, Start
 from physid_drake.cell.diagram import GRAVITY
+from physid_drake.cell.forces import FrictionLaw
 from physid_drake.cell.support import PressureGrid
 from physid_drake.effects.effect import Effect, PushFacts
 from physid_drake.effects.friction import Together
@@ -64,19 +65,13 @@ def roll(
     """
     present = [effect for effect in effects if not effect.is_null]
     cell = build(geometry_with(present, geometry))
-    facts = PushFacts(
-        order=push.order, mass=body.mass, polar=float(sum(_second_moments(cell))),
-        rolling_radius=cell.solid.rolling_radius, region=_region(cell, body, push),
-    )  # fmt: skip
-    for effect in present:
-        body = effect.body(body, facts)
+    facts = facts_of(cell, body, _region(cell, body, push), push.order)
+    body = body_with(present, body, facts)
     start = push.start
     for effect in reversed(present):
         start = dc.replace(start, pose=effect.true_pose(start.pose))
     motion: Motion | None = None
-    frictions = [law for effect in present for law in effect.frictions(facts)]
-    if len(frictions) > 1:
-        frictions = [Together(tuple(frictions))]
+    frictions = frictions_of(present, facts)
     for _ in range(max((effect.passes for effect in present), default=1)):
         path = push.path
         if path is not None:
@@ -94,6 +89,27 @@ def roll(
         )
     assert motion is not None
     return motion
+
+
+def facts_of(cell: Cell, body: Body, region: Array, order: int) -> PushFacts:
+    """What effects may know of a push that comes within a region (2, 2) [m]."""
+    return PushFacts(
+        order=order, mass=body.mass, polar=float(sum(_second_moments(cell))),
+        rolling_radius=cell.solid.rolling_radius, region=region,
+    )  # fmt: skip
+
+
+def body_with(effects: Sequence[Effect], body: Body, facts: PushFacts) -> Body:
+    """The body with what effects change of it."""
+    for effect in effects:
+        body = effect.body(body, facts)
+    return body
+
+
+def frictions_of(effects: Sequence[Effect], facts: PushFacts) -> list[FrictionLaw]:
+    """The effects' friction laws; several act as one."""
+    frictions = [law for effect in effects for law in effect.frictions(facts)]
+    return [Together(tuple(frictions))] if len(frictions) > 1 else frictions
 
 
 def tracked(motion: Motion, times: Array, effects: Sequence[Effect]) -> Array:

@@ -1,0 +1,109 @@
+"""The effects' forces as a system of the cell's diagram, for users who simulate the diagram themselves.
+
+It calls the same laws as ``Cell.rollout``, and like it samples them at every tick and holds them: a Python law that
+the solver evaluated and linearised within its steps would cost many times as much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pydrake.common.cpp_param import List
+from pydrake.common.value import AbstractValue, Value
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import ExternallyAppliedSpatialForce
+from pydrake.systems.framework import Context, DiagramBuilder, DiscreteValues, LeafSystem
+
+from physid_drake.cell import Body
+from physid_drake.cell.diagram import Scene
+from physid_drake.cell.forces import ForceLaw, FrictionLaw, StateReader, reader_of, total_wrenches
+
+NAME = "effect_forces"
+
+
+class EffectForces(LeafSystem):
+    """Forces of laws on the object, held over a tick.
+
+    Ports: ``object.state_estimated`` (13,) in, the object's positions and velocities;
+    ``object.force_commanded`` out, for the plant's applied spatial forces.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        reader: StateReader,
+        tick: float,
+        laws: Sequence[ForceLaw],
+        frictions: Sequence[FrictionLaw],
+    ) -> None:
+        """Prepare.
+
+        Args:
+            scene: whose object is pushed.
+            reader: sees the object's state.
+            tick: s.
+            laws: forces.
+            frictions: friction laws; the contact must hold their largest friction.
+        """
+        LeafSystem.__init__(self)
+        self.set_name(NAME)
+        self._reader, self._laws, self._frictions = reader, tuple(laws), tuple(frictions)
+        self._body = scene.object.index()
+        self.DeclareVectorInputPort("object.state_estimated", 13)
+        # Force and torque at the height of the centre of mass, and at the table.
+        self.DeclareDiscreteState(6)
+        self.DeclarePeriodicDiscreteUpdateEvent(tick, 0.0, self._sample)
+        self.DeclareAbstractOutputPort(
+            "object.force_commanded",
+            lambda: AbstractValue.Make([ExternallyAppliedSpatialForce()]),
+            self._forces,
+            {self.xd_ticket()},
+        )
+
+    def _sample(self, context: Context, discrete: DiscreteValues) -> None:
+        x = self.get_input_port().Eval(context).tolist()
+        state = self._reader.at(context.get_time(), x[:7], x[7:])
+        held = [0.0] * 6
+        for wrench in total_wrenches(state, self._laws, self._frictions):
+            at = 3 if wrench.at_table else 0
+            for k, value in enumerate((wrench.fx, wrench.fy, wrench.torque)):
+                held[at + k] += value
+        discrete.set_value(held)
+
+    def _forces(self, context: Context, output: Value[List[ExternallyAppliedSpatialForce]]) -> None:
+        held = context.get_discrete_state_vector().value().tolist()
+        output.set_value([self._force(held[:3], 0.0), self._force(held[3:], -self._reader.half_height)])
+
+    def _force(self, planar: Sequence[float], z: float) -> ExternallyAppliedSpatialForce:
+        force = ExternallyAppliedSpatialForce()
+        force.body_index = self._body
+        force.p_BoBq_B = [self._reader.p_BBcm.real, self._reader.p_BBcm.imag, z]
+        force.F_Bq_W = SpatialForce(tau=[0.0, 0.0, planar[2]], f=[planar[0], planar[1], 0.0])
+        return force
+
+
+def add_effect_forces(
+    builder: DiagramBuilder,
+    scene: Scene,
+    body: Body,
+    tick: float,
+    laws: Sequence[ForceLaw],
+    frictions: Sequence[FrictionLaw],
+) -> EffectForces:
+    """Add the system to a cell's diagram and connect it to the plant.
+
+    Args:
+        builder: of the cell's diagram.
+        scene: the cell's.
+        body: the object's parameters, without the friction laws' surplus.
+        tick: s.
+        laws: forces.
+        frictions: friction laws.
+    """
+    plant = scene.plant
+    system: EffectForces = builder.AddSystem(
+        EffectForces(scene, reader_of(body, scene.support, scene.solid), tick, laws, frictions)
+    )
+    builder.Connect(plant.get_state_output_port(scene.object.model_instance()), system.get_input_port())
+    builder.Connect(system.get_output_port(), plant.get_applied_spatial_force_input_port())
+    return system
