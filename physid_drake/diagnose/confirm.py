@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from physid_drake.diagnose.fit import EffectPoint, Fitted, Fitter
 from physid_drake.diagnose.linear import left_out_scores
@@ -18,7 +19,8 @@ Tick = Callable[[str, int, int], None]
 WORTH_A_FIT = 0.35  # of the best score test's gain
 SURE = 2.0  # standard errors
 LEAST = 4.0  # nats of held-out gain
-CERTAIN = 12.0  # nats of held-out gain, the best push not counted: odds of e^12
+CERTAIN = 40.0  # nats of held-out gain, the best push not counted
+UNLIKELY = 0.05  # of the signed-rank test of held-out gains
 STUCK = 1.6  # cost per degree of freedom after which a fit is tried again from elsewhere
 PERSISTENT = 2  # candidates that are worth that
 FELL_SHORT = 0.8  # of the gain that the score test promised
@@ -60,14 +62,18 @@ class Candidate:
     def accepted(self) -> bool:
         """Whether held-out pushes confirm the effect.
 
-        Either on the whole, or, for what only a few pushes feel (a patch, a magnet), in more than one push far beyond
-        chance: without an effect a push that was left out gains a nat or two at most.
+        Either most of them do, or, for what only a few pushes feel (a patch, a magnet), more than one does far beyond
+        what the simulator's own error explains.
         """
-        if self.degenerate:
+        if self.degenerate or self.gain < LEAST:
             return False
         some = np.sort(self.gains)[:-1]
         local = some.sum() > CERTAIN and (self.gains > CERTAIN / 4.0).sum() >= 2
-        return bool(self.gain > max(SURE * self.standard_error, LEAST) or local)
+        return bool((self.gain > SURE * self.standard_error and self._most_gain()) or local)
+
+    def _most_gain(self) -> bool:
+        """Whether gains outweigh losses in number and size; one large gain does not make an effect."""
+        return len(self.gains) < 5 or float(stats.wilcoxon(self.gains, alternative="greater").pvalue) < UNLIKELY
 
 
 def standard_error(values: Array) -> float:
@@ -104,8 +110,7 @@ def _candidate(fitter: Fitter, before: Fitted, one: Score, plain: Array, *, pers
     if persistent and fitted.reduced_chi2 > STUCK and fitted.score - before.score < FELL_SHORT * promised:
         # Far from the plain cell its derivatives mislead: from the score test's theta, with derivatives taken there.
         u = np.clip(before.state.u + np.clip(one.theta, -FAR, FAR), 1e-3, 1.0 - 1e-3)
-        fresh = dc.replace(state, u=u, own=tuple(np.zeros_like(o) for o in state.own), scatter=1.0)
-        again = fitter.fit(fresh, rounds=4, careful=1, like=fitter.linearise(fresh, learn_scatter=False))
+        again = fitter.fit(fitter.start(u, state.effects), rounds=4, careful=1, renew=True)
         fitted = again if again.score > fitted.score else fitted
     point = fitted.state.effects[-1]
     return Candidate(

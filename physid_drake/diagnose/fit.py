@@ -19,6 +19,7 @@ THETA_STEP = 0.006  # of the unit cube
 OWN_STEP = 0.5  # of the prior standard deviation
 MOST_OWN = 3.0  # standard deviations: unknowns are linearised no further out
 FAILED = 1e4  # standard deviations: features of a rollout that diverged
+RENEWED = 5.0  # of the cost, per push: a step that gained as much has left the place of its derivatives
 MOST_THETA_MOVE = 0.25  # of the unit cube in one iteration
 Say = Callable[[str], None]
 
@@ -132,10 +133,10 @@ class Fitter:
         self.tolerances = tolerances
         self._places = {problem.name: i for i, problem in enumerate(case.problems)}
 
-    def start(self, u: Array) -> State:
-        """The plain model at theta ``u`` (d,)."""
+    def start(self, u: Array, effects: tuple[EffectPoint, ...] = ()) -> State:
+        """A model at theta ``u`` (d,), the pushes' unknowns at zero."""
         own = tuple(np.zeros(len(n.names)) for n in self.case.nuisances)
-        return State(u=u, effects=(), own=own, scatter=1.0)
+        return State(u=u, effects=effects, own=own, scatter=1.0)
 
     # Rollouts.
 
@@ -325,6 +326,7 @@ class Fitter:
         rounds: int = 4,
         careful: int = 0,
         like: Fitted | None = None,
+        renew: bool = False,
         say: Say | None = None,
     ) -> Fitted:
         """Iterate from a state, with shorter steps where one fails.
@@ -335,31 +337,46 @@ class Fitter:
             careful: in so many first rounds only the shared parameters move, the pushes' unknowns stay at zero and
                 the scatter at its prior's median: far from the answer they would explain anything.
             like: a fitted model whose derivatives for theta and the pushes' unknowns are near enough.
+            renew: take all derivatives anew after each step that gained much.
             say: told of each round.
 
         Returns:
             The best state seen, linearised.
         """
         best = self.linearise(state, learn_scatter=careful == 0, like=like)
+        like = best if renew else like
         for k in range(rounds):
             if say is not None:
                 say(f"round {k + 1} of at most {rounds}")
-            cautious = k < careful
-            trial = best
-            for share in (1.0, 0.4, 0.15):
-                step = self.stepped(best, share)
-                if cautious:
-                    step = dc.replace(step, own=tuple(np.zeros_like(o) for o in step.own))
-                trial = self.linearise(step, learn_scatter=k + 1 >= careful, like=like)
-                if actual_cost(trial) < actual_cost(best) or k + 1 == careful:
-                    break
+            trial = self._tried(best, like, cautious=k < careful, released=k + 1 >= careful)
             gained = actual_cost(best) - actual_cost(trial)
             if gained <= 0.0 and k + 1 != careful:
                 break
             best = trial
             if gained < 0.5 and k >= careful:
                 break
+            if renew and k + 1 < rounds and gained > RENEWED * len(best.pushes):
+                like = best = self.linearise(best.state, learn_scatter=k + 1 >= careful)
         return best
+
+    def _tried(self, best: Fitted, like: Fitted | None, *, cautious: bool, released: bool) -> Fitted:
+        """One step, shorter where a long one fails.
+
+        Args:
+            best: where it starts.
+            like: gives derivatives.
+            cautious: keep the pushes' unknowns at zero.
+            released: learn the scatter; in the step that is both, the cost changes its meaning and is not compared.
+        """
+        trial = best
+        for share in (1.0, 0.4, 0.15):
+            step = self.stepped(best, share)
+            if cautious:
+                step = dc.replace(step, own=tuple(np.zeros_like(o) for o in step.own))
+            trial = self.linearise(step, learn_scatter=released, like=like)
+            if actual_cost(trial) < actual_cost(best) or (cautious and released):
+                break
+        return trial
 
     def refine(self, rough: Fitted) -> Fitted:
         """What another cell's fit left, here: theta's and effects' derivatives anew, then a step if it helps."""

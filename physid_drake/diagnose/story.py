@@ -86,8 +86,7 @@ def gather(
             break
         steps.append(candidates)
         tick(f"model with {candidates[0].name}", 0, 0)
-        freed = _freed(case, candidates[0].fitted.state)
-        current = fitter.fit(freed, rounds=3, like=fitter.linearise(freed))
+        current = _model_with(fitter, candidates[0])
         if current.reduced_chi2 > HOPELESS:
             break
         # The signatures at the plain cell are near enough to ask whether anything is left.
@@ -146,8 +145,16 @@ def _looks(
     return tuple(guard_kept), found
 
 
-def _freed(case: Case, state: State) -> State:
-    return dc.replace(state, effects=tuple(e.freed(case) for e in state.effects))
+def _model_with(fitter: Fitter, candidate: Candidate) -> Fitted:
+    """The model with an effect, all its coordinates free, all derivatives taken where it is."""
+    state = candidate.fitted.state
+    effects = tuple(e.freed(fitter.case) for e in state.effects)
+    near = fitter.fit(dc.replace(state, effects=effects), rounds=3, renew=True)
+    if near.reduced_chi2 <= EXPLAINED:
+        return near
+    # The pushes' unknowns may have been imitating what is missing: once more, without them at first.
+    far = fitter.fit(fitter.start(near.state.u, near.state.effects), rounds=6, careful=2, renew=True)
+    return far if far.score > near.score else near
 
 
 def _located(evidence: Evidence, tick: Tick) -> Evidence:
