@@ -1,4 +1,4 @@
-"""The command line: ``inspect``, ``convert``, ``diagnose``."""
+"""The command line: ``inspect``, ``convert``, ``diagnose``, ``prove``."""
 
 from __future__ import annotations
 
@@ -134,7 +134,33 @@ def _run_diagnose(arguments: argparse.Namespace) -> int:
     return run(arguments)
 
 
-COMMANDS: list[Callable[[Subparsers], None]] = [_register_inspect, _register_convert, _register_diagnose]
+def _register_prove(subparsers: Subparsers) -> None:
+    parser = subparsers.add_parser("prove", help="measure the diagnosis on sealed worlds of another simulator")
+    parser.add_argument("--worlds", type=int, metavar="N", help="how many (default 200)")
+    parser.add_argument("--quick", action="store_true", help="ten worlds")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all worlds (default 0)")
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where all goes (default: proofs/seed_N)")
+    parser.add_argument(
+        "--kind", choices=["none", "effect", "other", "pair"], help="only such worlds (default: a mix)"
+    )
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N",
+                        help="diagnoses at a time (default: the machine's cores)")  # fmt: skip
+    parser.add_argument("--timeout", type=float, default=1800.0, metavar="S",
+                        help="a diagnosis that takes longer has failed (default 1800)")  # fmt: skip
+    parser.add_argument("--retry", action="store_true", help="diagnose again what failed before")
+    parser.set_defaults(run=_run_prove)
+
+
+def _run_prove(arguments: argparse.Namespace) -> int:
+    # Matplotlib takes half a second to import, which the other commands need not wait for.
+    from physid_drake.run_prove import run  # noqa: PLC0415
+
+    return run(arguments)
+
+
+COMMANDS: list[Callable[[Subparsers], None]] = [
+    _register_inspect, _register_convert, _register_diagnose, _register_prove,
+]  # fmt: skip
 """One function for each command; it adds its parser, which sets ``run``: arguments -> exit status."""
 
 
