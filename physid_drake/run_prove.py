@@ -32,6 +32,7 @@ from physid_drake.report.proof_pictures import confusion_picture, drawn
 from physid_drake.run_folder import RunFolder
 
 WORLDS, QUICK = 200, 10
+NARROWEST_TABLE = 120  # columns
 SETTINGS = "settings.json"
 Commander = Callable[[Path, Path, Path], tuple[str, ...]]
 """Recording, folder of the results, what must not be seen: the words of the command that diagnoses."""
@@ -50,10 +51,10 @@ def run(arguments: argparse.Namespace, command: Commander = diagnose_command) ->
     """
     worlds = _checked(arguments)
     out: Path = arguments.out or Path("proofs") / "_".join(filter(None, (f"seed_{arguments.seed}", arguments.kind)))
-    folder = _claim(out, {"seed": arguments.seed, "kind": arguments.kind})
-    console = Console()
+    folder = claim(out, {"seed": arguments.seed, "kind": arguments.kind})
+    console = wide_console()
     names = [world_id(index, arguments.seed) for index in range(worlds)]
-    with _ended_softly():
+    with ended_softly():
         seal = _make(arguments, worlds, out, console)
         console.print(f"seal of {worlds} worlds, before any is diagnosed: sha256 {seal}", soft_wrap=True)
         diagnose_worlds(out, names, arguments, console, command)
@@ -68,20 +69,37 @@ def run(arguments: argparse.Namespace, command: Commander = diagnose_command) ->
     return 0
 
 
+def wide_console() -> Console:
+    """A console whose tables are legible where the output is no terminal."""
+    console = Console()
+    return console if console.is_terminal else Console(width=max(NARROWEST_TABLE, console.width))
+
+
 def _checked(arguments: argparse.Namespace) -> int:
     """How many worlds."""
     if arguments.quick and arguments.worlds is not None:
         raise ConfigError("--quick means ten worlds: give it or --worlds, not both.")
     worlds = QUICK if arguments.quick else WORLDS if arguments.worlds is None else int(arguments.worlds)
-    for name, value, least in (("worlds", worlds, 1), ("seed", arguments.seed, 0), ("jobs", arguments.jobs, 1)):
+    if worlds < 1:
+        raise ConfigError(f"--worlds must be at least 1, but is {worlds}.")
+    check_running(arguments)
+    return worlds
+
+
+def check_running(arguments: argparse.Namespace) -> None:
+    """Refuse a seed, a number of jobs or a time that cannot be.
+
+    Raises:
+        ConfigError: which one, and what it must be.
+    """
+    for name, value, least in (("seed", arguments.seed, 0), ("jobs", arguments.jobs, 1)):
         if value < least:
             raise ConfigError(f"--{name} must be at least {least}, but is {value}.")
     if not arguments.timeout > 0.0:
         raise ConfigError(f"--timeout must be positive, but is {arguments.timeout:g} s.")
-    return worlds
 
 
-def _claim(out: Path, settings: dict[str, object]) -> RunFolder:
+def claim(out: Path, settings: dict[str, object]) -> RunFolder:
     """The folder of a proof, refused where it holds another."""
     text = json.dumps(settings, indent=2) + "\n"
     file = out / SETTINGS
@@ -97,7 +115,7 @@ def _claim(out: Path, settings: dict[str, object]) -> RunFolder:
 
 
 @contextmanager
-def _ended_softly() -> Iterator[None]:
+def ended_softly() -> Iterator[None]:
     """Take a request to end for an interruption, so that permissions come back and diagnoses keep their stages."""
 
     def interrupt(number: int, frame: FrameType | None) -> None:
@@ -133,9 +151,9 @@ def _make(arguments: argparse.Namespace, worlds: int, out: Path, console: Consol
                 if counts is not None:
                     tick("worlds made", int(counts[1]), int(counts[2]))
             said = child.stdout.read()
-        finally:
-            if child.poll() is None and sys.exc_info()[0] is not None:
-                child.kill()
+        except BaseException:
+            child.kill()
+            raise
     seal = re.search(r"sha256 ([0-9a-f]{64})", said)
     if child.returncode != 0 or seal is None:
         raise ProofError(last.removeprefix("error: ") or f"the worlds were not made: exit status {child.returncode}.")

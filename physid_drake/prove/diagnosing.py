@@ -1,4 +1,4 @@
-"""Diagnoses many recordings, each by a command of its own: it goes on where it stopped, and a failure ends nothing."""
+"""Diagnoses many recordings, each by its own command: it goes on where it stopped, and a failure ends nothing."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ class _Running:
         (task.folder / ATTEMPT).unlink(missing_ok=True)
         log = (task.folder / LOG).open("wb")
         # One thread each: several diagnoses run side by side.
-        threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+        threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
         child = subprocess.Popen(
             task.words, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, env={**os.environ, **threads}
         )

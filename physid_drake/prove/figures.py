@@ -6,6 +6,7 @@ import dataclasses as dc
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -191,7 +192,7 @@ def calibration(outcomes: Sequence[Outcome]) -> tuple[tuple[Reliability, ...], f
     """Bins of stated probabilities, and the Brier score, over all names that were given."""
     named = [(p, names[0] in o.true) for o in outcomes for p, names in zip(o.probabilities, o.classes, strict=True)]
     bins = []
-    for low, high in zip(PROBABILITIES[:-1], PROBABILITIES[1:], strict=True):
+    for low, high in pairwise(PROBABILITIES):
         within = [(p, hit) for p, hit in named if low <= p and (p < high or high == PROBABILITIES[-1])]
         stated = float(np.mean([p for p, _ in within])) if within else math.nan
         bins.append(Reliability(low=low, high=high, stated=stated, right=_count(hit for _, hit in within)))

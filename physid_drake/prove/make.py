@@ -1,7 +1,8 @@
 """Makes sealed worlds: recordings that tell nothing, and apart from them the truth, under a hash.
 
 ``python -m physid_drake.prove.make --worlds 20 --seed 0 --out FOLDER`` writes ``recordings/<id>/``,
-``sealed/<id>.json``, ``seal.txt`` and ``seal.sha256``. The same seed gives the same bytes; worlds that exist are skipped.
+``sealed/<id>.json``, ``seal.txt`` and ``seal.sha256``. The same seed gives the same bytes;
+worlds that exist are skipped.
 """
 
 from __future__ import annotations

@@ -118,15 +118,13 @@ class Outcome:
     def fault(self) -> str | None:
         """What is not right about the answer, None where nothing is."""
         if self.failed:
-            return "failed"
+            return FAILED
         if self.kind == "none":
             return "false alarm" if self.found else None
-        if self.kind == "other":
-            return None if self.verdict == "unexplained" else "named" if self.classes else "missed"
-        if self.wrong_name:
-            return "wrong name"
-        if not self.found:
-            return "missed"
+        if self.kind == "other" and self.found:
+            return "wrong name" if self.classes else None
+        if self.wrong_name or not self.found:
+            return "wrong name" if self.wrong_name else "missed"
         if self.kind == "pair":
             return None if self.both else "one of two" if self.named else "not named"
         return None if self.right else "a large class" if self.in_class else "not named"

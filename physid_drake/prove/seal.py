@@ -50,7 +50,8 @@ def write_seal(out: Path, identities: Sequence[str]) -> str:
     changed = sorted(name for name, digest in digests.items() if earlier.get(name, digest) != digest)
     if changed:
         raise ProofError(
-            f"'{out / SEALED / changed[0]}.json' has changed since it was sealed in '{out / LINES}'; choose another --out."
+            f"'{out / SEALED / changed[0]}.json' has changed since it was sealed in '{out / LINES}';"
+            " choose another --out."
         )
     lines = [f"{digest}  {SEALED}/{name}.json\n" for name, digest in sorted({**earlier, **digests}.items())]
     (out / LINES).write_text("".join(lines), encoding="utf-8")

@@ -136,8 +136,8 @@ def proof_markdown(proof: Proof) -> str:
 def _worlds(proof: Proof) -> str:
     kinds = proof.figures.worlds
     return (
-        f"{len(proof.outcomes)} worlds: {kinds['none']} without an effect, {kinds['effect']} with one of the catalogue,"
-        f" {kinds['pair']} with two, {kinds['other']} with one that is in no catalogue"
+        f"{len(proof.outcomes)} worlds: {kinds['none']} without an effect, {kinds['effect']} with one of the"
+        f" catalogue, {kinds['pair']} with two, {kinds['other']} with one that is in no catalogue"
     )
 
 

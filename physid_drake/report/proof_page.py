@@ -84,7 +84,9 @@ _PAGE = """<!DOCTYPE html>
 {% macro rows(found) %}
 <div class="wide"><table><tr>{% for h in found[0] %}<th>{{ h }}</th>{% endfor %}</tr>
 {% for row in found[1] %}
-<tr>{% for cell in row %}<td{% if loop.first and cell[:1] == " " %} class="part"{% endif %}>{{ cell }}</td>{% endfor %}</tr>
+<tr>{% for cell in row %}
+<td{% if loop.first and cell[:1] == " " %} class="part"{% endif %}>{{ cell }}</td>
+{% endfor %}</tr>
 {% endfor %}
 </table></div>
 {% endmacro %}
