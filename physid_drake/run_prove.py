@@ -34,8 +34,8 @@ from physid_drake.run_folder import RunFolder
 WORLDS, QUICK = 200, 10
 NARROWEST_TABLE = 120  # columns
 SETTINGS = "settings.json"
-Commander = Callable[[Path, Path, Path], tuple[str, ...]]
-"""Recording, folder of the results, what must not be seen: the words of the command that diagnoses."""
+Commander = Callable[..., tuple[str, ...]]
+"""Recording, folder of the results, what must not be seen (one or more): the words of the command that diagnoses."""
 
 
 def run(arguments: argparse.Namespace, command: Commander = diagnose_command) -> int:

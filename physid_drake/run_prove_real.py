@@ -48,8 +48,9 @@ def run_real(arguments: argparse.Namespace, command: Commander = diagnose_comman
             if reason is not None:
                 skipped[case.name] = reason
         there = [case for case in cases if case.name not in skipped]
+        hidden = (published, out / "held_out")
         tasks = [
-            Task(name=case.id, words=command(out / "recordings" / case.id, out / "diagnoses" / case.id, published),
+            Task(name=case.id, words=command(out / "recordings" / case.id, out / "diagnoses" / case.id, *hidden),
                  folder=out / "diagnoses" / case.id)
             for case in there
         ]  # fmt: skip

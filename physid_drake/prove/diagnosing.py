@@ -46,18 +46,19 @@ class Attempt:
     error: str | None
 
 
-def diagnose_command(recording: Path, folder: Path, sealed: Path, *, pushes: int | None = None) -> tuple[str, ...]:
-    """The command that diagnoses a recording with one worker, blind to a folder.
+def diagnose_command(recording: Path, folder: Path, *sealed: Path) -> tuple[str, ...]:
+    """The command that diagnoses a recording with one worker, blind to some folders.
 
     Args:
         recording: its folder, all that the diagnosis is given.
         folder: where its results go.
         sealed: what it must not see.
-        pushes: look at so many at most; None for the command's own choice.
     """
-    words = [sys.executable, "-m", "physid_drake.prove.blindfold", str(sealed.resolve()), "diagnose",
-             str(recording.resolve()), "--out", str(folder.resolve()), "--jobs", "1", "--seed", "0"]  # fmt: skip
-    return (*words, *(() if pushes is None else ("--pushes", str(pushes))))
+    hidden = os.pathsep.join(str(path.resolve()) for path in sealed)
+    return (
+        sys.executable, "-m", "physid_drake.prove.blindfold", hidden, "diagnose", str(recording.resolve()),
+        "--out", str(folder.resolve()), "--jobs", "1", "--seed", "0",
+    )  # fmt: skip
 
 
 def attempt_of(folder: Path) -> Attempt | None:

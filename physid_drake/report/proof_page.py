@@ -95,13 +95,13 @@ _PAGE = """<!DOCTYPE html>
 with one of the catalogue, {{ worlds.pair }} with two, {{ worlds.other }} with one that is in no catalogue. Truth and
 recordings were made and sealed first; the diagnosis was given the recordings alone.</p>
 <p class="note">Seed {{ proof.seed }}. Seal, written down before the diagnosis: <code>sha256 {{ proof.seal }}</code>.
-{% for name, version in proof.versions.items() %}{{ name }} {{ version }}{{ "." if loop.last else ", " }}{% endfor %}
+{% for name, version in proof.versions.items() %}{{ name }} {{ version }}{{ ". " if loop.last else ", " }}{% endfor %}
 A diagnosis took {{ seconds }} on this machine.</p>
 {{ rows(main) }}
 <p class="note">A world without a diagnosis counts as nothing found; where there is no effect, as a false alarm.</p>
 <h2>What was said of what</h2>
 <figure>{{ pictures.confusion }}</figure>
-<p class="note">Worlds with one effect or none. Framed: the right name. Colour: share of the row.</p>
+<p class="note">Worlds with one effect or none. Framed: the right answer. Colour: share of the row.</p>
 <h2>Power against the size of the effect</h2>
 <figure>{{ pictures.power }}</figure>
 {{ rows(power) }}

@@ -22,6 +22,9 @@ FOUND, NAMED = "#98a1b0", "#2563c9"
 LAST = ("unexplained", "consistent", "underpowered", "failed")
 """What is said without a name: the last columns of the confusion."""
 
+RIGHT = {NOTHING: "consistent", NOT_CATALOGUED: "unexplained"}
+"""What is right where there is no name to be said."""
+
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "proof",
@@ -79,8 +82,7 @@ def confusion_picture(figures: Figures) -> Figure:
     axes.set_xlabel("said first")
     axes.set_ylabel("truth (worlds)")
     for k, name in enumerate(rows):
-        if name in columns:
-            axes.add_patch(_frame(columns.index(name), k))
+        axes.add_patch(_frame(columns.index(RIGHT.get(name, name)), k))
     axes.tick_params(length=0)
     return figure
 

@@ -29,7 +29,7 @@ if "error" in answer:
 """
 
 
-def fake(recording, folder, sealed):
+def fake(recording, folder, *sealed):
     return (sys.executable, "-c", FAKE, str(recording), str(folder))
 
 
