@@ -152,7 +152,7 @@ def _make(arguments: argparse.Namespace, worlds: int, out: Path, console: Consol
                     tick("worlds made", int(counts[1]), int(counts[2]))
             said = child.stdout.read()
         except BaseException:
-            child.kill()
+            child.send_signal(signal.SIGINT)  # it ends its own workers
             raise
     seal = re.search(r"sha256 ([0-9a-f]{64})", said)
     if child.returncode != 0 or seal is None:
