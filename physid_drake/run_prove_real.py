@@ -42,12 +42,8 @@ def run_real(arguments: argparse.Namespace, command: Commander = diagnose_comman
     folder = claim(out, {"real": True, "seed": arguments.seed, "pushes": arguments.pushes})
     console = wide_console()
     with ended_softly():
-        skipped = {}
-        for case in cases:
-            reason = prepare(case, published, out, pushes=arguments.pushes, seed=arguments.seed)
-            if reason is not None:
-                skipped[case.name] = reason
-        there = [case for case in cases if case.name not in skipped]
+        reasons = {c.name: prepare(c, published, out, pushes=arguments.pushes, seed=arguments.seed) for c in cases}
+        there = [case for case in cases if reasons[case.name] is None]
         hidden = (published, out / "held_out")
         tasks = [
             Task(name=case.id, words=command(out / "recordings" / case.id, out / "diagnoses" / case.id, *hidden),
@@ -57,9 +53,9 @@ def run_real(arguments: argparse.Namespace, command: Commander = diagnose_comman
         run_tasks(tasks, arguments, console)
         _measure_fresh(there, out)
     outcomes = [
-        RealOutcome(case=case, skipped=f"left out: {skipped[case.name]}")
-        if case.name in skipped
-        else real_outcome(case, published, out)
+        real_outcome(case, published, out)
+        if reasons[case.name] is None
+        else RealOutcome(case=case, skipped=f"left out: {reasons[case.name]}")
         for case in cases
     ]
     _write(folder, outcomes)
