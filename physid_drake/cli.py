@@ -1,4 +1,4 @@
-"""The command line: ``inspect``, ``convert``, ``diagnose``."""
+"""The command line: ``inspect``, ``convert``, ``diagnose``, ``prove``."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from rich.console import Console
 
-from physid_drake.errors import OutputError, PhysidError
+from physid_drake.errors import ConfigError, OutputError, PhysidError
 from physid_drake.recording import read_recording
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def _run_inspect(arguments: argparse.Namespace) -> int:
 
 def _register_convert(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser("convert", help="turn a published data set into a recording")
-    parser.add_argument("layout", choices=["cmu", "mit"], help="whose layout SOURCE is in")
+    parser.add_argument("layout", choices=["cmu", "mit", "cube"], help="whose layout SOURCE is in")
     parser.add_argument("source", type=Path, metavar="SOURCE", help="a published file, or a folder of them")
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="where the recording goes; new or empty")
     parser.add_argument("--limit", type=int, metavar="N", help="draw N pushes at random")
@@ -102,9 +102,9 @@ def _register_convert(subparsers: Subparsers) -> None:
 
 
 def _run_convert(arguments: argparse.Namespace) -> int:
-    from physid_drake.recording.adapters import convert_cmu, convert_mit  # noqa: PLC0415
+    from physid_drake.recording.adapters import convert_cmu, convert_cube, convert_mit  # noqa: PLC0415
 
-    convert = {"cmu": convert_cmu, "mit": convert_mit}[arguments.layout]
+    convert = {"cmu": convert_cmu, "mit": convert_mit, "cube": convert_cube}[arguments.layout]
     recording = convert(arguments.source, arguments.folder, limit=arguments.limit, seed=arguments.seed)
     print(f"{recording.name}: {len(recording.pushes)} pushes written to {arguments.folder}")
     return 0
@@ -134,7 +134,44 @@ def _run_diagnose(arguments: argparse.Namespace) -> int:
     return run(arguments)
 
 
-COMMANDS: list[Callable[[Subparsers], None]] = [_register_inspect, _register_convert, _register_diagnose]
+def _register_prove(subparsers: Subparsers) -> None:
+    parser = subparsers.add_parser("prove", help="measure the diagnosis on sealed worlds of another simulator")
+    parser.add_argument("--worlds", type=int, metavar="N", help="how many (default 200)")
+    parser.add_argument("--quick", action="store_true", help="ten worlds")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all worlds (default 0)")
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where all goes (default: proofs/seed_N)")
+    parser.add_argument(
+        "--kind", choices=["none", "effect", "other", "pair"], help="only such worlds (default: a mix)"
+    )
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N",
+                        help="diagnoses at a time (default: the machine's cores)")  # fmt: skip
+    parser.add_argument("--timeout", type=float, default=1800.0, metavar="S",
+                        help="a diagnosis that takes longer has failed (default 1800)")  # fmt: skip
+    parser.add_argument("--retry", action="store_true", help="diagnose again what failed before")
+    parser.add_argument("--real", type=Path, metavar="FOLDER",
+                        help="instead of worlds, recordings of robots that others published")  # fmt: skip
+    parser.add_argument("--only", nargs="+", metavar="NAME", help="of --real: only cases whose names begin so")
+    parser.add_argument("--pushes", type=int, default=16, metavar="N",
+                        help="of --real: pushes that are diagnosed (default 16)")  # fmt: skip
+    parser.set_defaults(run=_run_prove)
+
+
+def _run_prove(arguments: argparse.Namespace) -> int:
+    # Matplotlib takes half a second to import and Drake a second, which the other commands need not wait for.
+    if arguments.real is not None:
+        from physid_drake.run_prove_real import run_real  # noqa: PLC0415
+
+        return run_real(arguments)
+    if arguments.only is not None:
+        raise ConfigError("--only chooses among real recordings: give --real too.")
+    from physid_drake.run_prove import run  # noqa: PLC0415
+
+    return run(arguments)
+
+
+COMMANDS: list[Callable[[Subparsers], None]] = [
+    _register_inspect, _register_convert, _register_diagnose, _register_prove,
+]  # fmt: skip
 """One function for each command; it adds its parser, which sets ``run``: arguments -> exit status."""
 
 

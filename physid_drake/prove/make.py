@@ -1,7 +1,8 @@
 """Makes sealed worlds: recordings that tell nothing, and apart from them the truth, under a hash.
 
 ``python -m physid_drake.prove.make --worlds 20 --seed 0 --out FOLDER`` writes ``recordings/<id>/``,
-``sealed/<id>.json`` and ``seal.sha256``. The same seed gives the same bytes; worlds that exist are skipped.
+``sealed/<id>.json``, ``seal.txt`` and ``seal.sha256``. The same seed gives the same bytes;
+worlds that exist are skipped.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Final, Literal, TypeAlias, get_args
@@ -24,6 +25,7 @@ import numpy as np
 
 from physid_drake.errors import ParameterError, PhysidError
 from physid_drake.prove.drawing import TABLE_SIZE, Knob, Noise, Rng, Scene, draw_knob, draw_scene
+from physid_drake.prove.floor import floor_of
 from physid_drake.prove.mujoco_world import (
     RESIDUAL_RESTITUTION,
     Array,
@@ -32,6 +34,7 @@ from physid_drake.prove.mujoco_world import (
     PushWorld,
     height_of,
 )
+from physid_drake.prove.seal import write_seal
 from physid_drake.prove.world_effects import CATALOGUED, OTHERS, parameters_of
 from physid_drake.recording import (
     ForceStream,
@@ -126,7 +129,16 @@ def make_world(
     pushes = [_record(rng, scene, k, motion) for k, motion in enumerate(motions)]
     recording = _recording(name, scene, [push for push, _ in pushes], _lags(effects))
     truth = _truth(chosen, seed, scene, effects, sizes, size, motions, [poses for _, poses in pushes])
-    return recording, {"id": name} | truth
+    return recording, {"id": name, "held_out_floor": _floor(scene, effects, recording)} | truth
+
+
+def _floor(scene: Scene, effects: Sequence[Effect], recording: Recording) -> dict[str, float]:
+    """What the true world leaves of pushes whose own friction it is not told, as with pushes that are left out."""
+    pushes = tuple(replace(push, friction_factor=1.0) for push in scene.pushes)
+    expected = [motion.poses for motion in simulate(replace(scene, pushes=pushes), effects)]
+    noise = scene.noise
+    deviations = np.array([noise.position, noise.position, noise.rotation])
+    return floor_of(recording.pushes, expected, scene.rate, deviations)
 
 
 def _lags(effects: Sequence[Effect]) -> bool:
@@ -336,7 +348,7 @@ def make(
     """Writes ``worlds`` worlds and their seal; returns the seal's SHA-256. Worlds that exist are skipped.
 
     Args:
-        out: folder for ``recordings``, ``sealed`` and ``seal.sha256``.
+        out: folder for ``recordings``, ``sealed`` and the seal.
         worlds: how many.
         seed: of all of them.
         kind: only this kind; None: the mix.
@@ -348,18 +360,7 @@ def make(
     for done, identity in enumerate(_made(out, missing, seed, kind, effect, jobs), start=1):
         left = (time.monotonic() - begin) / done * (len(missing) - done)
         print(f"{identity}  {done}/{len(missing)}  {left:.0f} s left", file=sys.stderr, flush=True)
-    seal = seal_of(out / "sealed", [world_id(index, seed) for index in range(worlds)])
-    (out / "seal.sha256").write_text(f"{seal}\n", encoding="utf-8")
-    return seal
-
-
-def seal_of(folder: Path, identities: Sequence[str]) -> str:
-    """SHA-256 over names and contents of the sealed files, sorted by name."""
-    total = hashlib.sha256()
-    for identity in sorted(identities):
-        content = (folder / f"{identity}.json").read_bytes()
-        total.update(f"{identity} {hashlib.sha256(content).hexdigest()}\n".encode())
-    return total.hexdigest()
+    return write_seal(out, [world_id(index, seed) for index in range(worlds)])
 
 
 def _exists(out: Path, identity: str) -> bool:

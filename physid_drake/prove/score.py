@@ -1,4 +1,4 @@
-"""Scores of diagnoses against sealed truths. It reads two kinds of JSON and knows no simulator."""
+"""Scores of diagnoses against sealed truths, world by world. It reads JSON and knows no simulator."""
 
 from __future__ import annotations
 
@@ -9,10 +9,31 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from physid_drake.prove.diagnosing import RESULT, Attempt, attempt_of
+
 FOUND = ("explained", "ambiguous", "unexplained")
 NAMED = ("explained", "ambiguous")
+FAILED = "failed"
 CLEAR = 5.0  # standard deviations of motion: an effect that must be found
 MOST_NAMES = 2  # in a class that counts as the right answer
+_NO_ERRORS = (math.nan, math.nan, math.nan)
+# Components of one vector: their errors are over its length, since one of them may be next to nothing.
+_VECTORS = (("x", "y"), ("slope_x", "slope_y"))
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class HeldOut:
+    """Root mean square errors of pushes that were left out: (before, after, floor) each; nan where unknown.
+
+    Attributes:
+        rms: in standard deviations of the tracker.
+        position: in the plane [m].
+        rotation: [rad].
+    """
+
+    rms: tuple[float, float, float] = _NO_ERRORS
+    position: tuple[float, float, float] = _NO_ERRORS
+    rotation: tuple[float, float, float] = _NO_ERRORS
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -24,13 +45,15 @@ class Outcome:
         kind: ``none``, ``effect``, ``pair`` or ``other``.
         true: names of its effects.
         size: how far they move the object, in standard deviations of the tracker.
-        verdict: of the diagnosis.
+        verdict: of the diagnosis, or ``failed``.
         classes: per finding, its name and those it cannot be told from.
-        probability: stated for the first name.
+        probabilities: stated for the first name of each finding.
         errors: relative error of each parameter that was found.
         covered: whether each 90 % interval holds the truth.
-        chi2: cost per degree of freedom after.
-        rms: held-out error before and after, in standard deviations.
+        chi2: cost per degree of freedom after; nan where the diagnosis failed.
+        held_out: errors before and after, and those of the true world.
+        seconds: that the diagnosis took on this machine; nan where unknown.
+        error: one line on why a diagnosis failed.
     """
 
     id: str
@@ -38,12 +61,19 @@ class Outcome:
     true: tuple[str, ...]
     size: float
     verdict: str
-    classes: tuple[tuple[str, ...], ...]
-    probability: float
-    errors: tuple[float, ...]
-    covered: tuple[bool, ...]
-    chi2: float
-    rms: tuple[float, float]
+    classes: tuple[tuple[str, ...], ...] = ()
+    probabilities: tuple[float, ...] = ()
+    errors: tuple[float, ...] = ()
+    covered: tuple[bool, ...] = ()
+    chi2: float = math.nan
+    held_out: HeldOut = HeldOut()
+    seconds: float = math.nan
+    error: str | None = None
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is no diagnosis."""
+        return self.verdict == FAILED
 
     @property
     def found(self) -> bool:
@@ -60,20 +90,56 @@ class Outcome:
         )
 
     @property
+    def first(self) -> bool:
+        """Whether the name given first is right."""
+        return any(names[0] in self.true for names in self.classes)
+
+    @property
+    def in_class(self) -> bool:
+        """Whether a true name is in a class, of whatever size."""
+        return any(name in names for name in self.true for names in self.classes)
+
+    @property
     def wrong_name(self) -> bool:
         """Whether a name was given that is not there, also not within the class."""
         return any(not set(names) & set(self.true) for names in self.classes)
 
     @property
+    def named(self) -> int:
+        """How many of the world's effects were named, by themselves or in a class."""
+        return sum(any(name in names for names in self.classes) for name in self.true)
+
+    @property
     def both(self) -> bool:
         """Whether all effects of the world were named."""
-        return all(any(name in names for names in self.classes) for name in self.true)
+        return self.named == len(self.true)
+
+    @property
+    def fault(self) -> str | None:
+        """What is not right about the answer, None where nothing is."""
+        if self.failed:
+            return FAILED
+        if self.kind == "none":
+            return "false alarm" if self.found else None
+        if self.kind == "other" and self.found:
+            return "wrong name" if self.classes else None
+        if self.wrong_name or not self.found:
+            return "wrong name" if self.wrong_name else "missed"
+        if self.kind == "pair":
+            return None if self.both else "one of two" if self.named else "not named"
+        return None if self.right else "a large class" if self.in_class else "not named"
 
 
-def outcome(truth: dict[str, Any], diagnosis: dict[str, Any]) -> Outcome:
-    """Compare one diagnosis with its truth."""
+def outcome(truth: dict[str, Any], diagnosis: dict[str, Any], seconds: float = math.nan) -> Outcome:
+    """Compare one diagnosis with its truth.
+
+    Args:
+        truth: what was sealed.
+        diagnosis: what was said.
+        seconds: that it took.
+    """
     named = diagnosis["effects"] if diagnosis["verdict"] in NAMED else []
-    errors, covered = _parameters(truth["effects"], named)
+    compared = [pair for effect in named for pair in _parameters(truth["effects"], effect)]
     return Outcome(
         id=truth["id"],
         kind=truth["kind"],
@@ -81,61 +147,82 @@ def outcome(truth: dict[str, Any], diagnosis: dict[str, Any]) -> Outcome:
         size=truth["size_sigma"],
         verdict=diagnosis["verdict"],
         classes=tuple((e["name"], *e["indistinguishable_from"]) for e in named),
-        probability=named[0]["probability"] if named else math.nan,
-        errors=errors,
-        covered=covered,
-        chi2=diagnosis["reduced_chi2_after"],
-        rms=(diagnosis["fit"]["held_out_rms_before"], diagnosis["fit"]["held_out_rms_after"]),
+        probabilities=tuple(e["probability"] for e in named),
+        errors=tuple(error for error, _ in compared),
+        covered=tuple(covered for _, covered in compared),
+        chi2=_number(diagnosis["reduced_chi2_after"]),
+        held_out=_held_out(diagnosis["fit"], truth.get("held_out_floor", {})),
+        seconds=seconds,
     )
 
 
-def _parameters(true: Sequence[dict[str, Any]], named: Sequence[dict[str, Any]]) -> tuple[Any, Any]:
-    errors, covered = [], []
-    for effect in named:
-        match = next((t for t in true if t["name"] == effect["name"]), None)
-        for name, found in effect["parameters"].items() if match is not None else ():
-            value = match["parameters"].get(name) if match is not None else None
-            null = found["null"]
-            if not isinstance(value, float) or not isinstance(found["value"], float) or null is None:
-                continue  # shapes and grids are not compared by one number
-            scale = abs(value - null)
-            if scale > 0.0:
-                errors.append(abs(found["value"] - value) / scale)
-                covered.append(bool(found["ci90"][0] <= value <= found["ci90"][1]))
-    return tuple(errors), tuple(covered)
+def failed_outcome(truth: dict[str, Any], attempt: Attempt | None) -> Outcome:
+    """A world of which there is no diagnosis: nothing was found in it, and the score says so."""
+    return Outcome(
+        id=truth["id"],
+        kind=truth["kind"],
+        true=tuple(e["name"] for e in truth["effects"]),
+        size=truth["size_sigma"],
+        verdict=FAILED,
+        seconds=math.nan if attempt is None else attempt.seconds,
+        error="there is no diagnosis." if attempt is None else attempt.error,
+    )
 
 
-def read_outcomes(sealed: Path, diagnoses: Path) -> list[Outcome]:
-    """All worlds that have a truth and a diagnosis."""
+def read_outcomes(sealed: Path, diagnoses: Path, identities: Sequence[str] | None = None) -> list[Outcome]:
+    """All worlds with a truth, by name.
+
+    Args:
+        sealed: folder of the truths.
+        diagnoses: folder with one folder for each world.
+        identities: only these worlds, and those without a diagnosis count as failed; None: all that have one.
+    """
     outcomes = []
-    for file in sorted(sealed.glob("*.json")):
-        found = diagnoses / file.stem / "diagnosis.json"
-        if found.exists():
-            outcomes.append(outcome(json.loads(file.read_text()), json.loads(found.read_text())))
+    names = [file.stem for file in sealed.glob("*.json")] if identities is None else list(identities)
+    for name in sorted(names):
+        attempt = attempt_of(diagnoses / name)
+        if identities is None and attempt is None:
+            continue
+        truth = json.loads((sealed / f"{name}.json").read_text(encoding="utf-8"))
+        if attempt is None or attempt.error is not None:
+            outcomes.append(failed_outcome(truth, attempt))
+            continue
+        found = json.loads((diagnoses / name / RESULT).read_text(encoding="utf-8"))
+        outcomes.append(outcome(truth, found, attempt.seconds))
     return outcomes
 
 
-def table(outcomes: Sequence[Outcome]) -> list[tuple[str, str, str]]:
-    """Rows: what, the figure with its counts, what was asked for."""
-    kinds = {k: [o for o in outcomes if o.kind == k] for k in ("none", "effect", "pair", "other")}
-    clear = [o for o in kinds["effect"] if o.size >= CLEAR]
-    faint = [o for o in kinds["effect"] if o.size < CLEAR]
-    errors = sorted(e for o in clear for e in o.errors)
-    covered = [c for o in kinds["effect"] for c in o.covered]
-    return [
-        ("no effect: called a mismatch", _share([o.found for o in kinds["none"]]), "at most 1 %"),
-        (f"effect of {CLEAR:g} sigma or more: found", _share([o.found for o in clear]), "95 %"),
-        ("  named rightly, or in a class of two", _share([o.right for o in clear]), "90 %"),
-        ("  a wrong name", _share([o.wrong_name for o in clear]), ""),
-        ("  error of its parameters, median", f"{100 * errors[len(errors) // 2]:.1f} %" if errors else "-", "10 %"),
-        ("90 % intervals that hold the truth", _share(covered), "85 to 95 %"),
-        (f"effect below {CLEAR:g} sigma: found", _share([o.found for o in faint]), ""),
-        ("  named rightly, or in a class of two", _share([o.right for o in faint]), ""),
-        ("not in the catalogue: unexplained", _share([o.verdict == "unexplained" for o in kinds["other"]]), "90 %"),
-        ("  a wrong name", _share([o.verdict in NAMED for o in kinds["other"]]), "at most 3 %"),
-        ("two effects: both named", _share([o.both for o in kinds["pair"]]), "70 %"),
-    ]
+def _parameters(true: Sequence[dict[str, Any]], effect: dict[str, Any]) -> list[tuple[float, bool]]:
+    """Relative error of each parameter that has a null value, and whether its interval holds the truth."""
+    match = next((t["parameters"] for t in true if t["name"] == effect["name"]), None)
+    compared = []
+    for name, found in effect["parameters"].items() if match is not None else ():
+        value, null = match.get(name) if match is not None else None, found["null"]
+        if not isinstance(value, float) or not isinstance(found["value"], float) or null is None:
+            continue  # shapes and grids are not compared by one number
+        vector = next((names for names in _VECTORS if name in names), (name,))
+        scale = math.hypot(*(_leaves(match, effect, part) for part in vector))
+        if scale > 0.0:
+            compared.append(
+                (abs(found["value"] - value) / scale, bool(found["ci90"][0] <= value <= found["ci90"][1]))
+            )
+    return compared
 
 
-def _share(flags: Sequence[bool]) -> str:
-    return f"{sum(flags)} of {len(flags)}" + (f" ({100 * sum(flags) / len(flags):.0f} %)" if flags else "")
+def _leaves(true: dict[str, Any] | None, effect: dict[str, Any], name: str) -> float:
+    """How far a parameter's true value is from its null."""
+    null = effect["parameters"].get(name, {}).get("null")
+    value = true.get(name) if true is not None else None
+    return value - null if isinstance(value, float) and null is not None else 0.0
+
+
+def _held_out(fit: dict[str, Any], floor: dict[str, float]) -> HeldOut:
+    def three(what: str, unit: str) -> tuple[float, float, float]:
+        before, after = (_number(fit.get(f"held_out_rms_{when}{unit}")) for when in ("before", "after"))
+        return before, after, _number(floor.get(what))
+
+    return HeldOut(rms=three("rms", ""), position=three("position_m", "_m"), rotation=three("rotation_rad", "_rad"))
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)

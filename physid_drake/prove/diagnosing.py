@@ -1,0 +1,180 @@
+"""Diagnoses many recordings, each by its own command: it goes on where it stopped, and a failure ends nothing."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Final
+
+RESULT: Final = "diagnosis.json"
+ATTEMPT: Final = "attempt.json"
+"""Beside a diagnosis: how long it took [s], or why there is none."""
+LOG: Final = "log.txt"
+_POLL: Final = 0.05  # s
+_GRACE: Final = 10.0  # s that an interrupted diagnosis has to keep its stages
+_LONGEST_LINE: Final = 300
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """One recording to be diagnosed.
+
+    Attributes:
+        name: of the recording.
+        words: the command.
+        folder: where the results go.
+    """
+
+    name: str
+    words: tuple[str, ...]
+    folder: Path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Attempt:
+    """How a diagnosis ended: how long it took [s], and one line on why it failed, None where it did not."""
+
+    seconds: float
+    error: str | None
+
+
+def diagnose_command(recording: Path, folder: Path, *sealed: Path) -> tuple[str, ...]:
+    """The command that diagnoses a recording with one worker, blind to some folders.
+
+    Args:
+        recording: its folder, all that the diagnosis is given.
+        folder: where its results go.
+        sealed: what it must not see.
+    """
+    hidden = os.pathsep.join(str(path.resolve()) for path in sealed)
+    return (
+        sys.executable, "-m", "physid_drake.prove.blindfold", hidden, "diagnose", str(recording.resolve()),
+        "--out", str(folder.resolve()), "--jobs", "1", "--seed", "0",
+    )  # fmt: skip
+
+
+def attempt_of(folder: Path) -> Attempt | None:
+    """How the diagnosis in a folder ended; None where there is none yet."""
+    noted: dict[str, object] = {}
+    if (folder / ATTEMPT).is_file():
+        noted = json.loads((folder / ATTEMPT).read_text(encoding="utf-8"))
+    seconds = noted.get("seconds")
+    taken = float(seconds) if isinstance(seconds, int | float) else float("nan")
+    if (folder / RESULT).is_file():
+        return Attempt(seconds=taken, error=None)
+    return Attempt(seconds=taken, error=str(noted["error"])) if noted.get("error") else None
+
+
+def diagnose_all(
+    tasks: Sequence[Task],
+    *,
+    jobs: int,
+    timeout: float,
+    ended: Callable[[Task, Attempt], None],
+    again: bool = False,
+) -> None:
+    """Run every task that has not ended before.
+
+    Args:
+        tasks: what to run.
+        jobs: so many at a time.
+        timeout: after which a task is stopped and counts as failed [s].
+        ended: is told of every task that ends.
+        again: also run those that failed before.
+
+    Raises:
+        KeyboardInterrupt: when interrupted; what runs is told so first, so that it can keep its stages.
+    """
+    waiting = [task for task in tasks if _is_open(task, again)]
+    running: list[_Running] = []
+    try:
+        while waiting or running:
+            while waiting and len(running) < jobs:
+                running.append(_Running.begin(waiting.pop(0)))
+            time.sleep(_POLL)
+            for one in tuple(running):
+                attempt = one.look(timeout)
+                if attempt is not None:
+                    running.remove(one)
+                    _note(one.task.folder, attempt)
+                    ended(one.task, attempt)
+    finally:
+        for one in running:
+            one.interrupt()
+        for one in running:
+            one.stop(_GRACE)
+
+
+def _is_open(task: Task, again: bool) -> bool:
+    attempt = attempt_of(task.folder)
+    return attempt is None or (again and attempt.error is not None)
+
+
+def _note(folder: Path, attempt: Attempt) -> None:
+    content = {"seconds": round(attempt.seconds, 3), "error": attempt.error}
+    (folder / ATTEMPT).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Running:
+    """A command that runs, in a session of its own so that all it starts can be stopped with it."""
+
+    task: Task
+    child: subprocess.Popen[bytes]
+    log: IO[bytes]
+    since: float
+
+    @classmethod
+    def begin(cls, task: Task) -> _Running:
+        task.folder.mkdir(parents=True, exist_ok=True)
+        (task.folder / ATTEMPT).unlink(missing_ok=True)
+        log = (task.folder / LOG).open("wb")
+        # One thread each: several diagnoses run side by side.
+        threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+        child = subprocess.Popen(
+            task.words, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, env={**os.environ, **threads}
+        )
+        return cls(task=task, child=child, log=log, since=time.monotonic())
+
+    def look(self, timeout: float) -> Attempt | None:
+        """How it ended; None while it runs."""
+        code, seconds = self.child.poll(), time.monotonic() - self.since
+        if code is None and seconds < timeout:
+            return None
+        self.stop()
+        if code is None:
+            return Attempt(seconds=seconds, error=f"stopped after {timeout:g} s (--timeout).")
+        if code == 0 and (self.task.folder / RESULT).is_file():
+            return Attempt(seconds=seconds, error=None)
+        ended = f"signal {-code}" if code < 0 else f"exit status {code}"
+        return Attempt(seconds=seconds, error=_last_line(self.task.folder / LOG) or f"{ended}, without a word.")
+
+    def interrupt(self) -> None:
+        self._signal(signal.SIGINT)
+
+    def stop(self, grace: float = 0.0) -> None:
+        """Wait so long [s], then end it and all that it started."""
+        with suppress(subprocess.TimeoutExpired):
+            self.child.wait(grace)
+        self._signal(signal.SIGKILL)
+        self.child.wait()
+        self.log.close()
+
+    def _signal(self, number: signal.Signals) -> None:
+        with suppress(ProcessLookupError, PermissionError):  # it may have ended by itself
+            os.killpg(self.child.pid, number)
+
+
+def _last_line(file: Path) -> str:
+    """What a command said last, its own error line first."""
+    lines = [line.strip() for line in file.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
+    errors = [line for line in lines if line.startswith("error:")]
+    return (errors or lines or [""])[-1][:_LONGEST_LINE]

@@ -1,0 +1,186 @@
+"""What a diagnosis of a real recording came to, beside what its publishers say; nothing here is simulated."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from physid_drake.prove.diagnosing import RESULT, attempt_of
+from physid_drake.prove.mujoco_world import Array
+from physid_drake.prove.real import RealCase
+from physid_drake.recording import read_recording
+
+FRESH_ERRORS: Final = "fresh.json"
+"""Beside a diagnosis: end-point errors of its model on pushes that it did not get."""
+NEAR: Final = 0.015
+"""m from a point of support."""
+PUBLISHED: Final = ("quadratic", "poly4")
+"""The publishers' models: ellipsoidal and 4th-order limit surface."""
+_CORNER: Final = 0.05  # m from the right-angle corner of the CMU triangle to its centroid, along x and along y
+_LEG: Final = 0.15
+_GRID: Final = 1e-3  # m
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pressure:
+    """A recovered pressure map against the points that the object stood on.
+
+    Attributes:
+        weights: (n, n) relative pressure, rows along x of B.
+        points: (3, 2) of support, in B [m].
+        near: share of the weight within `NEAR` of the points.
+        even: the same share if the pressure were even.
+    """
+
+    weights: tuple[tuple[float, ...], ...]
+    points: tuple[tuple[float, float], ...]
+    near: float
+    even: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class RealOutcome:
+    """One real case.
+
+    Attributes:
+        case: which.
+        pushes: that were diagnosed.
+        skipped: why nothing was diagnosed, or why the diagnosis failed; None where it was.
+        verdict: of the diagnosis.
+        classes: per finding, its name and those it cannot be told from.
+        chi2: reduced chi-square of the plain cell, and after.
+        position: held-out errors [m], before and after.
+        rotation: held-out errors [rad], before and after.
+        fresh: end-point errors [m, rad] of the model on pushes that the diagnosis did not get.
+        published: name to end-point errors [m, rad] of the publishers' models on the diagnosed pushes.
+        pressure: the map that was found, where the points are known and a map was found.
+        seconds: that the diagnosis took.
+    """
+
+    case: RealCase
+    pushes: int = 0
+    skipped: str | None = None
+    verdict: str = ""
+    classes: tuple[tuple[str, ...], ...] = ()
+    chi2: tuple[float, float] = (math.nan, math.nan)
+    position: tuple[float, float] = (math.nan, math.nan)
+    rotation: tuple[float, float] = (math.nan, math.nan)
+    fresh: tuple[float, float] = (math.nan, math.nan)
+    published: dict[str, tuple[float, float]] | None = None
+    pressure: Pressure | None = None
+    seconds: float = math.nan
+
+
+def real_outcome(case: RealCase, published: Path, out: Path) -> RealOutcome:
+    """Open one case: only now its source is read again, for what it says about the answer.
+
+    Args:
+        case: which.
+        published: folder of all published files.
+        out: folder of the proof.
+    """
+    recording, folder = out / "recordings" / case.id, out / "diagnoses" / case.id
+    pushes = read_recording(recording).pushes
+    attempt = attempt_of(folder)
+    if attempt is None or attempt.error is not None:
+        error = "there is no diagnosis." if attempt is None else attempt.error
+        return RealOutcome(case=case, pushes=len(pushes), skipped=f"failed: {error}")
+    said = json.loads((folder / RESULT).read_text(encoding="utf-8"))
+    fit = said["fit"]
+    return RealOutcome(
+        case=case,
+        pushes=len(pushes),
+        verdict=said["verdict"],
+        classes=tuple((e["name"], *e["indistinguishable_from"]) for e in said["effects"]),
+        chi2=(_number(said["reduced_chi2_before"]), _number(said["reduced_chi2_after"])),
+        position=(_number(fit["held_out_rms_before_m"]), _number(fit["held_out_rms_after_m"])),
+        rotation=(_number(fit["held_out_rms_before_rad"]), _number(fit["held_out_rms_after_rad"])),
+        fresh=_fresh(folder / FRESH_ERRORS),
+        published=published_errors(published / case.source, [p.note for p in pushes])
+        if case.group == "mit"
+        else None,
+        pressure=_pressure(case, said) if case.group == "cmu" else None,
+        seconds=attempt.seconds,
+    )
+
+
+def published_errors(file: Path, notes: list[str]) -> dict[str, tuple[float, float]]:
+    """Root mean square end-point errors [m, rad] of the publishers' models.
+
+    Args:
+        file: table of end points.
+        notes: of the pushes, which end with ``row <number>``, the header being row 1.
+    """
+    with file.open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    numbers = [int(match[1]) - 2 for note in notes if (match := re.search(r"row (\d+)$", note))]
+    found = {}
+    for model in PUBLISHED:
+        errors = np.array([
+            [float(rows[k][f"{model}_end_object_{c}"]) - float(rows[k][f"end_object_{c}"])
+             for c in ("x_m", "y_m", "yaw_rad")]
+            for k in numbers
+        ])  # fmt: skip
+        turns = (errors[:, 2] + math.pi) % (2.0 * math.pi) - math.pi
+        distances = np.hypot(errors[:, 0], errors[:, 1])
+        found[model] = (float(np.sqrt(np.mean(distances**2))), float(np.sqrt(np.mean(turns**2))))
+    return found
+
+
+def points_of_support(name: str) -> Array | None:
+    """Points (3, 2) in B [m] that the name of a CMU folder gives in mm from the corner; None for full contact."""
+    numbers = name.split("_")
+    if len(numbers) != 6:
+        return None
+    x, y = np.array([float(n) for n in numbers]).reshape(2, 3)
+    points: Array = 1e-3 * np.column_stack([x, y]) - _CORNER
+    return points
+
+
+def weight_near(weights: Array, points: Array) -> tuple[float, float]:
+    """Share of the weight within `NEAR` of points under the CMU triangle, and what it would be if even.
+
+    Args:
+        weights: (n, m) relative pressure of the cells of a regular grid over the triangle's box, rows along x.
+        points: (k, 2) in B [m].
+    """
+    ticks = np.arange(0.5 * _GRID, _LEG, _GRID)
+    x, y = (axis.ravel() for axis in np.meshgrid(ticks, ticks, indexing="ij"))
+    inside = x + y <= _LEG
+    cells = weights[(x / _LEG * weights.shape[0]).astype(int), (y / _LEG * weights.shape[1]).astype(int)] * inside
+    places = np.column_stack([x, y]) - _CORNER
+    near = (np.linalg.norm(places[:, None] - points[None], axis=2) <= NEAR).any(axis=1)
+    return float(cells[near].sum() / cells.sum()), float((inside & near).sum() / inside.sum())
+
+
+def _pressure(case: RealCase, said: dict[str, Any]) -> Pressure | None:
+    points = points_of_support(Path(case.source).name)
+    found = next((e for e in said["effects"] if e["name"] == "uneven_support"), None)
+    if points is None or found is None:
+        return None
+    weights = np.array(found["parameters"]["weights"]["value"], dtype=np.float64)
+    near, even = weight_near(weights, points)
+    return Pressure(
+        weights=tuple(tuple(row) for row in weights.tolist()),
+        points=tuple((x, y) for x, y in points.tolist()),
+        near=near,
+        even=even,
+    )
+
+
+def _fresh(file: Path) -> tuple[float, float]:
+    if not file.is_file():
+        return math.nan, math.nan
+    errors = json.loads(file.read_text(encoding="utf-8"))
+    return _number(errors["position_m"]), _number(errors["rotation_rad"])
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)

@@ -1,0 +1,118 @@
+"""The seal on the truth: hashes that are written down before a diagnosis begins, and a folder that stays shut.
+
+``seal.txt`` is what ``sha256sum -c`` reads, one line for each sealed file; ``seal.sha256`` is one hash over all.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import stat
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+from physid_drake.prove.mujoco_world import ProofError
+
+SEALED: Final = "sealed"
+LINES: Final = "seal.txt"
+TOTAL: Final = "seal.sha256"
+
+
+def seal_of(folder: Path, identities: Sequence[str]) -> str:
+    """SHA-256 over names and contents of the sealed files, sorted by name.
+
+    Args:
+        folder: that holds ``<identity>.json``.
+        identities: of the worlds.
+
+    Raises:
+        ProofError: if one is missing.
+    """
+    total = hashlib.sha256()
+    for identity, digest in sorted(_digests(folder, identities).items()):
+        total.update(f"{identity} {digest}\n".encode())
+    return total.hexdigest()
+
+
+def write_seal(out: Path, identities: Sequence[str]) -> str:
+    """Write down the hashes of sealed files, and return the one over all; files of an earlier seal must be as then.
+
+    Args:
+        out: folder that holds ``sealed``.
+        identities: of the worlds.
+
+    Raises:
+        ProofError: if a file is missing, or is not as it was when it was sealed.
+    """
+    digests = _digests(out / SEALED, identities)
+    earlier = _read_lines(out / LINES)
+    changed = sorted(name for name, digest in digests.items() if earlier.get(name, digest) != digest)
+    if changed:
+        raise ProofError(
+            f"'{out / SEALED / changed[0]}.json' has changed since it was sealed in '{out / LINES}';"
+            " choose another --out."
+        )
+    lines = [f"{digest}  {SEALED}/{name}.json\n" for name, digest in sorted({**earlier, **digests}.items())]
+    (out / LINES).write_text("".join(lines), encoding="utf-8")
+    total = seal_of(out / SEALED, identities)
+    (out / TOTAL).write_text(f"{total}\n", encoding="utf-8")
+    return total
+
+
+def check_seal(out: Path, identities: Sequence[str], written: str) -> None:
+    """Refuse a truth that is not the one that was sealed.
+
+    Args:
+        out: folder that holds ``sealed``.
+        identities: of the worlds.
+        written: the hash that was written down before.
+
+    Raises:
+        ProofError: if the hash is another now.
+    """
+    now = seal_of(out / SEALED, identities)
+    if now != written:
+        raise ProofError(
+            f"the seal is broken: sha256 of '{out / SEALED}' is {now}, but {written} was written down before the"
+            " diagnosis; nothing is scored."
+        )
+
+
+@contextmanager
+def shut(folder: Path) -> Iterator[None]:
+    """Take all permissions off a folder while the block runs, and give them back whatever ends it.
+
+    It stops any user but root; against root there is the blindfold (`physid_drake.prove.blindfold`).
+    """
+    unlock(folder)
+    before = stat.S_IMODE(folder.stat().st_mode)
+    folder.chmod(0o000)
+    try:
+        yield
+    finally:
+        folder.chmod(before)
+
+
+def unlock(folder: Path) -> None:
+    """Give a folder back its permissions where a run that was killed could not."""
+    if folder.is_dir() and stat.S_IMODE(folder.stat().st_mode) == 0:
+        folder.chmod(0o755)
+
+
+def _digests(folder: Path, identities: Sequence[str]) -> dict[str, str]:
+    digests = {}
+    for identity in identities:
+        file = folder / f"{identity}.json"
+        try:
+            digests[identity] = hashlib.sha256(file.read_bytes()).hexdigest()
+        except OSError as error:
+            raise ProofError(f"sealed truth '{file}': cannot be read: {error.strerror or error}.") from error
+    return digests
+
+
+def _read_lines(file: Path) -> dict[str, str]:
+    if not file.is_file():
+        return {}
+    rows = [line.split(maxsplit=1) for line in file.read_text(encoding="utf-8").splitlines() if line.strip()]
+    return {Path(name).stem: digest for digest, name in rows}

@@ -1,0 +1,165 @@
+"""``proof.json`` and ``proof.md`` of a proof, and what it prints: it reads figures, it never computes them."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import json
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from rich.table import Table
+
+from physid_drake.prove.figures import Figures, held_out_table, json_of, power_table, table
+from physid_drake.prove.score import Outcome
+
+FORMAT = "physid-proof/1"
+MAIN = ("", "figure", "95 % interval", "asked for")
+POWER = ("size [sigma]", "found", "95 % interval", "named rightly", "95 % interval")
+HELD_OUT = ("median of worlds with", "worlds", "mm before", "after", "at best", "deg before", "after", "at best",
+            "sigmas before", "after", "at best")  # fmt: skip
+AT_BEST = (
+    "At best: what the true world leaves, with all its physics but not the friction of the push that is left out."
+)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Proof:
+    """A proof that was opened.
+
+    Attributes:
+        seed: of the worlds.
+        kind: of them, None for the mix.
+        seal: SHA-256 that was written down before the diagnosis.
+        outcomes: of all worlds, by name.
+        figures: of them.
+        versions: of the packages that made it.
+    """
+
+    seed: int
+    kind: str | None
+    seal: str
+    outcomes: tuple[Outcome, ...]
+    figures: Figures
+    versions: dict[str, str]
+
+    @property
+    def faults(self) -> tuple[Outcome, ...]:
+        """Worlds of which the answer is not right, the largest effects first."""
+        return tuple(sorted((o for o in self.outcomes if o.fault is not None), key=lambda o: (-o.size, o.id)))
+
+
+def said_of(outcome: Outcome) -> str:
+    """Verdict and names in words."""
+    names = " + ".join(" or ".join(group) for group in outcome.classes)
+    return outcome.verdict + (f": {names}" if names else "") + (f" ({outcome.error})" if outcome.error else "")
+
+
+def truth_of(outcome: Outcome) -> str:
+    """The world's effects in words."""
+    return " + ".join(outcome.true) or "no effect"
+
+
+def proof_json(proof: Proof) -> str:
+    """The file's text; all but ``seconds`` is the same for the same worlds, diagnoses and versions."""
+    figures = json_of(proof.figures)
+    seconds: dict[str, Any] = figures.pop("seconds")
+    seconds["worlds"] = {o.id: o.seconds for o in proof.outcomes if math.isfinite(o.seconds)}
+    content = {
+        "format": FORMAT,
+        "seed": proof.seed,
+        "kind": proof.kind,
+        "seal_sha256": proof.seal,
+        "versions": proof.versions,
+        "figures": figures,
+        "faults": [
+            {"id": o.id, "fault": o.fault, "true": list(o.true), "size_sigma": _digits(o.size), "said": said_of(o)}
+            for o in proof.faults
+        ],
+        "outcomes": [_outcome(o) for o in proof.outcomes],
+        "seconds": seconds,
+    }
+    return json.dumps(content, indent=2) + "\n"
+
+
+def _outcome(outcome: Outcome) -> dict[str, Any]:
+    return {
+        "id": outcome.id,
+        "kind": outcome.kind,
+        "true": list(outcome.true),
+        "size_sigma": _digits(outcome.size),
+        "verdict": outcome.verdict,
+        "classes": [list(names) for names in outcome.classes],
+        "probabilities": [_digits(p) for p in outcome.probabilities],
+        "parameter_errors": [_digits(e) for e in outcome.errors],
+        "covered_90": list(outcome.covered),
+        "reduced_chi2_after": _digits(outcome.chi2),
+        "held_out_rms": [_digits(v) for v in outcome.held_out.rms],
+        "error": outcome.error,
+    }
+
+
+def _digits(value: float) -> float | None:
+    return float(f"{value:.6g}") if math.isfinite(value) else None
+
+
+def proof_markdown(proof: Proof) -> str:
+    """The tables for a reader of plain text."""
+    figures = proof.figures
+    parts = [
+        "# Proof on sealed worlds",
+        f"{_worlds(proof)}, seed {proof.seed}. Seal, written down before the diagnosis: `sha256 {proof.seal}`.",
+        f"{', '.join(f'{name} {version}' for name, version in proof.versions.items())}.",
+        _markdown(MAIN, table(figures)),
+        "## Power against the size of the effect",
+        _markdown(POWER, power_table(figures)),
+        "## Pushes predicted while left out (root mean square)",
+        _markdown(HELD_OUT, held_out_table(figures)),
+        AT_BEST,
+        "## Stated probabilities",
+        _markdown(
+            ("stated", "mean", "came true"),
+            [
+                (f"{b.low:g} to {b.high:g}", _fixed(b.stated), f"{b.right.count} of {b.right.of}")
+                for b in figures.reliability
+            ],
+        ),
+        f"## Answers that are not right ({len(proof.faults)})",
+        _markdown(
+            ("world", "what", "truth", "sigma", "said"),
+            [(o.id, o.fault or "", truth_of(o), f"{o.size:.1f}", said_of(o)) for o in proof.faults],
+        ),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _worlds(proof: Proof) -> str:
+    kinds = proof.figures.worlds
+    return (
+        f"{len(proof.outcomes)} worlds: {kinds['none']} without an effect, {kinds['effect']} with one of the"
+        f" catalogue, {kinds['pair']} with two, {kinds['other']} with one that is in no catalogue"
+    )
+
+
+def _markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [headings, ["---"] * len(headings), *rows]
+    return "\n".join("| " + " | ".join(cell.strip().replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+def _fixed(value: float) -> str:
+    return f"{value:.2f}" if math.isfinite(value) else "-"
+
+
+def proof_tables(proof: Proof) -> tuple[Table, Table]:
+    """What the command prints: the figures, and power against size."""
+    main = Table(title=_worlds(proof), title_justify="left")
+    for column in MAIN:
+        main.add_column(column)
+    for row in table(proof.figures):
+        main.add_row(*row)
+    power = Table(title="single effects by size", title_justify="left")
+    for column in POWER:
+        power.add_column(column)
+    for row_of_power in power_table(proof.figures):
+        power.add_row(*row_of_power)
+    return main, power

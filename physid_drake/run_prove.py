@@ -1,0 +1,248 @@
+"""The ``prove`` command: sealed worlds made, diagnosed without their truth, opened and scored."""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import json
+import platform
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib import metadata
+from pathlib import Path
+from types import FrameType
+
+from rich.console import Console
+
+from physid_drake.errors import ConfigError, OutputError
+from physid_drake.prove.diagnosing import RESULT, Attempt, Task, attempt_of, diagnose_all, diagnose_command
+from physid_drake.prove.figures import figures_of
+from physid_drake.prove.make import world_id
+from physid_drake.prove.mujoco_world import ProofError
+from physid_drake.prove.score import read_outcomes
+from physid_drake.prove.seal import SEALED, check_seal, shut, unlock
+from physid_drake.report.progress import progress_bar
+from physid_drake.report.proof import Proof, proof_json, proof_markdown, proof_tables
+from physid_drake.report.proof_page import proof_page
+from physid_drake.report.proof_pictures import confusion_picture, drawn
+from physid_drake.run_folder import RunFolder
+
+WORLDS, QUICK = 200, 10
+NARROWEST_TABLE = 120  # columns
+SETTINGS = "settings.json"
+Commander = Callable[..., tuple[str, ...]]
+"""Recording, folder of the results, what must not be seen (one or more): the words of the command that diagnoses."""
+
+
+def run(arguments: argparse.Namespace, command: Commander = diagnose_command) -> int:
+    """Run the command.
+
+    Args:
+        arguments: of the command line.
+        command: gives the command that diagnoses a recording.
+
+    Raises:
+        PhysidError: one line that says what is wrong.
+        KeyboardInterrupt: when interrupted; all that is finished is kept.
+    """
+    worlds = _checked(arguments)
+    out: Path = arguments.out or Path("proofs") / "_".join(filter(None, (f"seed_{arguments.seed}", arguments.kind)))
+    folder = claim(out, {"seed": arguments.seed, "kind": arguments.kind})
+    console = wide_console()
+    names = [world_id(index, arguments.seed) for index in range(worlds)]
+    with ended_softly():
+        seal = _make(arguments, worlds, out, console)
+        console.print(f"seal of {worlds} worlds, before any is diagnosed: sha256 {seal}", soft_wrap=True)
+        diagnose_worlds(out, names, arguments, console, command)
+    proof = opened(out, names, seal, seed=arguments.seed, kind=arguments.kind)
+    write(folder, proof)
+    for table in proof_tables(proof):
+        console.print(table)
+    console.print(
+        f"written: {', '.join(str(out / n) for n in ('page.html', 'proof.md', 'proof.json', 'confusion.png'))}",
+        soft_wrap=True,
+    )
+    return 0
+
+
+def wide_console() -> Console:
+    """A console whose tables are legible where the output is no terminal."""
+    console = Console()
+    return console if console.is_terminal else Console(width=max(NARROWEST_TABLE, console.width))
+
+
+def _checked(arguments: argparse.Namespace) -> int:
+    """How many worlds."""
+    if arguments.quick and arguments.worlds is not None:
+        raise ConfigError("--quick means ten worlds: give it or --worlds, not both.")
+    worlds = QUICK if arguments.quick else WORLDS if arguments.worlds is None else int(arguments.worlds)
+    if worlds < 1:
+        raise ConfigError(f"--worlds must be at least 1, but is {worlds}.")
+    check_running(arguments)
+    return worlds
+
+
+def check_running(arguments: argparse.Namespace) -> None:
+    """Refuse a seed, a number of jobs or a time that cannot be.
+
+    Raises:
+        ConfigError: which one, and what it must be.
+    """
+    for name, value, least in (("seed", arguments.seed, 0), ("jobs", arguments.jobs, 1)):
+        if value < least:
+            raise ConfigError(f"--{name} must be at least {least}, but is {value}.")
+    if not arguments.timeout > 0.0:
+        raise ConfigError(f"--timeout must be positive, but is {arguments.timeout:g} s.")
+
+
+def claim(out: Path, settings: dict[str, object]) -> RunFolder:
+    """The folder of a proof, refused where it holds another."""
+    text = json.dumps(settings, indent=2) + "\n"
+    file = out / SETTINGS
+    try:
+        earlier = file.read_text(encoding="utf-8") if file.exists() else text
+    except (OSError, UnicodeDecodeError) as error:
+        raise OutputError(f"'{file}': cannot be read: {error}.") from error
+    if earlier != text:
+        raise ConfigError(
+            f"'{out}' holds another proof ({' '.join(earlier.split())}); choose another --out, or the same settings."
+        )
+    return RunFolder.open(out, text, name=SETTINGS)
+
+
+@contextmanager
+def ended_softly() -> Iterator[None]:
+    """Take a request to end for an interruption, so that permissions come back and diagnoses keep their stages."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    try:
+        earlier = signal.signal(signal.SIGTERM, interrupt)
+    except ValueError:  # not the main thread: then nobody can ask
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, earlier)
+
+
+def _make(arguments: argparse.Namespace, worlds: int, out: Path, console: Console) -> str:
+    """Make and seal the worlds in a process of their own; the seal's hash."""
+    unlock(out / SEALED)
+    words = [sys.executable, "-m", "physid_drake.prove.make", "--worlds", str(worlds), "--seed", str(arguments.seed),
+             "--out", str(out), "--jobs", str(arguments.jobs)]  # fmt: skip
+    words += ["--kind", arguments.kind] if arguments.kind else []
+    last = ""
+    with (
+        progress_bar(console) as tick,
+        subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child,
+    ):
+        assert child.stderr is not None and child.stdout is not None
+        try:
+            for line in child.stderr:
+                last = line.strip() or last
+                counts = re.search(r" (\d+)/(\d+) ", line)
+                if counts is not None:
+                    tick("worlds made", int(counts[1]), int(counts[2]))
+            said = child.stdout.read()
+        except BaseException:
+            child.send_signal(signal.SIGINT)  # it ends its own workers
+            raise
+    seal = re.search(r"sha256 ([0-9a-f]{64})", said)
+    if child.returncode != 0 or seal is None:
+        raise ProofError(last.removeprefix("error: ") or f"the worlds were not made: exit status {child.returncode}.")
+    return seal[1]
+
+
+def diagnose_worlds(
+    out: Path, names: Sequence[str], arguments: argparse.Namespace, console: Console, command: Commander
+) -> None:
+    """Diagnose every world that has not been, with the sealed folder shut."""
+    tasks = [
+        Task(name=name, words=command(out / "recordings" / name, out / "diagnoses" / name, out / SEALED),
+             folder=out / "diagnoses" / name)
+        for name in names
+    ]  # fmt: skip
+    with shut(out / SEALED):
+        run_tasks(tasks, arguments, console)
+
+
+def run_tasks(tasks: Sequence[Task], arguments: argparse.Namespace, console: Console) -> None:
+    """Diagnose with a bar, and a line for each that ends."""
+    earlier = [attempt_of(task.folder) for task in tasks]
+    left = sum(a is None or (arguments.retry and a.error is not None) for a in earlier)
+    with progress_bar(console) as tick:
+        tick("diagnosed", 0, left)
+        done = iter(range(1, left + 1))
+        ended = functools.partial(_tell, console, tick, done, left)
+        diagnose_all(tasks, jobs=arguments.jobs, timeout=arguments.timeout, ended=ended, again=arguments.retry)
+
+
+def _tell(
+    console: Console,
+    tick: Callable[[str, int, int], None],
+    done: Iterator[int],
+    left: int,
+    task: Task,
+    attempt: Attempt,
+) -> None:
+    said = "failed: " + attempt.error if attempt.error is not None else _verdict(task.folder)
+    k = next(done)
+    console.print(f"{task.name}  {k}/{left}  {attempt.seconds:.0f} s  {said}", soft_wrap=True, markup=False)
+    tick("diagnosed", k, left)
+
+
+def _verdict(folder: Path) -> str:
+    return str(json.loads((folder / RESULT).read_text(encoding="utf-8"))["verdict"])
+
+
+def opened(out: Path, names: Sequence[str], seal: str, *, seed: int, kind: str | None) -> Proof:
+    """Check the seal and score.
+
+    Args:
+        out: folder of the proof.
+        names: of the worlds.
+        seal: hash that was written down before the diagnosis.
+        seed: of the worlds.
+        kind: of the worlds, None for the mix.
+
+    Raises:
+        ProofError: if the truth is not the one that was sealed.
+    """
+    check_seal(out, names, seal)
+    outcomes = tuple(read_outcomes(out / SEALED, out / "diagnoses", names))
+    return Proof(
+        seed=seed, kind=kind, seal=seal, outcomes=outcomes, figures=figures_of(outcomes), versions=_versions()
+    )  # fmt: skip
+
+
+def _versions() -> dict[str, str]:
+    found = {"python": platform.python_version()}
+    for name in ("physid_drake", "drake", "mujoco", "numpy", "scipy"):
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def write(folder: RunFolder, proof: Proof) -> None:
+    """Write ``proof.json``, ``proof.md``, the page and the confusion as a picture.
+
+    Raises:
+        OutputError: if one cannot be written.
+    """
+    folder.write("proof.json", proof_json(proof))
+    folder.write("proof.md", proof_markdown(proof))
+    folder.write("page.html", proof_page(proof))
+    try:
+        with drawn():
+            confusion_picture(proof.figures).savefig(folder.path / "confusion.png", dpi=150)
+    except OSError as error:
+        raise OutputError(f"'{folder.path / 'confusion.png'}': cannot be written: {error}.") from error

@@ -1,0 +1,122 @@
+"""``prove --real``: recordings of others' robots, diagnosed without what is known about them, then opened."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from physid_drake.errors import ConfigError, OutputError, PhysidError
+from physid_drake.identify.problem import PushProblem, noise_of, problems_of
+from physid_drake.model import ModelCell, load_model
+from physid_drake.prove.diagnosing import RESULT, Task, diagnose_command
+from physid_drake.prove.mujoco_world import height_of
+from physid_drake.prove.real import RealCase, chosen_cases, prepare
+from physid_drake.prove.real_score import FRESH_ERRORS, RealOutcome, real_outcome
+from physid_drake.recording import MeshShape, read_recording
+from physid_drake.report.proof_pictures import drawn
+from physid_drake.report.real import pressure_picture, real_json, real_markdown, real_table
+from physid_drake.run_folder import RunFolder
+from physid_drake.run_prove import Commander, check_running, claim, ended_softly, run_tasks, wide_console
+
+
+def run_real(arguments: argparse.Namespace, command: Commander = diagnose_command) -> int:
+    """Run the command on what is in ``arguments.real``.
+
+    Raises:
+        PhysidError: one line that says what is wrong.
+        KeyboardInterrupt: when interrupted; all that is finished is kept.
+    """
+    published: Path = arguments.real
+    if not published.is_dir():
+        raise ConfigError(f"--real '{published}': there is no such folder.")
+    if arguments.pushes < 3:
+        raise ConfigError(f"--pushes must be at least 3, but is {arguments.pushes}.")
+    check_running(arguments)
+    cases = chosen_cases(arguments.only)
+    out: Path = arguments.out or Path("proofs") / "real"
+    folder = claim(out, {"real": True, "seed": arguments.seed, "pushes": arguments.pushes})
+    console = wide_console()
+    with ended_softly():
+        reasons = {c.name: prepare(c, published, out, pushes=arguments.pushes, seed=arguments.seed) for c in cases}
+        there = [case for case in cases if reasons[case.name] is None]
+        hidden = (published, out / "held_out")
+        tasks = [
+            Task(name=case.id, words=command(out / "recordings" / case.id, out / "diagnoses" / case.id, *hidden),
+                 folder=out / "diagnoses" / case.id)
+            for case in there
+        ]  # fmt: skip
+        run_tasks(tasks, arguments, console)
+        _measure_fresh(there, out)
+    outcomes = [
+        real_outcome(case, published, out)
+        if reasons[case.name] is None
+        else RealOutcome(case=case, skipped=f"left out: {reasons[case.name]}")
+        for case in cases
+    ]
+    _write(folder, outcomes)
+    console.print(real_table(outcomes))
+    console.print(f"written: {out / 'real.md'}, {out / 'real.json'}", soft_wrap=True)
+    return 0
+
+
+def _measure_fresh(cases: Sequence[RealCase], out: Path) -> None:
+    """End-point errors of each diagnosis's model on pushes that it did not get, once."""
+    for case in cases:
+        diagnosis, held = out / "diagnoses" / case.id, out / "held_out" / case.id
+        file = diagnosis / FRESH_ERRORS
+        if file.exists() or not (diagnosis / RESULT).exists() or not any(held.iterdir()):
+            continue
+        try:
+            errors = fresh_errors(diagnosis, held)
+        except PhysidError:
+            continue  # a model that cannot run leaves a dash in the table
+        position, rotation = (float(np.sqrt(np.mean(np.square(column)))) for column in errors.T)
+        RunFolder(path=diagnosis).write(
+            FRESH_ERRORS, json.dumps({"position_m": position, "rotation_rad": rotation, "pushes": len(errors)}) + "\n"
+        )
+
+
+def fresh_errors(diagnosis: Path, held: Path) -> np.ndarray:
+    """End-point errors (n, 2) [m, rad] of a model on a recording's pushes.
+
+    Args:
+        diagnosis: folder with ``model.yaml``.
+        held: folder of the recording.
+
+    Raises:
+        PhysidError: if the model or the recording cannot be read.
+    """
+    recording = read_recording(held)
+    shape = recording.object.shape
+    if isinstance(shape, MeshShape):
+        raise ConfigError("a mesh has no height of its own here.")
+    cell = load_model(diagnosis).build()
+    problems = problems_of(recording, noise_of(recording), height_of(shape))
+    return np.array([_end_error(cell, problem) for problem in problems])
+
+
+def _end_error(cell: ModelCell, problem: PushProblem) -> tuple[float, float]:
+    motion = cell.rollout(
+        start=problem.start, path=problem.path, begin=problem.begin, end=problem.end, hand_height=problem.hand_height
+    )
+    dx, dy, turn = (cell.tracked(motion, problem.times[-1:])[0] - problem.poses[-1]).tolist()
+    return math.hypot(dx, dy), (turn + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def _write(folder: RunFolder, outcomes: Sequence[RealOutcome]) -> None:
+    folder.write("real.md", real_markdown(outcomes))
+    folder.write("real.json", real_json(outcomes))
+    for outcome in outcomes:
+        if outcome.pressure is None:
+            continue
+        picture = folder.path / f"pressure_{outcome.case.name}.png"
+        try:
+            with drawn():
+                pressure_picture(outcome.pressure, outcome.case.name).savefig(picture, dpi=150)
+        except OSError as error:
+            raise OutputError(f"'{picture}': cannot be written: {error}.") from error

@@ -1,0 +1,226 @@
+"""The command ``prove`` with worlds and diagnoses that cost nothing."""
+
+import json
+import stat
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from physid_drake import run_prove
+from physid_drake.cli import build_parser, main
+from physid_drake.prove.diagnosing import Task, attempt_of, diagnose_all, diagnose_command
+from physid_drake.prove.make import world_id
+from physid_drake.prove.seal import write_seal
+
+# Notes that it was called, then does as the world's answer says.
+FAKE = """
+import json, pathlib, sys, time
+recording, out = map(pathlib.Path, sys.argv[1:])
+with open(out.parent.parent / "calls.txt", "a") as calls:
+    calls.write(recording.name + "\\n")
+answer = json.loads((recording / "answer.json").read_text())
+time.sleep(answer.get("sleep", 0.0))
+if "error" in answer:
+    print(answer["error"], file=sys.stderr)
+    sys.exit(answer.get("exit", 1))
+(out / "diagnosis.json").write_text(json.dumps(answer["diagnosis"]))
+"""
+
+
+def fake(recording, folder, *sealed):
+    return (sys.executable, "-c", FAKE, str(recording), str(folder))
+
+
+def diagnosis(verdict, names=()):
+    effects = [{"name": n, "indistinguishable_from": [], "probability": 0.9, "parameters": {}} for n in names]
+    fit = {"held_out_rms_before": 5.0, "held_out_rms_after": 1.1}
+    return {"verdict": verdict, "effects": effects, "fit": fit, "reduced_chi2_after": 1.0}
+
+
+ANSWERS = (
+    ("none", (), {"diagnosis": diagnosis("consistent")}),
+    ("effect", ("viscous_drag",), {"diagnosis": diagnosis("explained", ["viscous_drag"])}),
+    ("effect", ("table_tilt",), {"error": "error: the cell fell apart."}),
+)
+
+
+@pytest.fixture
+def worlds(tmp_path, monkeypatch):
+    """Three worlds, as if they had been made: one is right without an effect, one named, one fails."""
+
+    def make(arguments, count, out, console):
+        names = [world_id(k, arguments.seed) for k in range(count)]
+        for name, (kind, true, answer) in zip(names, ANSWERS, strict=False):
+            for part in ("sealed", f"recordings/{name}"):
+                (out / part).mkdir(parents=True, exist_ok=True)
+            truth = {"id": name, "kind": kind, "effects": [{"name": n, "parameters": {}} for n in true],
+                     "size_sigma": 8.0 * len(true)}  # fmt: skip
+            file = out / "sealed" / f"{name}.json"
+            if not file.exists():
+                file.write_text(json.dumps(truth))
+                (out / "recordings" / name / "answer.json").write_text(json.dumps(answer))
+        return write_seal(out, names)
+
+    monkeypatch.setattr(run_prove, "_make", make)
+    return tmp_path / "proof"
+
+
+def prove(out, *words):
+    arguments = build_parser().parse_args(["prove", "--worlds", "3", "--jobs", "2", "--out", str(out), *words])
+    return run_prove.run(arguments, command=fake)
+
+
+def calls(out):
+    file = out / "calls.txt"
+    return file.read_text().split() if file.exists() else []
+
+
+def test_a_world_that_fails_is_counted_and_listed_and_ends_nothing(worlds, capsys):
+    assert prove(worlds) == 0
+    content = json.loads((worlds / "proof.json").read_text())
+    lost = world_id(2, 0)
+    assert content["faults"] == [
+        {"id": lost, "fault": "failed", "true": ["table_tilt"], "size_sigma": 8.0,
+         "said": "failed (error: the cell fell apart.)"}
+    ]  # fmt: skip
+    assert (content["figures"]["failed"]["count"], content["figures"]["failed"]["of"]) == (1, 3)
+    assert (
+        content["figures"]["effect_clear"]["right"]["count"],
+        content["figures"]["effect_clear"]["right"]["of"],
+    ) == (1, 2)
+    for name in ("proof.md", "page.html", "confusion.png"):
+        assert (worlds / name).stat().st_size > 500
+    said = capsys.readouterr().out
+    assert said.index("sha256 " + content["seal_sha256"]) < said.index(world_id(0, 0))  # before the first diagnosis
+
+
+def test_what_is_done_is_not_done_again(worlds):
+    prove(worlds)
+    first = (worlds / "proof.json").read_bytes()
+    prove(worlds)
+    assert len(calls(worlds)) == 3
+    assert (worlds / "proof.json").read_bytes() == first
+    prove(worlds, "--retry")
+    assert calls(worlds)[3:] == [world_id(2, 0)]
+
+
+def test_an_interrupted_run_keeps_what_is_finished_and_opens_the_seal_again(worlds, monkeypatch):
+    tell = run_prove._tell
+
+    def stop(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run_prove, "_tell", stop)
+    with pytest.raises(KeyboardInterrupt):
+        prove(worlds, "--jobs", "1")
+    assert stat.S_IMODE((worlds / "sealed").stat().st_mode) == 0o755
+    assert not (worlds / "proof.json").exists()
+    finished = [d.parent.name for d in (worlds / "diagnoses").glob("*/diagnosis.json")]
+    assert len(finished) == 1
+    monkeypatch.setattr(run_prove, "_tell", tell)
+    assert prove(worlds) == 0
+    assert calls(worlds).count(finished[0]) == 1
+
+
+def test_the_sealed_folder_is_shut_while_worlds_are_diagnosed(worlds, monkeypatch):
+    modes = []
+    run_tasks = run_prove.run_tasks
+
+    def look(*arguments):
+        modes.append(stat.S_IMODE((worlds / "sealed").stat().st_mode))
+        run_tasks(*arguments)
+
+    monkeypatch.setattr(run_prove, "run_tasks", look)
+    prove(worlds)
+    assert modes == [0]
+    assert stat.S_IMODE((worlds / "sealed").stat().st_mode) == 0o755
+
+
+def test_a_broken_seal_is_refused(worlds, monkeypatch):
+    run_tasks = run_prove.run_tasks
+
+    def tamper(*arguments):
+        run_tasks(*arguments)
+        file = worlds / "sealed" / f"{world_id(1, 0)}.json"
+        (worlds / "sealed").chmod(0o755)
+        file.write_text(file.read_text().replace("viscous_drag", "table_tilt"))
+
+    monkeypatch.setattr(run_prove, "run_tasks", tamper)
+    with pytest.raises(run_prove.ProofError, match=r"^the seal is broken"):
+        prove(worlds)
+    assert not (worlds / "proof.json").exists()
+    # Nor does a second run take the new truth for the old one.
+    with pytest.raises(run_prove.ProofError, match="has changed since it was sealed"):
+        prove(worlds)
+
+
+def test_another_proof_in_the_same_folder_is_refused(worlds):
+    prove(worlds)
+    with pytest.raises(run_prove.ConfigError, match="holds another proof"):
+        prove(worlds, "--seed", "5")
+
+
+@pytest.mark.parametrize(
+    ("words", "rule"),
+    [
+        (["--worlds", "0"], "--worlds must be at least 1"),
+        (["--quick", "--worlds", "4"], "give it or --worlds"),
+        (["--jobs", "0"], "--jobs must be at least 1"),
+        (["--seed", "-1"], "--seed must be at least 0"),
+        (["--timeout", "0"], "--timeout must be positive"),
+        (["--only", "cmu"], "give --real too"),
+        (["--real", "/nowhere"], "there is no such folder"),
+        (["--real", "/", "--only", "nothing"], "no real case is named 'nothing'"),
+        (["--real", "/", "--pushes", "2"], "--pushes must be at least 3"),
+    ],
+)
+def test_bad_arguments_are_one_line(words, rule, tmp_path, capsys):
+    assert main(["prove", "--out", str(tmp_path / "out"), *words]) == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and rule in said
+
+
+def test_missing_mujoco_is_one_line_that_says_what_to_install(tmp_path, monkeypatch, capsys):
+    (tmp_path / "mujoco.py").write_text("raise ImportError('not here')\n")
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{Path(run_prove.__file__).parents[1]}")
+    assert main(["prove", "--worlds", "1", "--out", str(tmp_path / "out")]) == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "pip install 'physid_drake[proof]'" in said
+
+
+def task(tmp_path, name, code):
+    return Task(name=name, words=(sys.executable, "-c", code), folder=tmp_path / name)
+
+
+def test_a_diagnosis_that_takes_too_long_is_stopped_with_all_that_it_started(tmp_path):
+    code = "import subprocess, sys; subprocess.run([sys.executable, '-c', 'import time; time.sleep(60)'])"
+    slow = task(tmp_path, "slow", code)
+    begin = time.monotonic()
+    diagnose_all([slow], jobs=1, timeout=0.6, ended=lambda t, a: None)
+    assert time.monotonic() - begin < 10.0
+    found = attempt_of(slow.folder)
+    assert found is not None and found.error == "stopped after 0.6 s (--timeout)."
+
+
+def test_a_crash_and_a_silence_have_a_line_too(tmp_path):
+    codes = {
+        "crash": "import os; os.abort()",
+        "silence": "pass",
+        "words": "print('error: no table.'); raise SystemExit(1)",
+    }
+    tasks = [task(tmp_path, name, code) for name, code in codes.items()]
+    diagnose_all(tasks, jobs=3, timeout=30.0, ended=lambda t, a: None)
+    said = {t.name: attempt_of(t.folder).error for t in tasks}
+    assert said["crash"].startswith(("signal 6", "Fatal Python error"))
+    assert said["silence"] == "exit status 0, without a word."
+    assert said["words"] == "error: no table."
+
+
+def test_the_command_is_given_the_recording_and_no_truth(tmp_path):
+    words = diagnose_command(tmp_path / "recordings" / "ab", tmp_path / "diagnoses" / "ab", tmp_path / "sealed")
+    at = words.index("diagnose")
+    assert words[1:at] == ("-m", "physid_drake.prove.blindfold", str(tmp_path / "sealed"))
+    assert not any("sealed" in word for word in words[at:])
+    assert words[words.index("--jobs") + 1] == "1"

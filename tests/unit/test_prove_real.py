@@ -1,0 +1,180 @@
+"""The proof on published recordings, with files in their layouts and diagnoses that cost nothing."""
+
+import csv
+import json
+import math
+import sys
+
+import numpy as np
+import pytest
+
+from physid_drake import run_prove_real
+from physid_drake.cli import build_parser
+from physid_drake.errors import RecordingError
+from physid_drake.prove.real import chosen_cases, prepare, slides_of_squares
+from physid_drake.prove.real_score import points_of_support, published_errors, weight_near
+from physid_drake.recording import read_recording
+from physid_drake.recording.adapters import convert_cube
+from physid_drake.recording.adapters.cube import RATE, SIDE
+
+MIT_COLUMNS = [
+    *(f"{when}_{what}" for when in ("start", "end") for what in
+      ("object_x_m", "object_y_m", "object_yaw_rad", "tip_x_m", "tip_y_m")),
+    *(f"{model}_end_object_{what}" for model in ("quadratic", "poly4") for what in ("x_m", "y_m", "yaw_rad")),
+]  # fmt: skip
+
+
+@pytest.fixture
+def published(tmp_path):
+    """Thirty pushes of the MIT layout, in which one model is 3 mm and 4 mm off, the other 0.1 rad."""
+    folder = tmp_path / "published"
+    (folder / "mit_push_endpoints").mkdir(parents=True)
+    with (folder / "mit_push_endpoints" / "abs_rect1_v20.csv").open("w", newline="") as stream:
+        table = csv.DictWriter(stream, MIT_COLUMNS)
+        table.writeheader()
+        for k in range(30):
+            row = dict.fromkeys(MIT_COLUMNS, 0.0)
+            row |= {"start_tip_x_m": -0.06, "end_tip_x_m": -0.04, "end_object_x_m": 0.01 + 1e-3 * k}
+            # An angle may be given a turn away.
+            row |= {"quadratic_end_object_x_m": 0.013 + 1e-3 * k, "quadratic_end_object_y_m": 0.004,
+                    "quadratic_end_object_yaw_rad": 2.0 * math.pi}  # fmt: skip
+            row |= {"poly4_end_object_x_m": 0.01 + 1e-3 * k, "poly4_end_object_yaw_rad": -0.1}
+            table.writerow(row)
+    return folder
+
+
+def toss(rng, *, speeds_up=False, face=2, number=0):
+    """Falls for ten samples, then slides 80 mm straight ahead with its given face up, and rests."""
+    steps = np.arange(60) / RATE
+    way = 0.4 * steps - 0.5 * 1.0 * steps**2 if not speeds_up else 0.5 * 1.5 * steps**2
+    rows = np.zeros((70, 13))
+    rows[10:, 0] = way
+    rows[:, 1] = 0.01 * number
+    rows[:, 2] = SIDE / 2
+    rows[:10, 9] = -0.5
+    half = math.pi / 4
+    # Turned about y by a right angle, the object's x axis points down.
+    rows[:, 3:7] = [1.0, 0.0, 0.0, 0.0] if face == 2 else [math.cos(half), 0.0, math.sin(half), 0.0]
+    rows[:, :2] += 1e-5 * rng.standard_normal((70, 2))
+    return rows
+
+
+def write_tosses(file, tosses):
+    np.savez(file, traj=np.concatenate(tosses), length=[len(t) for t in tosses], id=np.arange(len(tosses)))
+
+
+def test_slides_of_one_face_are_taken_and_copies_and_driven_ones_are_not(tmp_path):
+    rng = np.random.default_rng(0)
+    tosses = [toss(rng, number=k) for k in range(3)]
+    tosses += [tosses[0], toss(rng, speeds_up=True), toss(rng, face=0), toss(rng, face=0)]
+    write_tosses(tmp_path / "contactnets_all.npz", tosses)
+    recording = convert_cube(tmp_path, tmp_path / "slides")
+    assert [push.note for push in recording.pushes] == ["toss 0", "toss 1", "toss 2"]
+    assert recording.hand is None
+    assert "5 of 7 tosses end in a slide, 3 of them on this face" in recording.description
+    stream = recording.pushes[0].object
+    assert len(stream) == 60
+    assert stream.planar[-1, 0] == pytest.approx(tosses[0][-1, 0])
+    assert np.abs(stream.planar[:, 2]).max() < 1e-9
+    assert np.allclose(stream.positions[:, 2], SIDE / 2)
+
+
+def test_a_cube_on_another_face_gets_a_frame_with_z_up(tmp_path):
+    rng = np.random.default_rng(0)
+    write_tosses(tmp_path / "tosses.npz", [toss(rng, face=0, number=k) for k in range(2)])
+    recording = convert_cube(tmp_path / "tosses.npz", tmp_path / "slides")
+    # The new x axis is the object's y, which points along the table's y.
+    assert recording.pushes[0].object.planar[:, 2] == pytest.approx(np.full(60, math.pi / 2))
+
+
+def test_a_file_that_holds_no_tosses_is_refused(tmp_path):
+    np.savez(tmp_path / "other.npz", traj=np.zeros((4, 6)), length=[4])
+    with pytest.raises(RecordingError, match="rows of 13 numbers"):
+        convert_cube(tmp_path / "other.npz", tmp_path / "slides")
+    (tmp_path / "text.npz").write_text("no")
+    with pytest.raises(RecordingError, match="is no table of tosses"):
+        convert_cube(tmp_path / "text.npz", tmp_path / "slides")
+    write_tosses(tmp_path / "still.npz", [np.tile([0.0, 0, 0.05, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0], (40, 1))])
+    with pytest.raises(RecordingError, match="no toss ends in a slide"):
+        convert_cube(tmp_path / "still.npz", tmp_path / "slides")
+
+
+def test_the_reason_for_leaving_out_the_squares_has_its_figures(tmp_path):
+    drops = np.zeros((3, 50, 6))
+    drops[0, :, 0] = np.linspace(0.0, 0.05, 50)  # slides flat all the time
+    drops[1, :25, 2] = 0.5
+    np.savez(tmp_path / "dice.npz", traj=drops)
+    assert slides_of_squares(tmp_path / "dice.npz").startswith("1 of 3 drops end in a slide of 30 mm or more")
+
+
+def test_a_recording_gets_a_neutral_name_and_fresh_pushes_stay_apart(published, tmp_path):
+    (case,) = chosen_cases(["mit_rect1_v20"])
+    out = tmp_path / "out"
+    assert prepare(case, published, out, pushes=16, seed=1) is None
+    given, held = (read_recording(out / part / case.id) for part in ("recordings", "held_out"))
+    assert (len(given.pushes), len(held.pushes)) == (16, 8)
+    assert given.name == case.id and "rect1" not in given.name
+    notes = [{push.note for push in part.pushes} for part in (given, held)]
+    assert not notes[0] & notes[1]
+    before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
+    assert prepare(case, published, out, pushes=16, seed=1) is None
+    assert before == {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
+
+
+def test_what_is_not_there_is_left_out_with_a_reason(published, tmp_path):
+    (case,) = chosen_cases(["cmu_patch"])
+    assert "not in this folder" in prepare(case, published, tmp_path / "out")
+
+
+def test_the_publishers_models_are_judged_on_the_same_pushes(published):
+    file = published / "mit_push_endpoints" / "abs_rect1_v20.csv"
+    errors = published_errors(file, ["abs_rect1_v20.csv, row 2", "abs_rect1_v20.csv, row 31"])
+    assert errors["quadratic"] == (pytest.approx(0.005), pytest.approx(0.0, abs=1e-12))
+    assert errors["poly4"] == (pytest.approx(0.0), pytest.approx(0.1))
+
+
+def test_points_of_support_and_the_weight_near_them():
+    assert points_of_support("patch") is None
+    points = points_of_support("30_90_30_30_30_90")
+    assert points == pytest.approx(np.array([[-0.02, -0.02], [0.04, -0.02], [-0.02, 0.04]]))
+    near, even = weight_near(np.ones((1, 1)), points)
+    assert near == even == pytest.approx(3 * math.pi * 15**2 / (150**2 / 2), rel=0.02)
+    corner = np.zeros((5, 5))
+    corner[1, 1] = 1.0  # 30 to 60 mm from the corner
+    assert weight_near(corner, points)[0] == pytest.approx(math.pi / 4 * 15**2 / 30**2, rel=0.05)
+
+
+ANSWER = {
+    "verdict": "unexplained",
+    "effects": [],
+    "reduced_chi2_before": 9.0,
+    "reduced_chi2_after": 9.0,
+    "fit": {f"held_out_rms_{when}{unit}": 0.004 for when in ("before", "after") for unit in ("", "_m", "_rad")},
+}
+FAKE = "import pathlib, sys; (pathlib.Path(sys.argv[2]) / 'diagnosis.json').write_text(sys.argv[3])"
+
+
+def test_the_command_writes_a_table_and_goes_on(published, tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        run_prove_real, "fresh_errors", lambda diagnosis, held: np.array([[0.003, 0.1], [0.004, 0.2]])
+    )
+    hidden = []
+
+    def fake(recording, folder, *sealed):
+        hidden.extend(sealed)
+        return (sys.executable, "-c", FAKE, str(recording), str(folder), json.dumps(ANSWER))
+
+    words = ["prove", "--real", str(published), "--only", "mit_rect1", "square", "--out", str(tmp_path / "out")]
+    arguments = build_parser().parse_args(words)
+    assert run_prove_real.run_real(arguments, command=fake) == 0
+    content = json.loads((tmp_path / "out" / "real.json").read_text())
+    cases = {case["name"]: case for case in content["cases"]}
+    assert set(cases) == {"mit_rect1_v10", "mit_rect1_v20", "square_drops"}
+    assert cases["mit_rect1_v10"]["skipped"].startswith("left out: ")
+    done = cases["mit_rect1_v20"]
+    assert (done["verdict"], done["pushes"], done["held_out_m"]) == ("unexplained", 16, [0.004, 0.004])
+    assert done["fresh"] == pytest.approx([math.sqrt(12.5e-6), math.sqrt(0.025)], rel=1e-5)
+    assert set(hidden) == {published, tmp_path / "out" / "held_out"}
+    first = (tmp_path / "out" / "real.md").read_bytes()
+    assert run_prove_real.run_real(arguments, command=fake) == 0
+    assert (tmp_path / "out" / "real.md").read_bytes() == first
