@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from pydrake.geometry import Meshcat
 from rich.console import Console
 
 from physid_drake.cell import CellConfig
@@ -18,15 +19,18 @@ from physid_drake.diagnose.memory import Memory
 from physid_drake.effects import effect_named
 from physid_drake.errors import ConfigError
 from physid_drake.identify.config import ThetaConfig
+from physid_drake.identify.rollouts import simulate
 from physid_drake.model import Model
 from physid_drake.recording import Recording, read_recording
 from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
 from physid_drake.report.diagnosis_page import ShownPush, diagnosis_page
 from physid_drake.report.progress import progress_bar
+from physid_drake.report.stage import Scene, Stage
 from physid_drake.resources import shipped
 from physid_drake.run_folder import RunFolder
 
 STATE = "stages.npz"
+SHOWN = 12  # pushes in the animation
 ALPHA = 0.01  # false-alarm rate
 
 
@@ -60,9 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     write(folder, diagnosis, evidence)
     folder.forget(STATE)
     show(console, diagnosis)
-    console.print(
-        f"written: {', '.join(str(folder.path / n) for n in ('diagnosis.json', 'page.html', 'model.yaml'))}"
-    )
+    console.print(f"written: diagnosis.json, page.html, scene.html and model.yaml in {folder.path}")
     return 0
 
 
@@ -144,8 +146,10 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
         )
 
 
-def write(folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, page: str = "page.html") -> None:
-    """Write ``diagnosis.json``, the page and ``model.yaml``.
+def write(
+    folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, page: str = "page.html", scene: str = "scene.html"
+) -> None:
+    """Write ``diagnosis.json``, the page, ``model.yaml`` and a scene of Meshcat that opens in any browser.
 
     Raises:
         OutputError: if one cannot be written.
@@ -154,6 +158,20 @@ def write(folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, page: 
     pushes = shown_pushes(diagnosis, evidence)
     folder.write(page, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches))
     folder.write("model.yaml", model_of(diagnosis, evidence).dump())
+    folder.write("scene.html", staged(evidence).StaticHtml())
+
+
+def staged(evidence: Evidence, meshcat: Meshcat | None = None) -> Meshcat:
+    """The pushes in Meshcat: recorded, and simulated by the final model, with the force that the plain cell lacks."""
+    case, state = evidence.case, evidence.final.state
+    stage = Stage(case.recording, meshcat)
+    scenes = []
+    for i in range(min(SHOWN, len(case.problems))):
+        task = evidence.fitter.task(state, i, own=0.0 * state.own[i])
+        scenes.append(Scene(push=case.recording.pushes[i], motion=simulate(case.pool.spec, case.thetas, task)))
+    stage.play(scenes)
+    stage.show_missing(evidence.wrenches, unit_force=0.1 * case.around.friction * case.around.weight)
+    return stage.meshcat
 
 
 def shown_pushes(diagnosis: Diagnosis, evidence: Evidence) -> list[ShownPush]:

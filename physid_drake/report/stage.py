@@ -11,13 +11,14 @@ from pydrake.geometry import (
     Box,
     Cylinder,
     Meshcat,
+    MeshcatCone,
     MeshcatParams,
     MeshcatVisualizer,
     MeshcatVisualizerParams,
     Rgba,
     Shape,
 )
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia, default_model_instance
@@ -26,6 +27,7 @@ from pydrake.systems.framework import DiagramBuilder
 from physid_drake.cell.hand_model import add_hand_visual
 from physid_drake.cell.motion import Motion
 from physid_drake.cell.solid import Solid, solid_of
+from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.recording import Push, Recording
 from physid_drake.resources import shipped
 
@@ -33,6 +35,9 @@ Array = NDArray[np.float64]
 
 RECORDED = np.array([0.95, 0.55, 0.15, 0.45])  # the ghost
 SIMULATED = np.array([0.20, 0.45, 0.80, 1.0])
+MISSING = (0.80, 0.10, 0.20, 1.0)
+ARROW = 0.05  # m
+SURE = 2.0  # standard deviations
 FRAMES_PER_SECOND = 32.0
 PAUSE = 0.4  # s between two pushes
 LONGEST = 60.0  # s of the whole animation; longer recordings are shown faster
@@ -133,6 +138,41 @@ class Stage:
         self.meshcat.SetLine(
             f"paths/simulated/{name}", simulated[:, :: max(1, simulated.shape[1] // 300)], 2.0, Rgba(*SIMULATED)
         )
+
+    def show_missing(self, wrenches: Sequence[MissingWrench], unit_force: float) -> int:
+        """Arrows of the force that is missing from the plain cell, where the object was when it was missing.
+
+        Args:
+            wrenches: window by window; those within two standard deviations of nothing are not drawn.
+            unit_force: that is drawn as long as ``ARROW`` [N].
+
+        Returns:
+            How many arrows there are.
+        """
+        self.meshcat.Delete("missing")
+        height = 1.1 * self._solid.height
+        count = 0
+        for wrench in wrenches:
+            force = np.hypot(*wrench.wrench[:2])
+            if force < SURE * np.hypot(*wrench.std[:2]):
+                continue
+            heading = wrench.heading + float(np.arctan2(wrench.wrench[1], wrench.wrench[0]))
+            length = ARROW * float(np.clip(force / unit_force, 0.05, 3.0))
+            self._arrow(f"missing/{count}", np.array([*wrench.place, height]), heading, length)
+            count += 1
+        return count
+
+    def _arrow(self, path: str, start: Array, heading: float, length: float) -> None:
+        """A horizontal arrow: a shaft with a cone, whose axes Meshcat draws along z."""
+        turn = RotationMatrix.MakeZRotation(heading) @ RotationMatrix.MakeYRotation(0.5 * np.pi)
+        ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
+        head = min(0.35 * length, 0.012)
+        self.meshcat.SetObject(f"{path}/shaft", Cylinder(0.0012, length - head), Rgba(*MISSING))
+        self.meshcat.SetTransform(f"{path}/shaft", RigidTransform(turn, start + 0.5 * (length - head) * ahead))
+        self.meshcat.SetObject(f"{path}/head", MeshcatCone(head, 0.004, 0.004), Rgba(*MISSING))
+        # A cone's tip is at its origin, its base above it.
+        back = RotationMatrix.MakeZRotation(heading) @ RotationMatrix.MakeYRotation(-0.5 * np.pi)
+        self.meshcat.SetTransform(f"{path}/head", RigidTransform(back, start + length * ahead))
 
     def _pose(self, simulated: RigidTransform, recorded: RigidTransform, hand: RigidTransform | None) -> None:
         for body, pose in zip(self._bodies, (simulated, recorded, hand), strict=True):
