@@ -83,7 +83,7 @@ def _verdict(evidence: Evidence, p_value: float, alpha: float, detectable: Seque
         return "underpowered" if blind else "consistent"
     if not evidence.steps or unexplained(evidence.final):
         return "unexplained"
-    return "ambiguous" if any(class_of(evidence, step) for step in evidence.steps) else "explained"
+    return "ambiguous" if any(class_of(evidence.plain, step) for step in evidence.steps) else "explained"
 
 
 def _location(evidence: Evidence, verdict: str, findings: Sequence[EffectFinding], seed: int) -> Location | None:
@@ -96,12 +96,12 @@ def _location(evidence: Evidence, verdict: str, findings: Sequence[EffectFinding
     return dc.replace(found, frame=evidence.steps[0][0].score.kind.frame)
 
 
-def class_of(evidence: Evidence, step: Sequence[Candidate]) -> tuple[str, ...]:
-    """Names that explain these pushes as well as the best of a step."""
+def class_of(plain: Fitted, step: Sequence[Candidate]) -> tuple[str, ...]:
+    """Names that explain these pushes as well as the best of a step, or look like it from the plain model."""
     best = step[0]
     close = {c.name for c in rivals(best, step)}
     for other in step[1:]:
-        if other.accepted and abs(cosine(evidence.plain, best.score, other.score)) > ALIKE:
+        if other.accepted and abs(cosine(plain, best.score, other.score)) > ALIKE:
             difference = best.gains - other.gains
             if difference.sum() < 3.0 * standard_error(difference):
                 close.add(other.name)
@@ -130,7 +130,7 @@ def _findings(evidence: Evidence) -> tuple[EffectFinding, ...]:
             EffectFinding(
                 name=kind.name,
                 element=kind.element,
-                indistinguishable_from=class_of(evidence, step),
+                indistinguishable_from=class_of(evidence.plain, step),
                 probability=_probability(step),
                 parameters=parameters_of(evidence, k),
                 statement=kind.statement,

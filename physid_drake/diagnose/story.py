@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.conclude import class_of, conclude
-from physid_drake.diagnose.confirm import Candidate, confirm
+from physid_drake.diagnose.confirm import Candidate, confirm, push_scores
 from physid_drake.diagnose.evidence import EXPLAINED, Evidence, mismatch
 from physid_drake.diagnose.fit import Fitted, Fitter, State
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
@@ -97,6 +97,7 @@ def gather(
             missing = [k for k in kinds if k not in {e.kind for e in current.state.effects}]
             at = signatures(Fitter(rough), current, missing)
             remaining = screen(current, at, screen_rng)
+    steps = [_reconsidered(fitter, plain, current, k, step, tick) for k, step in enumerate(steps)]
     fine = Fitter(case, guard, allowed)
     tick("on short ticks", 0, 0)
     refined = fine.refine(plain)
@@ -145,6 +146,28 @@ def _looks(
     return tuple(guard_kept), found
 
 
+def _reconsidered(
+    fitter: Fitter, plain: Fitted, final: Fitted, k: int, step: tuple[Candidate, ...], tick: Tick
+) -> tuple[Candidate, ...]:
+    """A step's rivals judged again beside the effects that came after it: what was missing then blurred them."""
+    count = len(final.state.effects)
+    alike = class_of(plain, step)
+    if k + 1 >= count or not alike:
+        return step
+    before = push_scores(plain)
+    judged = [dc.replace(step[0], gains=push_scores(final) - before)]
+    for other in step[1:]:
+        if other.name in alike and other.name not in {e.kind.name for e in final.state.effects}:
+            tick(f"{other.name} in place of {step[0].name}", 0, 0)
+            effects = list(final.state.effects)
+            effects[k] = other.fitted.state.effects[-1]
+            swapped = fitter.fit(dc.replace(final.state, effects=tuple(effects)), rounds=4, like=final)
+            judged.append(dc.replace(other, gains=push_scores(swapped) - before))
+        else:
+            judged.append(other)
+    return tuple(judged)
+
+
 def _model_with(fitter: Fitter, candidate: Candidate) -> Fitted:
     """The model with an effect, all its coordinates free, all derivatives taken where it is."""
     state = candidate.fitted.state
@@ -173,6 +196,6 @@ def _rival_states(evidence: Evidence) -> list[State]:
     if not evidence.steps:
         return []
     last = evidence.steps[-1]
-    alike = class_of(evidence, last)
+    alike = class_of(evidence.plain, last)
     others = [c for c in last[1:] if c.name in alike] or [c for c in last[1:] if not c.degenerate][:1]
     return [evidence.final.state, *(c.fitted.state for c in others)]
