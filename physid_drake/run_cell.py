@@ -15,7 +15,7 @@ from rich.console import Console
 
 from physid_drake.diagnose import case_of
 from physid_drake.diagnose.memory import Memory
-from physid_drake.errors import PhysidError
+from physid_drake.errors import ConfigError, PhysidError
 from physid_drake.identify import Identification, Identifier
 from physid_drake.identify.nuisance import nuisance_of
 from physid_drake.identify.rollouts import Task, simulate
@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     out = arguments.out or Path("runs") / name
     # Everything that can be refused is refused before anything is written.
     identifier = _identifier(scenario, recording, out)
-    planner = None if arguments.no_plan else _planner(scenario, recording, identifier)
+    planner = None if arguments.no_plan else _planner(scenario, recording, identifier, console)
     folder = RunFolder.open(out, dump_scenario(name, scenario))
     stage = None if arguments.no_view else _live(recording, console)
     result, plan = _identify(identifier, planner, recording, console)
@@ -153,11 +153,18 @@ def _identifier(scenario: Scenario, recording: Recording, out: Path) -> Identifi
     )
 
 
-def _planner(scenario: Scenario, recording: Recording, identifier: Identifier) -> Planner | None:
-    """What plans a push with an identification; None where nothing pushes."""
+def _planner(scenario: Scenario, recording: Recording, identifier: Identifier, console: Console) -> Planner | None:
+    """What plans a push with an identification; None where nothing pushes, or no goal was asked for and none fits."""
     if recording.hand is None:
         return None
-    return planner_of(scenario.plan, identifier.pool.spec, identifier.problems, recording.name, scenario.seed)
+    asked = scenario.plan.goal_m or scenario.plan.start_m
+    try:
+        return planner_of(scenario.plan, identifier.pool.spec, identifier.problems, recording.name, scenario.seed)
+    except ConfigError as error:
+        if asked:
+            raise
+        console.print(f"No push is planned. {error}")
+        return None
 
 
 def _identify(

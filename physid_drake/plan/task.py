@@ -20,6 +20,7 @@ Point = tuple[float, float]
 
 NEAREST = 5e-3  # m: a goal nearer than this needs no push
 LEAST_TRAVEL = 5e-3  # m
+LEAST_RADIUS = 1e-3  # m: the middle of a mesh may lie on its outline
 DEFAULT_DISTANCE = 0.3  # m
 ROOM_SHARE = 0.6  # of the way to the table's edge
 
@@ -63,8 +64,8 @@ def policy_for(name: str, model: Model, start: Pose, goal: Point, choices: Choic
     speed = CARRYING_SPEED if choices.speed is None else choices.speed
     heading = math.atan2(way[1], way[0]) if choices.direction is None else choices.direction
     travel = _travel(name, model, distance, speed) if choices.travel is None else choices.travel
-    outline = solid_of(model.shape).outline
-    reach = Reach(heading=heading, travel=travel, inner_radius=-outline.nearest(0.0, 0.0)[0], speed=speed)
+    inner = max(LEAST_RADIUS, -solid_of(model.shape).outline.nearest(0.0, 0.0)[0])
+    reach = Reach(heading=heading, travel=travel, inner_radius=inner, speed=speed)
     return policy_named(name, reach)
 
 

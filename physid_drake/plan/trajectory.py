@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.cell import HandPath, Motion, Outcome, Start
+from physid_drake.cell import HandPath, Motion, Outcome, SolverConfig, Start
 from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
 from physid_drake.errors import ConfigError
@@ -27,7 +27,8 @@ HORIZON = 4.0  # s after the hand has stopped
 MOST_SAMPLES = 200
 TOPPLED = math.cos(math.radians(30.0))
 STILL = 2e-3  # m/s
-LONGEST_STEP = 2.5e-4  # m of the hand in one tick; ticks of slow pushes are longer, up to four times
+LONGEST_STEP = 2.5e-4  # m of the hand in one tick, within the bounds below
+SHORTEST_TICK, LONGEST_TICK = 2e-3, 4e-3  # s, unless the model's own tick is shorter, or longer
 
 
 class Ending(enum.Enum):
@@ -143,20 +144,24 @@ def trajectory_of(
 
 
 def _roll(model: Model, push: PlannedPush, path: HandPath, situation: Situation) -> Motion:
-    solver = model.config.solver
-    # In powers of two, so that few cells are built.
-    pace = 2.0 ** int(np.clip(math.log2(LONGEST_STEP / (push.speed * solver.time_step_s)), 0.0, 2.0))
-    tick = min(pace * solver.time_step_s, max(solver.time_step_s, 4e-3))
-    slower = dc.replace(solver, time_step_s=tick, slide_time_step_s=max(tick, solver.slide_time_step_s))
-    spec = CellSpec(
-        shape=model.shape, hand_radius=model.hand_radius, config=dc.replace(model.config, solver=slower),
-        table=model.table,
-    )  # fmt: skip
+    config = dc.replace(model.config, solver=_paced(model.config.solver, push.speed))
+    spec = CellSpec(shape=model.shape, hand_radius=model.hand_radius, config=config, table=model.table)
     rollout = Rollout(
         start=Start(pose=situation.start), path=path, begin=0.0, end=float(path.times[-1]) + HORIZON,
         hand_height=situation.hand_height, order=situation.order,
     )  # fmt: skip
     return roll(lambda g: cell_of(spec, g), Geometry(shape=model.shape), model.body, rollout, model.effects)
+
+
+def _paced(solver: SolverConfig, speed: float) -> SolverConfig:
+    """Ticks for a push's speed: a model learnt from slow pushes has long ones, in which a fast hand would jump."""
+    own = solver.time_step_s
+    # In powers of two, so that few cells are built.
+    wanted = own * 2.0 ** math.floor(math.log2(LONGEST_STEP / (speed * own)))
+    tick = min(max(wanted, min(own, SHORTEST_TICK)), max(own, LONGEST_TICK))
+    return dc.replace(
+        solver, time_step_s=tick, slide_time_step_s=max(tick, min(solver.slide_time_step_s, 2.0 * tick))
+    )
 
 
 def _ending(model: Model, motion: Motion) -> Ending:

@@ -10,10 +10,12 @@ import pytest
 import yaml
 from pydrake.common.value import AbstractValue
 from pydrake.systems.analysis import Simulator
+from rich.console import Console
 from runs import COARSE, coarse_identifier, quick, shipped_pushes, write_small
 from twin import body_of
 
-from physid_drake import run_plan
+from physid_drake import run_cell, run_plan
+from physid_drake.cell import SolverConfig
 from physid_drake.cli import main
 from physid_drake.effects.forces import TableTilt
 from physid_drake.errors import ConfigError
@@ -25,9 +27,10 @@ from physid_drake.plan.draws import draw_models
 from physid_drake.plan.story import outcome_under
 from physid_drake.plan.system import PolicySystem, identified_model, planner_of
 from physid_drake.plan.task import Choices, default_goal, policy_for
-from physid_drake.plan.trajectory import trajectory_of
+from physid_drake.plan.trajectory import _paced, trajectory_of
 from physid_drake.policies import PlannedPush
 from physid_drake.recording import Box, Hand, ObjectModel, Recording, Sensors, Table
+from physid_drake.scenario_schema import Scenario
 
 START, GOAL = (0.0, 0.0, 0.0), (0.25, 0.0)
 MODEL = Model(
@@ -441,6 +444,22 @@ def test_the_planner_starts_where_the_recording_began():
     assert planner.situation.order == 2 and planner.situation.hand_height == pytest.approx(0.015)
     assert planner.goal == pytest.approx((planner.situation.start[0] + 0.3, planner.situation.start[1]))
     assert planner.dimension == 3
+
+
+def test_no_goal_that_fits_is_no_reason_to_stop_but_a_wrong_one_is(capsys):
+    elsewhere = replace(shipped_pushes(2), table=Table(size=(0.1, 0.1), centre=(5.0, 5.0)))
+    identifier = coarse_identifier(elsewhere)
+    assert run_cell._planner(Scenario(), elsewhere, identifier, Console()) is None
+    assert "not on the table" in " ".join(capsys.readouterr().out.split())
+    with pytest.raises(ConfigError, match="not on the table"):
+        run_cell._planner(Scenario(plan=PlanConfig(goal_m=[0.0, 0.0])), elsewhere, identifier, Console())
+
+
+@pytest.mark.parametrize(
+    ("own", "speed", "tick"), [(1e-3, 1.0, 1e-3), (1e-3, 0.02, 4e-3), (1e-2, 0.005, 1e-2), (1e-2, 1.0, 2e-3)]
+)
+def test_a_tick_is_short_enough_for_the_push_and_no_shorter(own, speed, tick):
+    assert _paced(SolverConfig(time_step_s=own), speed).time_step_s == pytest.approx(tick)
 
 
 def test_another_model_says_what_it_makes_of_a_plan(planned):
