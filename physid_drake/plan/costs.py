@@ -64,7 +64,7 @@ class InsideRegion:
 
 
 def loss_of(cost: Cost, table: Corners) -> float:
-    """The cost of an object that fell or toppled [m]: more than that of any place on the table."""
+    """The cost of an object that fell, toppled or does not stop [m]: more than that of any place on the table."""
     (x0, y0), (x1, y1) = table
     return LOSS * max(cost.at(np.array(corner)) for corner in itertools.product((x0, x1), (y0, y1)))
 
@@ -80,4 +80,5 @@ def cost_of(cost: Cost, trajectory: Trajectory, table: Corners) -> float:
     if trajectory.ending is Ending.DIVERGED:
         return math.inf
     loss = loss_of(cost, table)
-    return loss if trajectory.lost else min(loss, cost.at(trajectory.end[:2]))
+    # Where a moving object is when the rollout ends says nothing of where it will stop.
+    return min(loss, cost.at(trajectory.end[:2])) if trajectory.ending is Ending.AT_REST else loss

@@ -36,7 +36,7 @@ class Spread:
     """What the belief says of one setting.
 
     Attributes:
-        costs: (n,) of the draws [m]; an object that is lost has the loss, a rollout that diverged too.
+        costs: (n,) of the draws [m]; the loss where the object is lost or does not stop, or the rollout diverged.
         ends: (n, 3) x, y [m], yaw [rad].
         endings: (n) how they ended.
     """
@@ -60,6 +60,11 @@ class Spread:
     def losses(self) -> int:
         """Draws in which the object fell or toppled."""
         return sum(e in (Ending.FELL, Ending.TOPPLED) for e in self.endings)
+
+    @property
+    def moving(self) -> int:
+        """Draws in which the object had not stopped when the rollout ended."""
+        return sum(e is Ending.MOVING for e in self.endings)
 
     @property
     def diverged(self) -> int:
@@ -101,7 +106,7 @@ class Plan:
         settings: (d,) best settings, each in its unit.
         predicted: the trajectory under the likely theta.
         cost: its cost [m]; infinite if every rollout diverged.
-        loss: the cost of an object that is lost [m].
+        loss: the cost of an object that is lost or does not stop [m].
         spread: under the belief, or None if nothing was drawn.
         sweep: cost along the policy's swept setting, the others as the search found them best.
         search: what the search found; with ``risk`` its errors are mean costs under the belief.

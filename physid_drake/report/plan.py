@@ -96,7 +96,8 @@ def plan_rows(plan: Plan, *, with_effects: tuple[Trajectory, float] | None = Non
     if with_effects is not None:
         rows.append(("with the effects found", _said(*with_effects)))
     if plan.spread is not None:
-        rows += _belief_rows(plan.spread, plan.tolerance)
+        whose = "" if with_effects is None else ", says the plain model"
+        rows += [(what + whose, value) for what, value in _belief_rows(plan.spread, plan.tolerance)]
     return rows
 
 
@@ -110,6 +111,8 @@ def _belief_rows(spread: Spread, tolerance: float) -> list[tuple[str, str]]:
         (f"within {1e3 * tolerance:g} mm", f"{rate:.2f} (90 %: {low:.2f} to {high:.2f}) of {count} draws"),
         ("falls or topples", f"{spread.losses} of {count} draws"),
     ]  # fmt: skip
+    if spread.moving:
+        rows.append(("does not stop", f"{spread.moving} of {count} draws, which count as lost"))
     if spread.diverged:
         rows.append(("diverged", f"{spread.diverged} of {count} draws, which count as lost"))
     return rows
@@ -143,6 +146,7 @@ def _belief(spread: Spread, tolerance: float) -> dict[str, Any]:
         "mean_cost_m": spread.mean,
         "cost_5_95_m": list(spread.band),
         "losses": spread.losses,
+        "moving": spread.moving,
         "diverged": spread.diverged,
         "success_rate": rate,
         "success_rate_ci90": list(interval),

@@ -90,9 +90,9 @@ def caption_of(plan: Plan) -> str:
     drawn = [row.spread for row in plan.sweep if row.spread is not None]
     if drawn:
         text += f" Line: the most likely theta; band: 5 to 95 % of {len(drawn[0].costs)} draws from the belief."
-    lost = sum(s.losses for s in drawn) + sum(row.ending in (Ending.FELL, Ending.TOPPLED) for row in plan.sweep)
+    lost = sum(s.losses + s.moving for s in drawn) + sum(row.ending is not Ending.AT_REST for row in plan.sweep)
     if lost:
-        text += f" An object that falls or topples costs {MM * plan.loss:.0f} mm."
+        text += f" An object that falls, topples or does not stop costs {MM * plan.loss:.0f} mm."
     return text
 
 
@@ -108,7 +108,7 @@ def _draw_curve(axes: Axes, plan: Plan) -> None:
     if len(values):
         axes.fill_between(values, MM * bands[:, 0], MM * bands[:, 1], color=OBJECT, alpha=0.18, linewidth=0.0)
         axes.plot(values, costs, color=OBJECT, marker="o", markersize=2.5, linewidth=1.2)
-    lost = [k for k, row in enumerate(rows) if row.ending in (Ending.FELL, Ending.TOPPLED)]
+    lost = [k for k, row in enumerate(rows) if row.ending is not Ending.AT_REST]
     axes.plot(values[lost], costs[lost], "x", color=LOST, markersize=6)
     if math.isfinite(plan.cost):
         axes.plot([best], [MM * plan.cost], "o", color=GOAL, markersize=6, zorder=4, clip_on=False)

@@ -29,7 +29,7 @@ from physid_drake.plan.system import PolicySystem, identified_model, planner_of
 from physid_drake.plan.task import Choices, default_goal, policy_for
 from physid_drake.plan.trajectory import _paced, trajectory_of
 from physid_drake.policies import PlannedPush
-from physid_drake.recording import Box, Hand, ObjectModel, Recording, Sensors, Table
+from physid_drake.recording import Box, Cylinder, Hand, ObjectModel, Recording, Sensors, Table
 from physid_drake.scenario_schema import Scenario
 
 START, GOAL = (0.0, 0.0, 0.0), (0.25, 0.0)
@@ -100,6 +100,15 @@ def test_a_tall_object_that_is_tipped_over_is_lost():
     push = PlannedPush(direction=0.0, speed=0.5, travel=0.2)
     trajectory = trajectory_of(tall, (push,), Situation(start=START, hand_height=0.24))
     assert trajectory.ending is Ending.TOPPLED and trajectory.lost
+
+
+def test_an_object_that_rolls_on_has_no_end_to_be_near_the_goal():
+    rolling = replace(MODEL, shape=Cylinder(radius=0.03, length=0.1, axis="y"), table=((-9.0, -9.0), (9.0, 9.0)))
+    push = PlannedPush(direction=0.0, speed=0.05, travel=0.03)
+    trajectory = trajectory_of(rolling, (push,), Situation(start=START))
+    cost = DistanceToGoal(goal=(float(trajectory.end[0]), float(trajectory.end[1])))
+    assert trajectory.ending is Ending.MOVING and not trajectory.lost
+    assert cost_of(cost, trajectory, rolling.table) == loss_of(cost, rolling.table)
 
 
 # The belief.
