@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from physid_drake.plan import DistanceToGoal, Plan, Spread, SweepRow, Trajectory
+from physid_drake.plan import DistanceToGoal, Ending, Plan, Spread, SweepRow, Trajectory
 from physid_drake.plan.trajectory import hand_height_of
 
 FORMAT = "physid-plan/1"
@@ -127,6 +127,8 @@ def _setting(value: float, unit: str) -> str:
 def _said(trajectory: Trajectory, cost: float) -> str:
     x, y, yaw = np.round(trajectory.end * [1e3, 1e3, 180.0 / math.pi], 1) + 0.0  # no -0.0
     place = f"{x:.1f}, {y:.1f} mm, {yaw:.1f} deg"
+    if trajectory.ending is not Ending.AT_REST:
+        return f"{place}, {trajectory.ending.value}: this push does not bring it to the goal"
     return f"{place}, {trajectory.ending.value}; off by {1e3 * cost:.1f} mm"
 
 
