@@ -1,4 +1,4 @@
-"""The command line: ``inspect``, ``convert``, ``diagnose``, ``prove``."""
+"""The command line: ``inspect``, ``convert``, ``diagnose``, ``plan``, ``prove``."""
 
 from __future__ import annotations
 
@@ -169,9 +169,50 @@ def _run_prove(arguments: argparse.Namespace) -> int:
     return run(arguments)
 
 
+def _register_plan(subparsers: Subparsers) -> None:
+    parser = subparsers.add_parser(
+        "plan", help="find the push that brings the object to a goal, with a model's physics"
+    )
+    parser.add_argument(
+        "run_folder", nargs="?", type=Path, metavar="RUN", help="folder of a run_cell run or diagnosis"
+    )
+    parser.add_argument("--goal", nargs=2, type=float, required=True, metavar=("X", "Y"), help="on the table, in m")
+    parser.add_argument("--start", nargs=3, type=float, metavar=("X", "Y", "DEG"),
+                        help="of the object, in m and degrees (default: the middle of the table)")  # fmt: skip
+    parser.add_argument("--policy", default="push_speed", metavar="NAME",
+                        help="push_speed (default), push_direction, push or two_pushes")  # fmt: skip
+    parser.add_argument("--model", type=Path, metavar="FILE", help="plan with this model instead of RUN's model.yaml")
+    parser.add_argument("--plain", action="store_true", help="plan without the effects found, to compare")
+    parser.add_argument("--speed", type=float, metavar="M/S", help="of push_direction (default 0.05)")
+    parser.add_argument("--direction", type=float, metavar="DEG",
+                        help="of push_speed, or the middle of the search (default: to the goal)")  # fmt: skip
+    parser.add_argument("--travel", type=float, metavar="M", help="of the hand from the touch to the brake")
+    parser.add_argument("--tolerance", type=float, default=0.01, metavar="M", help="of a success (default 0.01)")
+    parser.add_argument(
+        "--search", default="greedy_entropy", metavar="NAME", help="greedy_entropy (default) or random"
+    )
+    parser.add_argument("--budget", type=int, metavar="N", help="settings tried (default: 24, 48 or 64, by policy)")
+    parser.add_argument("--draws", type=int, default=16, metavar="N", help="of theta, for the spread (default 16)")
+    parser.add_argument("--risk", action="store_true", help="make the mean cost over the draws small")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (default 0)")
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where results go (default: plans/RECORDING)")
+    parser.set_defaults(run=_run_plan)
+
+
+def _run_plan(arguments: argparse.Namespace) -> int:
+    # Drake takes a second to import, which the other commands need not wait for.
+    from physid_drake.run_plan import run  # noqa: PLC0415
+
+    return run(arguments)
+
+
 COMMANDS: list[Callable[[Subparsers], None]] = [
-    _register_inspect, _register_convert, _register_diagnose, _register_prove,
-]  # fmt: skip
+    _register_inspect,
+    _register_convert,
+    _register_diagnose,
+    _register_plan,
+    _register_prove,
+]
 """One function for each command; it adds its parser, which sets ``run``: arguments -> exit status."""
 
 

@@ -15,19 +15,24 @@ from rich.console import Console
 
 from physid_drake.diagnose import case_of
 from physid_drake.diagnose.memory import Memory
-from physid_drake.errors import PhysidError
+from physid_drake.errors import ConfigError, PhysidError
 from physid_drake.identify import Identification, Identifier
 from physid_drake.identify.nuisance import nuisance_of
 from physid_drake.identify.rollouts import Task, simulate
 from physid_drake.identify.system import PUSH_PERIOD, IdentificationSystem, RecordingPlayer
+from physid_drake.plan import Plan
+from physid_drake.plan.system import Planner, PolicySystem, identified_model, planner_of
 from physid_drake.recording import Recording, read_recording
 from physid_drake.report.page import result_page
+from physid_drake.report.plan import plan_table, push_files
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.result import result_json
 from physid_drake.report.stage import Scene, Stage
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
 from physid_drake.run_diagnose import ALPHA, STATE, recording_folder, run_case, show, write
 from physid_drake.run_folder import RunFolder
+from physid_drake.run_plan import forget as forget_plan
+from physid_drake.run_plan import write as write_plan
 from physid_drake.scenario import dump_scenario, load_scenario
 from physid_drake.scenario_schema import Scenario
 
@@ -60,6 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seed", type=int, metavar="N", help="of everything random, instead of the scenario's")
     parser.add_argument("--set", dest="override", metavar="YAML", help="such as '{search: {budget: 20}}'")
     parser.add_argument("--no-diagnosis", action="store_true", help="identify only")
+    parser.add_argument("--no-plan", action="store_true", help="plan no push with what was identified")
     parser.add_argument("--no-view", action="store_true", help="serve no live Meshcat while working")
     return parser
 
@@ -77,9 +83,10 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     out = arguments.out or Path("runs") / name
     # Everything that can be refused is refused before anything is written.
     identifier = _identifier(scenario, recording, out)
+    planner = None if arguments.no_plan else _planner(scenario, recording, identifier, console)
     folder = RunFolder.open(out, dump_scenario(name, scenario))
     stage = None if arguments.no_view else _live(recording, console)
-    result = _identify(identifier, recording, console)
+    result, plan = _identify(identifier, planner, recording, console)
     console.print()
     console.print(estimates_table(result, recording.name))
     console.print(accuracy_table(result))
@@ -89,14 +96,26 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     stage = stage or Stage(recording)
     marks = stage.play(_scenes(result, identifier, recording))
     note = f"{recording.description} Seed {scenario.seed}; {identifier.pool.count} rollouts."
-    page = result_page(stage.meshcat.StaticHtml(), result, name=recording.name, marks=marks, note=note)
+    page = result_page(stage.meshcat.StaticHtml(), result, name=recording.name, marks=marks, note=note, plan=plan)
     folder.write("page.html", page)
     folder.write("result.json", result_json(result, recording, scenario.seed, versions()))
+    folder.write("model.yaml", identified_model(result, identifier.pool.spec, recording.name).dump())
     folder.forget("belief.npz")
-    console.print(f"written: result.json and page.html in {folder.path}")
+    console.print(f"written: result.json, page.html and model.yaml in {folder.path}")
+    _keep_plan(plan, scenario, folder, console)
     if not arguments.no_diagnosis:
         _diagnose(scenario, recording, folder, console)
     _keep_serving(arguments.no_view, stage, console)
+
+
+def _keep_plan(plan: Plan | None, scenario: Scenario, folder: RunFolder, console: Console) -> None:
+    """Show and write the plan; an earlier run's is dropped."""
+    forget_plan(folder)
+    if plan is None:
+        return
+    console.print(plan_table(plan))
+    write_plan(folder, plan, seed=scenario.seed, page=None)
+    console.print(f"written: plan.json and {', '.join(push_files(plan))} in {folder.path}")
 
 
 def _diagnose(scenario: Scenario, recording: Recording, folder: RunFolder, console: Console) -> None:
@@ -134,8 +153,24 @@ def _identifier(scenario: Scenario, recording: Recording, out: Path) -> Identifi
     )
 
 
-def _identify(identifier: Identifier, recording: Recording, console: Console) -> Identification:
-    """Wire and run the diagram: the recording's player, and the system that learns from its pushes."""
+def _planner(scenario: Scenario, recording: Recording, identifier: Identifier, console: Console) -> Planner | None:
+    """What plans a push with an identification; None where nothing pushes, or no goal was asked for and none fits."""
+    if recording.hand is None:
+        return None
+    asked = scenario.plan.goal_m or scenario.plan.start_m
+    try:
+        return planner_of(scenario.plan, identifier.pool.spec, identifier.problems, recording.name, scenario.seed)
+    except ConfigError as error:
+        if asked:
+            raise
+        console.print(f"No push is planned. {error}")
+        return None
+
+
+def _identify(
+    identifier: Identifier, planner: Planner | None, recording: Recording, console: Console
+) -> tuple[Identification, Plan | None]:
+    """Wire and run the diagram: the recording's player, the system that learns from its pushes, and the policy's."""
     with progress_bar(console) as bar:
         builder = DiagramBuilder()
         player = builder.AddSystem(RecordingPlayer(recording.pushes))
@@ -148,11 +183,21 @@ def _identify(identifier: Identifier, recording: Recording, console: Console) ->
             )
         )
         builder.Connect(player.GetOutputPort("push.measured"), system.GetInputPort("push.measured"))
+        policy = None
+        if planner is not None:
+            policy = builder.AddSystem(
+                PolicySystem(lambda known: planner.run(known, bar), dimension=planner.dimension)
+            )
+            identified = system.GetOutputPort("identification.estimated")
+            builder.Connect(identified, policy.GetInputPort("identification.estimated"))
         simulator = Simulator(builder.Build())
-        simulator.AdvanceTo(len(recording.pushes) * PUSH_PERIOD)
-        result: Identification | None = system.identification(system.GetMyContextFromRoot(simulator.get_context()))
+        # One period more: what is identified at an update is seen by the policy at the next.
+        simulator.AdvanceTo((len(recording.pushes) + 1) * PUSH_PERIOD)
+        root = simulator.get_context()
+        result: Identification | None = system.identification(system.GetMyContextFromRoot(root))
+        plan = None if policy is None else policy.plan(policy.GetMyContextFromRoot(root))
     assert result is not None
-    return result
+    return result, plan
 
 
 def _scenes(result: Identification, identifier: Identifier, recording: Recording) -> list[Scene]:

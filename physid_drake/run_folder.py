@@ -43,15 +43,23 @@ class RunFolder:
         return folder
 
     def write(self, name: str, text: str) -> None:
-        """Write a file whole or not at all.
+        """Write a text file whole or not at all.
+
+        Raises:
+            OutputError: if it cannot be written.
+        """
+        self.write_bytes(name, text.encode("utf-8"))
+
+    def write_bytes(self, name: str, content: bytes) -> None:
+        """Write a file of bytes whole or not at all.
 
         Raises:
             OutputError: if it cannot be written.
         """
         part = None
         try:
-            with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=self.path, delete=False) as part:
-                part.write(text)
+            with tempfile.NamedTemporaryFile("wb", dir=self.path, delete=False) as part:
+                part.write(content)
             Path(part.name).chmod(0o644)
             os.replace(part.name, self.path / name)  # noqa: PTH105
         except OSError as error:

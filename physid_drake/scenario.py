@@ -13,6 +13,7 @@ import yaml
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
 from physid_drake.errors import ConfigError
+from physid_drake.policies import POLICIES
 from physid_drake.resources import shipped
 from physid_drake.scenario_schema import Scenario
 
@@ -161,7 +162,7 @@ _KINDS: dict[Any, tuple[str, Callable[[Any], bool]]] = {
 
 def _checked(scenario: Scenario, where: str) -> Scenario:
     """Refuse values that no run can use."""
-    cell, search, contact = scenario.cell, scenario.search, scenario.cell.contact
+    cell, search, contact, plan = scenario.cell, scenario.search, scenario.cell.contact, scenario.plan
     rules: list[tuple[str, object, bool, str]] = [
         ("cell.contact.model", cell.contact.model, cell.contact.model in ("hydroelastic", "point"),
          "'hydroelastic' or 'point'"),
@@ -190,6 +191,13 @@ def _checked(scenario: Scenario, where: str) -> Scenario:
         ("search.jobs", search.jobs, search.jobs >= 0, "at least 0"),
         ("search.entropy_tolerance_nats", search.entropy_tolerance_nats, search.entropy_tolerance_nats >= 0.0,
          "at least 0 nats"),
+        ("plan.policy", plan.policy, plan.policy in POLICIES, f"one of {', '.join(POLICIES)}"),
+        ("plan.goal_m", plan.goal_m, len(plan.goal_m) in (0, 2), "[x, y], or empty"),
+        ("plan.start_m", plan.start_m, len(plan.start_m) in (0, 2), "[x, y], or empty"),
+        ("plan.budget", plan.budget, plan.budget >= 1, "at least 1"),
+        ("plan.sweep", plan.sweep, plan.sweep >= 0, "at least 0"),
+        ("plan.draws", plan.draws, plan.draws >= 0, "at least 0"),
+        ("plan.tolerance_m", plan.tolerance_m, plan.tolerance_m > 0.0, "above 0 m"),
         ("seed", scenario.seed, scenario.seed >= 0, "at least 0"),
         ("held_out_share", scenario.held_out_share, 0.0 <= scenario.held_out_share < 1.0, "in [0, 1)"),
     ]  # fmt: skip

@@ -4,6 +4,7 @@ import dataclasses as dc
 
 from physid_drake.cell.config import CellConfig
 from physid_drake.identify import SearchConfig, ThetaConfig
+from physid_drake.plan.config import PlanConfig
 
 
 @dc.dataclass
@@ -17,6 +18,7 @@ class Scenario:
         cell: contact, solver, friction cells.
         theta: the unknowns.
         search: greedy entropy search.
+        plan: the sweep over a policy with what was identified.
     """
 
     recording: str = "eraser_reference"
@@ -25,3 +27,4 @@ class Scenario:
     cell: CellConfig = dc.field(default_factory=CellConfig)
     theta: ThetaConfig = dc.field(default_factory=ThetaConfig)
     search: SearchConfig = dc.field(default_factory=SearchConfig)
+    plan: PlanConfig = dc.field(default_factory=PlanConfig)

@@ -45,10 +45,11 @@ def write_small(folder: Path, count: int = 3, **changes: object) -> Path:
     return folder
 
 
-def quick(out: Path, *argv: object, recording: Path, **overrides: object) -> int:
-    """The exit status of a quick run into ``out``."""
+def quick(out: Path, *argv: object, recording: Path, plan_too: bool = False, **overrides: object) -> int:
+    """The exit status of a quick run into ``out``; it plans no push unless asked."""
     override = json.dumps(laid_over(QUICK, overrides))
     arguments = ["--recording", recording, "--out", out, "--set", override, "--no-view", "--no-diagnosis", *argv]
+    arguments += [] if plan_too else ["--no-plan"]
     return run_cell.main([str(a) for a in arguments])
 
 

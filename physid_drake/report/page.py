@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from jinja2 import Environment, StrictUndefined
 
 from physid_drake.identify import Identification
+from physid_drake.plan import Plan
+from physid_drake.report.plan import plan_rows
+from physid_drake.report.plan_page import caption_of, curve_svg
 from physid_drake.report.tables import accuracy_cells, verdict
 
 _PANEL = """
@@ -16,6 +21,7 @@ _PANEL = """
   #physid table { border-collapse: collapse; } #physid td, #physid th { padding: 1px 8px 1px 0; text-align: right;
     font-weight: normal; } #physid th { color: #666; } #physid td:first-child, #physid th:first-child { text-align: left; }
   #physid .dot { display: inline-block; width: 10px; height: 10px; border-radius: 5px; margin: 0 4px 0 10px; }
+  #physid svg { display: block; width: 100%; height: auto; margin: 6px 0; }
   #physid summary { cursor: pointer; } #physid select { max-width: 100%; }
 </style>
 <div id="physid"><details open><summary><b>{{ name }}</b></summary>
@@ -30,6 +36,9 @@ _PANEL = """
   <table><tr><th></th><th>mm</th><th>deg</th><th>end mm</th><th>end deg</th><th>N</th><th>std</th></tr>
   {% for label, cells in accuracy %}<tr><td>{{ label }}</td>{% for c in cells %}<td>{{ c }}</td>{% endfor %}</tr>{% endfor %}
   </table>
+  {% if plan %}<h2>{{ plan.title }}</h2>
+  <table>{% for what, value in plan.rows %}<tr><td>{{ what }}</td><td>{{ value }}</td></tr>{% endfor %}</table>
+  {{ plan.curve }}<p>{{ plan.caption }} Green: the plan; dashed: the tolerance.</p>{% endif %}
   <p><span class="dot" style="background:#f28c26"></span>recorded<span class="dot" style="background:#3373cc"></span>
     simulated &nbsp; push: <select id="physid-push">{% for push, start in marks %}
     <option value="{{ start }}">{{ push }}</option>{% endfor %}</select></p>
@@ -43,7 +52,15 @@ _PANEL = """
 """
 
 
-def result_page(html: str, result: Identification, *, name: str, marks: list[tuple[str, float]], note: str) -> str:
+def result_page(
+    html: str,
+    result: Identification,
+    *,
+    name: str,
+    marks: list[tuple[str, float]],
+    note: str,
+    plan: Plan | None = None,
+) -> str:
     """Meshcat's static page with a panel of results.
 
     Args:
@@ -52,6 +69,7 @@ def result_page(html: str, result: Identification, *, name: str, marks: list[tup
         name: of the recording.
         marks: name and start in the animation [s] of every push shown.
         note: one line on how it was made.
+        plan: the plan made with the identified theta, whose curve is shown; None for none.
     """
     rows = [
         ("held out, before", result.before),
@@ -66,6 +84,16 @@ def result_page(html: str, result: Identification, *, name: str, marks: list[tup
         accuracy=[(label, accuracy_cells(a)) for label, a in rows if a is not None],
         marks=marks,
         note=note,
+        plan=None if plan is None else _shown_plan(plan),
     )
     body_end = html.rindex("</body>")
     return html[:body_end] + panel + html[body_end:]
+
+
+def _shown_plan(plan: Plan) -> dict[str, Any]:
+    return {
+        "title": f"plan: {plan.policy.name}, with the identified theta",
+        "rows": plan_rows(plan),
+        "curve": curve_svg(plan) if plan.sweep else "",
+        "caption": caption_of(plan) if plan.sweep else "",
+    }

@@ -31,7 +31,7 @@ def result_of(folder):
 
 
 def test_a_run_leaves_its_configuration_its_result_and_its_page(done):
-    assert {path.name for path in done.iterdir()} == {"config.yaml", "result.json", "page.html"}
+    assert {path.name for path in done.iterdir()} == {"config.yaml", "result.json", "page.html", "model.yaml"}
     assert {oct(path.stat().st_mode & 0o777) for path in done.iterdir()} == {"0o644"}
 
 

@@ -1,0 +1,84 @@
+"""Costs of a trajectory: what a plan makes small."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import itertools
+import math
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.errors import ConfigError
+from physid_drake.plan.trajectory import Ending, Trajectory
+
+Array = NDArray[np.float64]
+Corners = tuple[tuple[float, float], tuple[float, float]]
+
+LOSS = 1.1  # times the worst cost on the table
+
+
+class Cost(Protocol):
+    """How far a resting object's end is from what is wanted."""
+
+    def at(self, place: Array) -> float:
+        """Cost [m] of resting at x, y (2,) [m]; 0 is best, and it grows no slower than a convex function."""
+        ...
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class DistanceToGoal:
+    """Distance of the end from a point ``goal`` [m]."""
+
+    goal: tuple[float, float]
+
+    def at(self, place: Array) -> float:
+        """The distance [m]."""
+        return math.hypot(float(place[0]) - self.goal[0], float(place[1]) - self.goal[1])
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class InsideRegion:
+    """Zero in a box from ``lower`` to ``upper`` [m]; outside, about the distance from it, without a kink at its edge.
+
+    Attributes:
+        lower, upper: corners [m].
+        softness: distance over which the cost bends from level to slope 1 [m].
+    """
+
+    lower: tuple[float, float]
+    upper: tuple[float, float]
+    softness: float = 0.01
+
+    def __post_init__(self) -> None:
+        if not (self.lower[0] < self.upper[0] and self.lower[1] < self.upper[1] and self.softness > 0.0):
+            raise ConfigError(f"region: needs lower < upper and a softness above 0 m, but got {self}.")
+
+    def at(self, place: Array) -> float:
+        """The softened distance [m]."""
+        outside = [
+            max(a - float(v), float(v) - b, 0.0) for a, b, v in zip(self.lower, self.upper, place, strict=True)
+        ]
+        return math.hypot(*outside, self.softness) - self.softness
+
+
+def loss_of(cost: Cost, table: Corners) -> float:
+    """The cost of an object that fell, toppled or does not stop [m]: more than that of any place on the table."""
+    (x0, y0), (x1, y1) = table
+    return LOSS * max(cost.at(np.array(corner)) for corner in itertools.product((x0, x1), (y0, y1)))
+
+
+def cost_of(cost: Cost, trajectory: Trajectory, table: Corners) -> float:
+    """The cost of a trajectory [m]; infinite where the rollout diverged, which is no answer.
+
+    Args:
+        cost: of a resting object.
+        trajectory: the prediction.
+        table: lower and upper corner of its top [m]; an object that is beyond it counts as lost.
+    """
+    if trajectory.ending is Ending.DIVERGED:
+        return math.inf
+    loss = loss_of(cost, table)
+    # Where a moving object is when the rollout ends says nothing of where it will stop.
+    return min(loss, cost.at(trajectory.end[:2])) if trajectory.ending is Ending.AT_REST else loss

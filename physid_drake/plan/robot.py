@@ -1,0 +1,103 @@
+"""A robot that makes planned pushes: what the loop of pushing, learning and planning needs of one."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.errors import ConfigError
+from physid_drake.model import Model
+from physid_drake.plan.trajectory import Ending, Situation, hand_height_of, path_of, trajectory_of
+from physid_drake.policies import PlannedPush, hand_samples
+from physid_drake.recording import PoseStream, Push, Sensors
+
+Array = NDArray[np.float64]
+Pose = tuple[float, float, float]
+
+RATE = 100.0  # Hz of the recording
+REST = 0.2  # s recorded after the object has stopped
+
+
+class Robot(Protocol):
+    """Something that sees the object and makes planned pushes."""
+
+    def see(self) -> Pose:
+        """Where the object stands: x, y [m], yaw [rad]."""
+        ...
+
+    def execute(self, push: PlannedPush) -> Push:
+        """Make one push and record it."""
+        ...
+
+
+class SimulatedRobot:
+    """A robot whose world is a model that nobody else sees; the object stays where a push has left it.
+
+    Attributes:
+        ending: how the last push ended; AT_REST before the first.
+    """
+
+    def __init__(self, hidden: Model, *, start: Pose, sensors: Sensors, rng: np.random.Generator) -> None:
+        """Put the object on the table.
+
+        Args:
+            hidden: the world.
+            start: of the object.
+            sensors: standard deviations of its white noise; None is none.
+            rng: draws the noise.
+        """
+        self._hidden, self._pose, self._sensors, self._rng = hidden, start, sensors, rng
+        self._pushes = 0
+        self.ending = Ending.AT_REST
+
+    def see(self) -> Pose:
+        """The object's pose with the tracker's noise."""
+        x, y, yaw = np.array(self._pose) + self._rng.standard_normal(3) * self._object_std()
+        return float(x), float(y), float(yaw)
+
+    def execute(self, push: PlannedPush) -> Push:
+        """Push, record at 100 Hz until the object has rested for 0.2 s, and leave the object there.
+
+        Raises:
+            ConfigError: if the object is lost, or the rollout diverges.
+        """
+        if self.ending not in (Ending.AT_REST, Ending.MOVING):
+            raise ConfigError(f"robot: the object {self.ending.value} in the last push; put it back first.")
+        situation = Situation(start=self._pose, order=self._pushes)
+        path = path_of(self._hidden, push, self.see())
+        trajectory = trajectory_of(self._hidden, (push,), situation, path=path)
+        if trajectory.ending is Ending.DIVERGED:
+            raise ConfigError("robot: the hidden world's rollout diverged.")
+        self._pushes += 1
+        self.ending = trajectory.ending
+        x, y, yaw = trajectory.end.tolist()
+        self._pose = (x, y, yaw)
+        moving = np.flatnonzero(np.abs(np.diff(trajectory.poses, axis=0)).max(axis=1) > 1e-6)
+        stopped = float(trajectory.times[moving[-1] + 1]) if len(moving) else 0.0
+        end = min(max(stopped, float(path.times[-1])) + REST, float(trajectory.times[-1]))
+        times = np.arange(math.ceil(end * RATE)) / RATE
+        poses = np.column_stack([np.interp(times, trajectory.times, column) for column in trajectory.poses.T])
+        hand = hand_samples(path, hand_height_of(self._hidden, situation), rate=RATE).positions
+        hand = np.vstack([hand, np.repeat(hand[-1:], max(0, len(times) - len(hand)), axis=0)])[: len(times)]
+        hand[:, :2] += (self._sensors.hand_position_std or 0.0) * self._rng.standard_normal((len(times), 2))
+        return Push(
+            name=f"pushes/{self._pushes:03d}.csv", object=self._object(times, poses), force=None,
+            hand=PoseStream(times=times, positions=hand, quaternions=np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1))),
+        )  # fmt: skip
+
+    def _object_std(self) -> Array:
+        place, turn = self._sensors.object_position_std or 0.0, self._sensors.object_rotation_std or 0.0
+        return np.array([place, place, turn])
+
+    def _object(self, times: Array, poses: Array) -> PoseStream:
+        seen = poses + self._rng.standard_normal(poses.shape) * self._object_std()
+        half, zeros = 0.5 * seen[:, 2], np.zeros(len(seen))
+        height = hand_height_of(self._hidden, Situation(start=self._pose))
+        return PoseStream(
+            times=times,
+            positions=np.column_stack([seen[:, :2], np.full(len(seen), height)]),
+            quaternions=np.column_stack([np.cos(half), zeros, zeros, np.sin(half)]),
+        )

@@ -1,0 +1,283 @@
+"""The story: a model, a policy and a cost in, the best push out, with what the belief says of its success."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from physid_drake.belief import Belief
+from physid_drake.errors import ConfigError
+from physid_drake.model import Model
+from physid_drake.plan.costs import Cost, cost_of, loss_of
+from physid_drake.plan.draws import draw_models, uncertain_names
+from physid_drake.plan.trajectory import Ending, Situation, Trajectory, hand_radius_of, trajectory_of
+from physid_drake.policies import Policy
+from physid_drake.search import GreedyEntropySearch, RandomSearch, Search, SearchResult, search_minimum
+
+Array = NDArray[np.float64]
+Tick = Callable[[str, int, int], None]
+
+SEARCHES: dict[str, type[GreedyEntropySearch] | type[RandomSearch]] = {
+    "greedy_entropy": GreedyEntropySearch,
+    "random": RandomSearch,
+}
+CANDIDATES = 256
+REFINE_EVERY = 6  # trials: candidates gather where the best setting may be
+TOLERANCE = 0.01  # m
+
+
+@dc.dataclass(frozen=True, kw_only=True, eq=False)
+class Spread:
+    """What the belief says of one setting.
+
+    Attributes:
+        costs: (n,) of the draws [m]; the loss where the object is lost or does not stop, or the rollout diverged.
+        ends: (n, 3) x, y [m], yaw [rad].
+        endings: (n) how they ended.
+    """
+
+    costs: Array
+    ends: Array
+    endings: tuple[Ending, ...]
+
+    @property
+    def mean(self) -> float:
+        """Mean cost [m]."""
+        return float(self.costs.mean())
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """5 % and 95 % quantile of the cost [m]."""
+        low, high = np.quantile(self.costs, [0.05, 0.95]).tolist()
+        return low, high
+
+    @property
+    def losses(self) -> int:
+        """Draws in which the object fell or toppled."""
+        return sum(e in (Ending.FELL, Ending.TOPPLED) for e in self.endings)
+
+    @property
+    def moving(self) -> int:
+        """Draws in which the object had not stopped when the rollout ended."""
+        return sum(e is Ending.MOVING for e in self.endings)
+
+    @property
+    def diverged(self) -> int:
+        """Draws whose rollout diverged."""
+        return sum(e is Ending.DIVERGED for e in self.endings)
+
+    def successes(self, tolerance: float) -> int:
+        """Draws that end at rest within a tolerance [m]."""
+        ended = [e is Ending.AT_REST for e in self.endings]
+        return int(np.count_nonzero((self.costs <= tolerance) & ended))
+
+    def success_rate(self, tolerance: float) -> tuple[float, tuple[float, float]]:
+        """Share of successes, and its 90 % interval (Wilson's)."""
+        hits, count = self.successes(tolerance), len(self.costs)
+        interval = stats.binomtest(hits, count).proportion_ci(confidence_level=0.9, method="wilson")
+        return hits / count, (float(interval.low), float(interval.high))
+
+
+@dc.dataclass(frozen=True, kw_only=True, eq=False)
+class SweepRow:
+    """One setting of a sweep: the setting's value, cost [m] and ending under the likely theta, spread if drawn."""
+
+    value: float
+    cost: float
+    ending: Ending
+    spread: Spread | None
+
+
+@dc.dataclass(frozen=True, kw_only=True, eq=False)
+class Plan:
+    """The best push of a policy.
+
+    Attributes:
+        model: that it was planned with.
+        policy: the family.
+        cost_function: what was made small.
+        situation: where the object starts.
+        tolerance: cost up to which an end counts as a success [m].
+        settings: (d,) best settings, each in its unit.
+        predicted: the trajectory under the likely theta.
+        cost: its cost [m]; infinite if every rollout diverged.
+        loss: the cost of an object that is lost or does not stop [m].
+        spread: under the belief, or None if nothing was drawn.
+        sweep: cost along the policy's swept setting, the others as the search found them best.
+        search: what the search found; with ``risk`` its errors are mean costs under the belief.
+        risk: whether the mean over the belief was made small instead of the likely theta's cost.
+    """
+
+    model: Model
+    policy: Policy
+    cost_function: Cost
+    situation: Situation
+    tolerance: float
+    settings: Array
+    predicted: Trajectory
+    cost: float
+    loss: float
+    spread: Spread | None
+    sweep: tuple[SweepRow, ...]
+    search: SearchResult
+    risk: bool
+
+
+def plan(
+    model: Model,
+    policy: Policy,
+    cost: Cost,
+    *,
+    situation: Situation,
+    rng: np.random.Generator,
+    budget: int = 24,
+    search: str = "greedy_entropy",
+    draws: int = 16,
+    risk: bool = False,
+    sweep: int = 16,
+    tolerance: float = TOLERANCE,
+    friction_scatter: float = 0.0,
+    tick: Tick | None = None,
+) -> Plan:
+    """Search a policy's settings for the least cost.
+
+    The cost is that of the trajectory under the most likely theta, as in the paper, or with ``risk`` the mean over
+    draws of theta from the model's intervals, where an object that is lost costs more than any that is not.
+
+    Args:
+        model: the object, with its effects.
+        policy: the family of pushes.
+        cost: what is to be small.
+        situation: where the object starts.
+        rng: of candidates, search and draws; the same state gives the same plan.
+        budget: settings tried.
+        search: a name in ``SEARCHES``.
+        draws: of theta, for the spread; 0 for none. A model without intervals has no spread.
+        risk: make the mean over the draws small.
+        sweep: settings of the sweep; 0 for none.
+        tolerance: cost up to which an end counts as a success [m].
+        friction_scatter: of support friction from push to push [-], drawn along.
+        tick: told stage, steps done and steps in all.
+
+    Raises:
+        ConfigError: if a number is out of its range, the search is unknown, the model has no hand, or ``risk`` has
+            nothing to draw from.
+
+    Source: Zhu, Kimmel, Boularias, section III.C, policy optimization.
+    """
+    _check(budget, draws, sweep, tolerance, search)
+    hand_radius_of(model)
+    streams = [np.random.default_rng(s) for s in rng.integers(2**63, size=3)]
+    models: tuple[Model, ...] = ()
+    if draws and (uncertain_names(model) or friction_scatter > 0.0):
+        models = draw_models(model, draws, streams[0], friction_scatter=friction_scatter)
+    if risk and not models:
+        raise ConfigError("plan: the mean over the belief needs draws, and a model with intervals to draw from.")
+    story = _Story(model, models, policy, cost, situation, tick or (lambda stage, done, total: None))
+    objective = story.mean_costs if risk else story.likely_costs
+    found = search_minimum(
+        objective, policy.space, policy.space.sample(streams[1], CANDIDATES, from_prior=False),
+        _search(search), budget=budget, rng=streams[2], refine_every=REFINE_EVERY, entropy_tolerance=0.0,
+        on_trial=lambda belief: story.tell_search(belief, budget),
+    )  # fmt: skip
+    if found.stop_reason == "interrupted":
+        raise KeyboardInterrupt
+    rows = story.sweep(found.theta_best, sweep)
+    best = _better(policy, found, rows, risk=risk)
+    predicted = story.trajectory(model, best)
+    return Plan(
+        model=model, policy=policy, cost_function=cost, situation=situation, tolerance=tolerance, settings=best,
+        predicted=predicted, cost=cost_of(cost, predicted, model.table), loss=story.loss,
+        spread=story.spread(best) if models else None, sweep=rows, search=found, risk=risk,
+    )  # fmt: skip
+
+
+def outcome_under(made: Plan, model: Model) -> tuple[Trajectory, float]:
+    """What another model says of a plan's push: its trajectory and cost [m]."""
+    trajectory = trajectory_of(model, made.policy.pushes(made.settings), made.situation)
+    return trajectory, cost_of(made.cost_function, trajectory, model.table)
+
+
+def _better(policy: Policy, found: SearchResult, rows: Sequence[SweepRow], *, risk: bool) -> Array:
+    """The best setting (d,) of the search, or of the sweep along the swept one where that is better."""
+    best, least = np.array(found.theta_best), found.error_best
+    index = policy.space.index(policy.swept)
+    for row in rows:
+        cost = row.spread.mean if risk and row.spread is not None else row.cost
+        if cost < least:
+            least, best[index] = cost, row.value
+    return best
+
+
+def _check(budget: int, draws: int, sweep: int, tolerance: float, search: str) -> None:
+    for name, value, least in (("budget", budget, 1), ("draws", draws, 0), ("sweep", sweep, 0)):
+        if value < least:
+            raise ConfigError(f"plan: {name} must be at least {least}, but is {value}.")
+    if not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise ConfigError(f"plan: the tolerance must be above 0 m, but is {tolerance:g} m.")
+    _search(search)
+
+
+def _search(name: str) -> Search:
+    if name not in SEARCHES:
+        raise ConfigError(f"plan: the search '{name}' is unknown; known are {', '.join(SEARCHES)}.")
+    return SEARCHES[name]()
+
+
+class _Story:
+    """The rollouts of one plan."""
+
+    def __init__(
+        self, model: Model, models: Sequence[Model], policy: Policy, cost: Cost, situation: Situation, tick: Tick
+    ) -> None:
+        self._model, self._models, self._policy = model, models, policy
+        self._cost, self._situation, self._tick = cost, situation, tick
+        self.loss = loss_of(cost, model.table)
+
+    def trajectory(self, model: Model, settings: Array) -> Trajectory:
+        return trajectory_of(model, self._policy.pushes(settings), self._situation)
+
+    def likely_costs(self, settings: Array) -> Array:
+        """Costs (k,) of settings (k, d) under the likely theta."""
+        return np.array([cost_of(self._cost, self.trajectory(self._model, s), self._model.table) for s in settings])
+
+    def mean_costs(self, settings: Array) -> Array:
+        """Mean costs (k,) of settings (k, d) under the belief."""
+        return np.array([self.spread(s).mean for s in settings])
+
+    def spread(self, settings: Array) -> Spread:
+        trajectories = [self.trajectory(m, settings) for m in self._models]
+        costs = [cost_of(self._cost, t, self._model.table) for t in trajectories]
+        return Spread(
+            costs=np.array([c if math.isfinite(c) else self.loss for c in costs]),
+            ends=np.array([t.end for t in trajectories]),
+            endings=tuple(t.ending for t in trajectories),
+        )
+
+    def sweep(self, best: Array, count: int) -> tuple[SweepRow, ...]:
+        """Costs along the swept setting, evenly over its bounds, the others at their best."""
+        index = self._policy.space.index(self._policy.swept)
+        parameter = self._policy.space.parameters[index]
+        rows = []
+        for k, value in enumerate(np.linspace(parameter.lower, parameter.upper, count).tolist()):
+            self._tick("sweep", k, count)
+            settings = np.array(best)
+            settings[index] = value
+            trajectory = self.trajectory(self._model, settings)
+            rows.append(
+                SweepRow(
+                    value=value,
+                    cost=cost_of(self._cost, trajectory, self._model.table),
+                    ending=trajectory.ending,
+                    spread=self.spread(settings) if self._models else None,
+                )
+            )
+        return tuple(rows)
+
+    def tell_search(self, belief: Belief, budget: int) -> None:
+        self._tick("search over the policy", belief.n_trials, budget)

@@ -1,0 +1,159 @@
+"""Planning as a Drake system: it sweeps a policy under the belief once there is an identification."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
+
+from physid_drake.identify import Identification
+from physid_drake.identify.problem import CellSpec, PushProblem
+from physid_drake.identify.system import PUSH_PERIOD
+from physid_drake.model import Model
+from physid_drake.plan.config import PlanConfig
+from physid_drake.plan.costs import DistanceToGoal
+from physid_drake.plan.story import Plan, Tick, plan
+from physid_drake.plan.task import check_task, default_goal, policy_for
+from physid_drake.plan.trajectory import Situation
+from physid_drake.policies import policy_named
+from physid_drake.policies.policy import Reach
+
+Array = NDArray[np.float64]
+MakePlan = Callable[[Identification], Plan]
+_STREAM = 2  # of the run's seed; the identification takes the two before
+
+
+class PolicySystem(LeafSystem):
+    """Plans the next push with what was identified; its state holds that theta and the plan made with it.
+
+    .. pydrake_system::
+        name: policy
+        input_ports:
+        - identification.estimated
+        output_ports:
+        - push.desired
+        - settings.desired
+    """
+
+    def __init__(self, make_plan: MakePlan, *, dimension: int) -> None:
+        """Prepare.
+
+        Args:
+            make_plan: what to run on an identification.
+            dimension: of the policy's settings; they are nan before the first plan.
+        """
+        LeafSystem.__init__(self)
+        self.set_name("policy")
+        self._make_plan, self._dimension = make_plan, dimension
+        self.DeclareAbstractInputPort("identification.estimated", Value[object]())
+        start: tuple[Array, Plan | None] = (np.zeros(0), None)
+        self._memory = self.DeclareAbstractState(Value[object](start))
+        self.DeclareAbstractOutputPort("push.desired", Value[object], self._copy)
+        self.DeclareVectorOutputPort("settings.desired", dimension, self._settings)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(PUSH_PERIOD, 0.0, self._receive)
+
+    def plan(self, context: Context) -> Plan | None:
+        """The latest plan held in the state; None before the first."""
+        latest: Plan | None = context.get_abstract_state(self._memory).get_value()[1]
+        return latest
+
+    def _receive(self, context: Context, state: State) -> EventStatus:
+        known, _ = context.get_abstract_state(self._memory).get_value()
+        identification = self.GetInputPort("identification.estimated").Eval(context)
+        # Drake copies what goes through a port, so that identity would not tell a new one from an old one.
+        if identification is not None and not np.array_equal(identification.theta, known):
+            made = (identification.theta.copy(), self._make_plan(identification))
+            state.get_mutable_abstract_state(self._memory).set_value(made)
+        return EventStatus.Succeeded()
+
+    def _copy(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(self.plan(context))
+
+    def _settings(self, context: Context, output: BasicVector) -> None:
+        latest = self.plan(context)
+        output.SetFromVector([math.nan] * self._dimension if latest is None else latest.settings)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Planner:
+    """What the main job plans once it knows theta.
+
+    Attributes:
+        config: of the plan.
+        spec: of the cell.
+        situation: the object where the recording began.
+        goal: x, y [m].
+        name: of the recording.
+        seed: of the run.
+    """
+
+    config: PlanConfig
+    spec: CellSpec
+    situation: Situation
+    goal: tuple[float, float]
+    name: str
+    seed: int
+
+    @property
+    def dimension(self) -> int:
+        """Number of the policy's settings."""
+        return policy_named(self.config.policy, Reach(heading=0.0, travel=1.0, inner_radius=1.0)).space.dimension
+
+    def run(self, result: Identification, tick: Tick | None = None) -> Plan:
+        """Plan with the identified theta and its intervals.
+
+        Args:
+            result: the identification.
+            tick: told stage, steps done and steps in all.
+        """
+        model = identified_model(result, self.spec, self.name)
+        stream = np.random.SeedSequence(self.seed).spawn(_STREAM + 1)[_STREAM]
+        return plan(
+            model, policy_for(self.config.policy, model, self.situation.start, self.goal),
+            DistanceToGoal(goal=self.goal), situation=self.situation, rng=np.random.default_rng(stream),
+            budget=self.config.budget, draws=self.config.draws, sweep=self.config.sweep,
+            tolerance=self.config.tolerance_m, friction_scatter=result.polished.friction_scatter, tick=tick,
+        )  # fmt: skip
+
+
+def planner_of(config: PlanConfig, spec: CellSpec, problems: Sequence[PushProblem], name: str, seed: int) -> Planner:
+    """The planner of a recording: the object stands where the configuration says, else where it was before any push.
+
+    Args:
+        config: of the plan.
+        spec: of the cell.
+        problems: the recording's pushes, the first one's start and contact height are taken.
+        name: of the recording.
+        seed: of the run.
+
+    Raises:
+        ConfigError: if start or goal is not on the table, or too near to one another.
+    """
+    first = problems[0]
+    start = first.start.pose
+    if config.start_m:
+        start = (config.start_m[0], config.start_m[1], math.radians(config.start_deg))
+    goal = (config.goal_m[0], config.goal_m[1]) if config.goal_m else default_goal(start, spec.table)
+    check_task(start, goal, spec.table)
+    situation = Situation(start=start, order=len(problems), hand_height=first.hand_height)
+    return Planner(config=config, spec=spec, situation=situation, goal=goal, name=name, seed=seed)
+
+
+def identified_model(result: Identification, spec: CellSpec, name: str) -> Model:
+    """The plain cell with the identified theta and its intervals.
+
+    Args:
+        result: the identification.
+        spec: of the cell it was made with.
+        name: of the recording.
+    """
+    return Model(
+        recording=name, shape=spec.shape, hand_radius=spec.hand_radius, table=spec.table, config=spec.config,
+        body=result.thetas.body(result.theta),
+        intervals={f"theta.{e.name}": list(e.ci90) for e in result.estimates},
+    )  # fmt: skip

@@ -1,0 +1,183 @@
+"""What a planned push is predicted to do: the object's trajectory, and how it ended."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import enum
+import math
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.cell import HandPath, Motion, Outcome, SolverConfig, Start
+from physid_drake.cell.solid import Solid, solid_of
+from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
+from physid_drake.errors import ConfigError
+from physid_drake.identify.problem import CellSpec
+from physid_drake.identify.rollouts import cell_of
+from physid_drake.model import Model
+from physid_drake.policies import PlannedPush
+from physid_drake.recording import Shape
+
+Array = NDArray[np.float64]
+Pose = tuple[float, float, float]
+
+HORIZON = 4.0  # s after the hand has stopped
+MOST_SAMPLES = 200
+TOPPLED = math.cos(math.radians(30.0))
+STILL = 2e-3  # m/s
+LONGEST_STEP = 2.5e-4  # m of the hand in one tick, within the bounds below
+SHORTEST_TICK, LONGEST_TICK = 2e-3, 4e-3  # s, unless the model's own tick is shorter, or longer
+
+
+class Ending(enum.Enum):
+    """How a trajectory ended."""
+
+    AT_REST = "at rest"
+    MOVING = "still moving"
+    FELL = "fell off the table"
+    TOPPLED = "toppled"
+    DIVERGED = "diverged"
+
+
+@dc.dataclass(frozen=True, kw_only=True, eq=False)
+class Trajectory:
+    """An object's predicted way, as the recording's tracker would report it.
+
+    Attributes:
+        times: (n,) s, from the start of the first push; later pushes follow on.
+        poses: (n, 3) x, y [m], yaw [rad].
+        paths: the hand's, one for each push, each from its own time 0.
+        ending: how it ended.
+    """
+
+    times: Array
+    poses: Array
+    paths: tuple[HandPath, ...]
+    ending: Ending
+
+    @property
+    def end(self) -> Array:
+        """The last pose (3,)."""
+        return np.asarray(self.poses[-1])
+
+    @property
+    def lost(self) -> bool:
+        """Whether the object fell off the table or toppled."""
+        return self.ending in (Ending.FELL, Ending.TOPPLED)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Situation:
+    """Where a push begins.
+
+    Attributes:
+        start: x, y [m], yaw [rad] of the object, as the tracker reports it.
+        order: number of the next push since the recording began, for physics that changes from push to push.
+        hand_height: of the tip's centre above the table [m]; None for half the object's height.
+    """
+
+    start: Pose
+    order: int = 0
+    hand_height: float | None = None
+
+
+@cache
+def _solid(shape: Shape) -> Solid:
+    return solid_of(shape)
+
+
+def hand_height_of(model: Model, situation: Situation) -> float:
+    """Height of the tip's centre above the table [m]."""
+    return 0.5 * _solid(model.shape).height if situation.hand_height is None else situation.hand_height
+
+
+def hand_radius_of(model: Model) -> float:
+    """The tip's radius [m].
+
+    Raises:
+        ConfigError: if the model has no hand.
+    """
+    if model.hand_radius is None:
+        raise ConfigError(f"model '{model.recording}': has no hand, so that no push can be planned.")
+    return model.hand_radius
+
+
+def path_of(model: Model, push: PlannedPush, pose: Pose) -> HandPath:
+    """The hand's path of a planned push on the model's object.
+
+    Raises:
+        ConfigError: if the model has no hand, or the hand would pass the object.
+    """
+    return push.path(pose, _solid(model.shape).outline, hand_radius_of(model))
+
+
+def trajectory_of(
+    model: Model, pushes: tuple[PlannedPush, ...], situation: Situation, *, path: HandPath | None = None
+) -> Trajectory:
+    """Simulate pushes, one after the other.
+
+    Args:
+        model: the object, with its effects.
+        pushes: at least one; a push after a loss is not made.
+        situation: where the object starts.
+        path: of the first push, where the hand aims at another place than where the object is.
+    """
+    pose, clock = situation.start, 0.0
+    times, poses, paths, ending = [], [], [], Ending.AT_REST
+    for number, push in enumerate(pushes):
+        paths.append(path_of(model, push, pose) if number or path is None else path)
+        motion = _roll(model, push, paths[-1], dc.replace(situation, start=pose, order=situation.order + number))
+        sampled = np.linspace(0.0, float(motion.times[-1]), MOST_SAMPLES)
+        seen = tracked(motion, sampled, model.effects)
+        times.append(clock + sampled)
+        poses.append(seen)
+        ending = _ending(model, motion)
+        clock += float(paths[-1].times[-1]) + HORIZON
+        pose = (float(seen[-1, 0]), float(seen[-1, 1]), float(seen[-1, 2]))
+        if ending is not Ending.AT_REST:
+            break
+    return Trajectory(
+        times=np.concatenate(times), poses=np.concatenate(poses), paths=tuple(paths), ending=ending
+    )  # fmt: skip
+
+
+def _roll(model: Model, push: PlannedPush, path: HandPath, situation: Situation) -> Motion:
+    config = dc.replace(model.config, solver=_paced(model.config.solver, push.speed))
+    spec = CellSpec(shape=model.shape, hand_radius=model.hand_radius, config=config, table=model.table)
+    rollout = Rollout(
+        start=Start(pose=situation.start), path=path, begin=0.0, end=float(path.times[-1]) + HORIZON,
+        hand_height=situation.hand_height, order=situation.order,
+    )  # fmt: skip
+    return roll(lambda g: cell_of(spec, g), Geometry(shape=model.shape), model.body, rollout, model.effects)
+
+
+def _paced(solver: SolverConfig, speed: float) -> SolverConfig:
+    """Ticks for a push's speed: a model learnt from slow pushes has long ones, in which a fast hand would jump."""
+    own = solver.time_step_s
+    # In powers of two, so that few cells are built.
+    wanted = own * 2.0 ** math.floor(math.log2(LONGEST_STEP / (speed * own)))
+    tick = min(max(wanted, min(own, SHORTEST_TICK)), max(own, LONGEST_TICK))
+    return dc.replace(
+        solver, time_step_s=tick, slide_time_step_s=max(tick, min(solver.slide_time_step_s, 2.0 * tick))
+    )
+
+
+def _ending(model: Model, motion: Motion) -> Ending:
+    if motion.outcome is Outcome.DIVERGED:
+        return Ending.DIVERGED
+    if motion.outcome is Outcome.FELL:
+        # Only the underside meets the table, so that what topples sinks into it.
+        low, high = np.array(model.table)
+        place = motion.poses[-1, 4:6]
+        return Ending.TOPPLED if ((place >= low) & (place <= high)).all() else Ending.FELL
+    w, x, y, z = motion.poses[-1, :4]
+    rolls = _solid(model.shape).rolling_radius is not None
+    # What stays upright, or level where the object rolls: B's z axis, or its y axis.
+    upright = 1.0 - 2.0 * (x * x + y * y) if not rolls else math.sqrt(max(0.0, 1.0 - 4.0 * (y * z + w * x) ** 2))
+    if upright < TOPPLED:
+        return Ending.TOPPLED
+    end = float(motion.times[-1])
+    last = motion.planar_at(np.array([end - 0.05, end]))
+    return Ending.MOVING if float(np.hypot(*(last[1, :2] - last[0, :2]))) > 0.05 * STILL else Ending.AT_REST

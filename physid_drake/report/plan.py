@@ -1,0 +1,167 @@
+"""A plan as ``plan.json`` and as a table in the terminal."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from physid_drake.plan import DistanceToGoal, Ending, Plan, Spread, SweepRow, Trajectory
+from physid_drake.plan.trajectory import hand_height_of
+
+FORMAT = "physid-plan/1"
+
+
+def push_files(plan: Plan) -> list[str]:
+    """Names of the files that hold the hand's paths."""
+    count = len(plan.predicted.paths)
+    return ["push.csv"] if count == 1 else [f"push_{k + 1}.csv" for k in range(count)]
+
+
+def plan_json(plan: Plan, *, seed: int, with_effects: tuple[Trajectory, float] | None = None) -> str:
+    """The plan as JSON text; the same model, task and seed give the same bytes.
+
+    Args:
+        plan: the plan.
+        seed: of the run.
+        with_effects: trajectory and cost of the same push under the model with its effects, where it was planned
+            without them.
+    """
+    pushes = plan.policy.pushes(plan.settings)
+    content: dict[str, Any] = {
+        "format": FORMAT,
+        "recording": plan.model.recording,
+        "effects": [e.name for e in plan.model.effects],
+        "policy": plan.policy.name,
+        "goal_m": list(plan.cost_function.goal) if isinstance(plan.cost_function, DistanceToGoal) else None,
+        "tolerance_m": plan.tolerance,
+        "start": _pose(plan.situation.start),
+        "settings": {
+            p.name: {"value": float(v), "unit": p.unit}
+            for p, v in zip(plan.policy.space.parameters, plan.settings, strict=True)
+        },
+        "pushes": [
+            {"file": file, "direction_rad": p.direction, "speed_mps": p.speed, "travel_m": p.travel,
+             "contact_offset_m": p.contact_offset}
+            for file, p in zip(push_files(plan), pushes, strict=False)
+        ],
+        "hand_height_m": hand_height_of(plan.model, plan.situation),
+        "predicted": _outcome(plan.predicted, plan.cost),
+        "predicted_with_effects": None if with_effects is None else _outcome(*with_effects),
+        "belief": None if plan.spread is None else _belief(plan.spread, plan.tolerance),
+        "loss_m": plan.loss,
+        "sweep": {"setting": plan.policy.swept, "rows": [_row(row) for row in plan.sweep]},
+        "search": {
+            "made_small": "mean cost under the belief" if plan.risk else "cost under the most likely theta",
+            "trials": plan.search.belief.n_trials,
+            "failed": plan.search.n_failed,
+            "stop_reason": plan.search.stop_reason,
+        },
+        "seed": seed,
+    }  # fmt: skip
+    return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+
+def plan_table(plan: Plan, *, with_effects: tuple[Trajectory, float] | None = None) -> Table:
+    """The best push and what is expected of it."""
+    table = Table(title=title_of(plan), title_justify="left", show_header=False)
+    table.add_column("what")
+    table.add_column("value")
+    for what, value in plan_rows(plan, with_effects=with_effects):
+        table.add_row(what, value)
+    return table
+
+
+def title_of(plan: Plan) -> str:
+    """One line that says what was planned."""
+    effects = ", ".join(e.name for e in plan.model.effects)
+    return f"{plan.model.recording}: {plan.policy.name}, {'with ' + effects if effects else 'plain cell'}"
+
+
+def plan_rows(plan: Plan, *, with_effects: tuple[Trajectory, float] | None = None) -> list[tuple[str, str]]:
+    """The plan as lines of two texts."""
+    x, y, yaw = plan.situation.start
+    rows = [("object at", f"{1e3 * x:.0f}, {1e3 * y:.0f} mm, {math.degrees(yaw):.0f} deg")]
+    if isinstance(plan.cost_function, DistanceToGoal):
+        gx, gy = plan.cost_function.goal
+        rows.append(("goal", f"{1e3 * gx:.0f}, {1e3 * gy:.0f} mm"))
+    rows += [
+        (p.name, _setting(float(v), p.unit))
+        for p, v in zip(plan.policy.space.parameters, plan.settings, strict=True)
+    ]  # fmt: skip
+    rows.append(("predicted end", _said(plan.predicted, plan.cost)))
+    if with_effects is not None:
+        rows.append(("with the effects found", _said(*with_effects)))
+    if plan.spread is not None:
+        whose = "" if with_effects is None else ", says the plain model"
+        rows += [(what + whose, value) for what, value in _belief_rows(plan.spread, plan.tolerance)]
+    return rows
+
+
+def _belief_rows(spread: Spread, tolerance: float) -> list[tuple[str, str]]:
+    rate, (low, high) = spread.success_rate(tolerance)
+    count = len(spread.costs)
+    band = spread.band
+    rows = [
+        ("cost under the belief",
+         f"mean {1e3 * spread.mean:.1f} mm, 5 to 95 %: {1e3 * band[0]:.1f} to {1e3 * band[1]:.1f} mm"),
+        (f"within {1e3 * tolerance:g} mm", f"{rate:.2f} (90 %: {low:.2f} to {high:.2f}) of {count} draws"),
+        ("falls or topples", f"{spread.losses} of {count} draws"),
+    ]  # fmt: skip
+    if spread.moving:
+        rows.append(("does not stop", f"{spread.moving} of {count} draws, which count as lost"))
+    if spread.diverged:
+        rows.append(("diverged", f"{spread.diverged} of {count} draws, which count as lost"))
+    return rows
+
+
+def _setting(value: float, unit: str) -> str:
+    if unit == "rad":
+        return f"{math.degrees(value):.2f} deg"
+    return f"{1e3 * value:.1f} mm" if unit == "m" else f"{value:.4f} {unit}"
+
+
+def _said(trajectory: Trajectory, cost: float) -> str:
+    x, y, yaw = np.round(trajectory.end * [1e3, 1e3, 180.0 / math.pi], 1) + 0.0  # no -0.0
+    place = f"{x:.1f}, {y:.1f} mm, {yaw:.1f} deg"
+    if trajectory.ending is not Ending.AT_REST:
+        return f"{place}, {trajectory.ending.value}: this push does not bring it to the goal"
+    return f"{place}, {trajectory.ending.value}; off by {1e3 * cost:.1f} mm"
+
+
+def _pose(pose: Any) -> dict[str, float]:
+    x, y, yaw = (float(v) for v in pose)
+    return {"x_m": x, "y_m": y, "yaw_rad": yaw}
+
+
+def _outcome(trajectory: Trajectory, cost: float) -> dict[str, Any]:
+    return {"end": _pose(trajectory.end), "ending": trajectory.ending.value, "cost_m": _finite(cost)}
+
+
+def _belief(spread: Spread, tolerance: float) -> dict[str, Any]:
+    rate, interval = spread.success_rate(tolerance)
+    return {
+        "draws": len(spread.costs),
+        "mean_cost_m": spread.mean,
+        "cost_5_95_m": list(spread.band),
+        "losses": spread.losses,
+        "moving": spread.moving,
+        "diverged": spread.diverged,
+        "success_rate": rate,
+        "success_rate_ci90": list(interval),
+        "ends": [_pose(end) for end in spread.ends],
+    }
+
+
+def _row(row: SweepRow) -> dict[str, Any]:
+    numbers: dict[str, Any] = {"value": row.value, "cost_m": _finite(row.cost), "ending": row.ending.value}
+    if row.spread is not None:
+        numbers |= {"mean_cost_m": row.spread.mean, "cost_5_95_m": list(row.spread.band), "losses": row.spread.losses}
+    return numbers
+
+
+def _finite(cost: float) -> float | None:
+    return cost if math.isfinite(cost) else None

@@ -1,0 +1,259 @@
+"""A plan as pictures and as a page that opens without a network; the same plan gives the same bytes."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon, Rectangle
+from numpy.typing import NDArray
+
+from physid_drake.cell.outline import Disc, Outline
+from physid_drake.cell.outline import Polygon as OutlinePolygon
+from physid_drake.cell.solid import solid_of
+from physid_drake.plan import DistanceToGoal, Ending, InsideRegion, Plan, SweepRow, Trajectory
+from physid_drake.report.plan import plan_rows, push_files, title_of
+
+Array = NDArray[np.float64]
+
+INK, MUTED, RULE = "#1c2330", "#667085", "#dfe3ea"
+OBJECT, HAND, GOAL, LOST = "#2563c9", "#b4540a", "#1d7a46", "#b42318"
+MM = 1e3
+FLATTEST = 0.6  # of the longer side of a view from above
+
+_STYLE: dict[Any, Any] = {
+    "svg.fonttype": "none", "font.family": "DejaVu Sans", "font.size": 8.5, "text.color": INK,
+    "text.parse_math": False, "axes.edgecolor": "#c3c9d4", "axes.labelcolor": MUTED, "axes.linewidth": 0.6,
+    "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False, "grid.color": RULE,
+    "grid.linewidth": 0.5, "xtick.color": "#c3c9d4", "ytick.color": "#c3c9d4", "xtick.labelcolor": MUTED,
+    "ytick.labelcolor": MUTED, "legend.frameon": False, "savefig.transparent": True,
+}  # fmt: skip
+
+
+def curve_svg(plan: Plan, *, size: tuple[float, float] = (5.2, 3.4)) -> Markup:
+    """Cost against the swept setting, with its spread, as inline SVG; ``size`` in inches."""
+    with mpl.rc_context():
+        _style()
+        figure = Figure(figsize=size, layout="constrained")
+        _draw_curve(figure.add_subplot(), plan)
+        return _svg(figure, "curve", f"Cost against {plan.policy.swept}")
+
+
+def plan_png(plan: Plan) -> bytes:
+    """The table from above and the cost's curve, side by side, as PNG."""
+    with mpl.rc_context():
+        _style()
+        figure = Figure(figsize=(11.0, 4.2), layout="constrained")
+        axes = figure.subplots(1, 2, width_ratios=[1.25, 1.0])
+        _draw_table(axes[0], plan)
+        _draw_curve(axes[1], plan)
+        figure.suptitle(title_of(plan), x=0.01, ha="left", fontsize=10)
+        file = io.BytesIO()
+        figure.savefig(file, format="png", dpi=120, transparent=False, metadata={"Software": None})
+        return file.getvalue()
+
+
+def plan_page(plan: Plan, *, seed: int, with_effects: tuple[Trajectory, float] | None = None) -> str:
+    """The page as HTML.
+
+    Args:
+        plan: what to show.
+        seed: of the run.
+        with_effects: trajectory and cost of the same push under the model with its effects, where it was planned
+            without them.
+    """
+    with mpl.rc_context():
+        _style()
+        above = Figure(figsize=(6.4, 4.4), layout="constrained")
+        _draw_table(above.add_subplot(), plan, with_effects)
+        picture = _svg(above, "above", "The table from above: the object, its predicted path, the goal")
+    environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string(_PAGE).render(
+        title=title_of(plan), rows=plan_rows(plan, with_effects=with_effects), above=picture,
+        curve=curve_svg(plan) if plan.sweep else None, caption=caption_of(plan), files=push_files(plan),
+        seed=seed, other=with_effects is not None, trials=plan.search.belief.n_trials,
+    ) + "\n"  # fmt: skip
+
+
+def caption_of(plan: Plan) -> str:
+    """What the curve shows, in words."""
+    fixed = "" if plan.policy.space.dimension == 1 else ", the other settings at their best"
+    text = f"Cost against {plan.policy.swept}{fixed}."
+    drawn = [row.spread for row in plan.sweep if row.spread is not None]
+    if drawn:
+        text += f" Line: the most likely theta; band: 5 to 95 % of {len(drawn[0].costs)} draws from the belief."
+    lost = sum(s.losses + s.moving for s in drawn) + sum(row.ending is not Ending.AT_REST for row in plan.sweep)
+    if lost:
+        text += f" An object that falls, topples or does not stop costs {MM * plan.loss:.0f} mm."
+    return text
+
+
+def _draw_curve(axes: Axes, plan: Plan) -> None:
+    parameter = plan.policy.space.parameters[plan.policy.space.index(plan.policy.swept)]
+    angle = parameter.unit == "rad"
+    scale, unit = (180.0 / math.pi, "deg") if angle else (1.0, parameter.unit)
+    best = scale * float(plan.settings[plan.policy.space.index(plan.policy.swept)])
+    rows = _curve(plan)
+    values = np.array([scale * row.value for row in rows])
+    costs = np.array([MM * row.cost if math.isfinite(row.cost) else np.nan for row in rows])
+    bands = np.array([row.spread.band if row.spread is not None else (np.nan, np.nan) for row in rows])
+    if len(values):
+        axes.fill_between(values, MM * bands[:, 0], MM * bands[:, 1], color=OBJECT, alpha=0.18, linewidth=0.0)
+        axes.plot(values, costs, color=OBJECT, marker="o", markersize=2.5, linewidth=1.2)
+    lost = [k for k, row in enumerate(rows) if row.ending is not Ending.AT_REST]
+    axes.plot(values[lost], costs[lost], "x", color=LOST, markersize=6)
+    if math.isfinite(plan.cost):
+        axes.plot([best], [MM * plan.cost], "o", color=GOAL, markersize=6, zorder=4, clip_on=False)
+    axes.axvline(best, color=GOAL, linewidth=0.8, linestyle=":")
+    axes.axhline(MM * plan.tolerance, color=MUTED, linewidth=0.6, linestyle="--")
+    axes.set(xlabel=f"{plan.policy.swept} [{unit}]", ylabel="cost [mm]")
+    axes.set_ylim(bottom=0.0)
+    axes.grid()
+
+
+def _curve(plan: Plan) -> list[SweepRow]:
+    """The sweep with the plan itself at its place, so that the curve reaches down to it."""
+    if not plan.sweep:
+        return []
+    value = float(plan.settings[plan.policy.space.index(plan.policy.swept)])
+    chosen = SweepRow(value=value, cost=plan.cost, ending=plan.predicted.ending, spread=plan.spread)
+    return sorted([*plan.sweep, chosen], key=lambda row: row.value)
+
+
+def _draw_table(axes: Axes, plan: Plan, other: tuple[Trajectory, float] | None = None) -> None:
+    outline = _corners(solid_of(plan.model.shape).outline)
+    start, poses = np.array(plan.situation.start), plan.predicted.poses
+    (x0, y0), (x1, y1) = plan.model.table
+    axes.add_patch(
+        Rectangle((MM * x0, MM * y0), MM * (x1 - x0), MM * (y1 - y0), facecolor="#faf8f4", edgecolor="#cbbfa8")
+    )
+    for path in plan.predicted.paths:
+        hand = MM * path.positions(np.linspace(0.0, float(path.times[-1]), 100))
+        axes.plot(hand[:, 0], hand[:, 1], color=HAND, linewidth=1.4)
+        axes.add_patch(
+            Circle(tuple(hand[-1]), MM * (plan.model.hand_radius or 0.0), facecolor="none", edgecolor=HAND)
+        )
+    ends = [] if plan.spread is None else list(plan.spread.ends)
+    for end in ends:
+        axes.add_patch(Polygon(_placed(outline, end), closed=True, facecolor="none", edgecolor=OBJECT, alpha=0.2))
+        axes.plot(*(MM * end[:2]), ".", color=OBJECT, alpha=0.4, markersize=3)
+    axes.plot(MM * poses[:, 0], MM * poses[:, 1], color=OBJECT, linewidth=1.2)
+    for pose, alpha in ((start, 0.45), (plan.predicted.end, 1.0)):
+        axes.add_patch(Polygon(_placed(outline, pose), closed=True, facecolor="none", edgecolor=OBJECT, alpha=alpha))
+    if other is not None:
+        end = other[0].end
+        axes.add_patch(Polygon(_placed(outline, end), closed=True, facecolor="none", edgecolor=LOST, linestyle="--"))
+    _draw_goal(axes, plan)
+    _frame(axes, plan, outline, [start, *poses[:: max(1, len(poses) // 20)], *ends])
+    axes.set(xlabel="x [mm]", ylabel="y [mm]")
+    axes.grid()
+
+
+def _draw_goal(axes: Axes, plan: Plan) -> None:
+    cost = plan.cost_function
+    if isinstance(cost, DistanceToGoal):
+        x, y = MM * cost.goal[0], MM * cost.goal[1]
+        axes.add_patch(Circle((x, y), MM * plan.tolerance, facecolor=GOAL, edgecolor=GOAL, alpha=0.25))
+        axes.plot([x], [y], "+", color=GOAL, markersize=9, zorder=5)
+    elif isinstance(cost, InsideRegion):
+        (x0, y0), (x1, y1) = cost.lower, cost.upper
+        axes.add_patch(
+            Rectangle((MM * x0, MM * y0), MM * (x1 - x0), MM * (y1 - y0), facecolor=GOAL, edgecolor=GOAL, alpha=0.2)
+        )
+
+
+def _frame(axes: Axes, plan: Plan, outline: Array, poses: list[Array]) -> None:
+    """Show what moves, the goal and a margin, with a mm as long along x as along y."""
+    points = [_placed(outline, pose) for pose in poses]
+    points += [MM * path.knot_positions() for path in plan.predicted.paths]
+    if isinstance(plan.cost_function, DistanceToGoal):
+        points.append(MM * np.array([plan.cost_function.goal]))
+    every = np.vstack(points)
+    middle, half = 0.5 * (every.min(axis=0) + every.max(axis=0)), 0.56 * np.ptp(every, axis=0)
+    half = np.maximum(half, FLATTEST * half[::-1])
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
+    axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
+
+
+def _corners(outline: Outline) -> Array:
+    """Corners (n, 2) of an outline in B [m]."""
+    if isinstance(outline, OutlinePolygon):
+        return np.array(outline.vertices)
+    assert isinstance(outline, Disc)
+    angles = np.linspace(0.0, 2.0 * math.pi, 48, endpoint=False)
+    return np.asarray(outline.radius * np.column_stack([np.cos(angles), np.sin(angles)]))
+
+
+def _placed(outline: Array, pose: Array) -> Array:
+    """The outline at a pose (n, 2) [mm]."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    return np.asarray(MM * (outline @ np.array([[c, s], [-s, c]]) + pose[:2]))
+
+
+def _style() -> None:
+    mpl.rcdefaults()
+    mpl.rcParams.update(_STYLE)
+
+
+def _svg(figure: Figure, salt: str, label: str) -> Markup:
+    """A figure as inline SVG that scales with its column; ``salt`` keeps its ids apart from the others'."""
+    mpl.rcParams["svg.hashsalt"] = f"plan {salt}"
+    file = io.BytesIO()
+    figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    text = file.getvalue().decode()
+    text = re.sub(
+        r"<!--.*?-->|<metadata>.*?</metadata>|<style .*?</style>", "", text[text.index("<svg") :], flags=re.S
+    )
+    box = re.search(r'viewBox="[^"]*"', text)
+    assert box is not None
+    body = re.sub(r'<g id="[^"]*">', "<g>", text[text.index(">") + 1 :]).replace("xlink:href", "href")
+    return Markup('<svg {} role="img" aria-label="{}">\n{}').format(Markup(box[0]), label, Markup(body.strip()))
+
+
+_PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{{ title }}</title>
+<style>
+body { margin: 0; color: #1c2330; background: #fff; font: 15px/1.5 system-ui, "Segoe UI", Roboto, Arial, sans-serif; }
+main { max-width: 1120px; margin: 0 auto; padding: 28px 24px 48px; }
+h1 { font-size: 24px; line-height: 1.25; margin: 0 0 16px; overflow-wrap: anywhere; }
+.columns { display: grid; grid-template-columns: minmax(0, 1.25fr) minmax(0, 1fr); gap: 28px; align-items: start; }
+figure { margin: 0; } svg { display: block; width: 100%; height: auto; } svg * { stroke-linejoin: round; }
+figcaption, .note { color: #667085; font-size: 13px; margin-top: 6px; }
+table { border-collapse: collapse; margin: 20px 0 8px; font-size: 14px; font-variant-numeric: tabular-nums; }
+th { text-align: left; font-weight: 500; color: #667085; } th, td { padding: 5px 22px 5px 0; }
+tr + tr th, tr + tr td { border-top: 1px solid #dfe3ea; }
+i { display: inline-block; width: 18px; height: 4px; border-radius: 2px; vertical-align: middle;
+  margin: 0 6px 0 12px; }
+@media (max-width: 800px) { .columns { grid-template-columns: minmax(0, 1fr); } main { padding: 18px 14px; } }
+</style></head><body><main>
+<h1>{{ title }}</h1>
+<div class="columns">
+<figure>{{ above }}<figcaption><i style="background:#2563c9; margin-left:0"></i>object
+<i style="background:#b4540a"></i>hand
+<i style="background:#1d7a46"></i>goal and tolerance. Faint: where the object ends under draws from the belief.
+{% if other %}Dashed red: where it ends with the effects found.{% endif %}
+
+</figcaption></figure>
+{% if curve %}
+<figure>{{ curve }}<figcaption>{{ caption }} Green: the plan; dashed: the tolerance.</figcaption></figure>
+{% endif %}
+</div>
+<table>
+{% for what, value in rows %}
+<tr><th>{{ what }}</th><td>{{ value }}</td></tr>
+{% endfor %}
+</table>
+<p class="note">{{ files | join(", ") }}: the hand's path for a controller (time_s, hand_x_m, hand_y_m, hand_z_m).
+{{ trials }} settings tried; seed {{ seed }}.</p>
+</main></body></html>
+"""

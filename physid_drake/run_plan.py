@@ -1,0 +1,176 @@
+"""The ``plan`` command: a model and a goal in; ``plan.json``, the hand's path, a picture and a page out."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses as dc
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from physid_drake.errors import ConfigError
+from physid_drake.model import Model, load_model
+from physid_drake.plan import DistanceToGoal, Plan, Situation, plan
+from physid_drake.plan.draws import uncertain_names
+from physid_drake.plan.story import outcome_under
+from physid_drake.plan.task import Choices, policy_for
+from physid_drake.plan.trajectory import Trajectory, hand_height_of
+from physid_drake.policies import push_csv
+from physid_drake.report.plan import plan_json, plan_table, push_files
+from physid_drake.report.plan_page import plan_page, plan_png
+from physid_drake.report.progress import progress_bar
+from physid_drake.run_folder import RunFolder
+
+BUDGETS = {1: 24, 3: 48, 4: 64}  # settings tried, by the number of settings
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Learnt:
+    """What a run's folder says beside its model.
+
+    Attributes:
+        friction_scatter: of support friction from push to push [-].
+        pushes: in its recording.
+    """
+
+    friction_scatter: float = 0.0
+    pushes: int = 0
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the command.
+
+    Raises:
+        PhysidError: one line that says what is wrong.
+        KeyboardInterrupt: when interrupted; nothing is written.
+    """
+    model, learnt = _read(arguments)
+    full = model
+    if arguments.plain:
+        model = model.plain()
+    start, goal = _places(arguments, model)
+    choices = Choices(
+        speed=arguments.speed, travel=arguments.travel,
+        direction=None if arguments.direction is None else _radians("--direction", arguments.direction),
+    )  # fmt: skip
+    policy = policy_for(arguments.policy, model, start, goal, choices)
+    console = Console()
+    with progress_bar(console) as tick:
+        made = plan(
+            model, policy, DistanceToGoal(goal=goal), situation=Situation(start=start, order=learnt.pushes),
+            rng=np.random.default_rng(_seed(arguments.seed)),
+            budget=BUDGETS[policy.space.dimension] if arguments.budget is None else arguments.budget,
+            search=arguments.search, draws=arguments.draws, risk=arguments.risk, tolerance=arguments.tolerance,
+            friction_scatter=learnt.friction_scatter, tick=tick,
+        )  # fmt: skip
+    with_effects = outcome_under(made, full) if arguments.plain and full.effects else None
+    folder = RunFolder.open(
+        arguments.out or Path("plans") / model.recording, json.dumps(_settings(arguments), indent=2) + "\n",
+        name="settings.json", state="none",
+    )  # fmt: skip
+    write(folder, made, seed=arguments.seed, with_effects=with_effects)
+    console.print(plan_table(made, with_effects=with_effects))
+    if made.spread is None and arguments.draws:
+        console.print("The model has no intervals to draw from: no spread, no success rate.")
+    names = ["plan.json", *push_files(made), "plan.png", "page.html"]
+    console.print(f"written: {', '.join(names)} in {folder.path}")
+    return 0
+
+
+def write(
+    folder: RunFolder, made: Plan, *, seed: int, with_effects: tuple[Trajectory, float] | None = None,
+    page: str | None = "page.html",
+) -> None:  # fmt: skip
+    """Write ``plan.json``, the hand's paths, and with ``page`` the picture and the page.
+
+    Raises:
+        OutputError: if one cannot be written.
+    """
+    forget(folder)
+    folder.write("plan.json", plan_json(made, seed=seed, with_effects=with_effects))
+    height = hand_height_of(made.model, made.situation)
+    for name, path in zip(push_files(made), made.predicted.paths, strict=True):
+        folder.write(name, push_csv(path, height))
+    if page is not None:
+        folder.write_bytes("plan.png", plan_png(made))
+        folder.write(page, plan_page(made, seed=seed, with_effects=with_effects))
+
+
+def forget(folder: RunFolder) -> None:
+    """Drop an earlier plan: its push files may be more than a new one's."""
+    for name in ("plan.json", "push.csv", "push_1.csv", "push_2.csv"):
+        folder.forget(name)
+
+
+def _read(arguments: argparse.Namespace) -> tuple[Model, Learnt]:
+    folder: Path | None = arguments.run_folder
+    if folder is None and arguments.model is None:
+        raise ConfigError("plan: give the folder of a run or of a diagnosis, or --model FILE.")
+    if folder is not None and not folder.is_dir():
+        raise ConfigError(f"run '{folder}': there is no such folder.")
+    if arguments.model is None and folder is not None and not (folder / "model.yaml").exists():
+        raise ConfigError(f"run '{folder}': holds no model.yaml; run run_cell or diagnose into it, or give --model.")
+    file = arguments.model or folder
+    assert file is not None
+    model = load_model(file)
+    uncertain_names(model)
+    return model, Learnt() if folder is None else _learnt(folder)
+
+
+def _learnt(folder: Path) -> Learnt:
+    """Scatter and number of pushes: of the diagnosis that wrote the model, else of the identification.
+
+    Raises:
+        ConfigError: if a result is there and cannot be read.
+    """
+    for name in ("diagnosis.json", "result.json"):
+        file = folder / name
+        if not file.exists():
+            continue
+        try:
+            content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+            scatter = float(content["friction_scatter"])
+            pushes = (
+                len(content["fit"]["per_push"]) if name == "diagnosis.json"
+                else len(content["held_out"]["pushes"]) + len(content["training"]["pushes"])
+            )  # fmt: skip
+        except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError) as error:
+            text = " ".join(str(error).split())
+            raise ConfigError(f"'{file}': cannot be read: {type(error).__name__}: {text}.") from error
+        if not 0.0 <= scatter < 1.0:
+            raise ConfigError(f"'{file}': friction_scatter must be in [0, 1), but is {scatter:g}.")
+        return Learnt(friction_scatter=scatter, pushes=pushes)
+    return Learnt()
+
+
+def _places(arguments: argparse.Namespace, model: Model) -> tuple[tuple[float, float, float], tuple[float, float]]:
+    """The object's start, the middle of the table unless it is given, and the goal."""
+    (x0, y0), (x1, y1) = model.table
+    goal = (float(arguments.goal[0]), float(arguments.goal[1]))
+    if arguments.start is None:
+        start = (0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.0)
+    else:
+        start = (*arguments.start[:2], _radians("--start", arguments.start[2]))
+    return start, goal
+
+
+def _radians(flag: str, degrees: float) -> float:
+    if not math.isfinite(degrees):
+        raise ConfigError(f"{flag}: the angle must be finite, but is {degrees:g} degrees.")
+    return math.radians(degrees)
+
+
+def _seed(seed: int) -> int:
+    if seed < 0:
+        raise ConfigError(f"--seed must be at least 0, but is {seed}.")
+    return seed
+
+
+def _settings(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What the command was told, with its folders as text."""
+    left_out = ("run", "out")
+    return {k: str(v) if isinstance(v, Path) else v for k, v in vars(arguments).items() if k not in left_out}
