@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Tick = Callable[[str, int, int], None]
 
 WORTH_A_FIT = 0.35  # of the best score test's gain
+WORTH_A_TRY = 0.1  # where no better one explains the pushes
 SURE = 2.0  # standard errors
 LEAST = 4.0  # nats of held-out gain
 CERTAIN = 40.0  # nats of held-out gain, the best push not counted
@@ -90,14 +91,26 @@ def push_scores(fitted: Fitted) -> Array:
 def confirm(
     fitter: Fitter, before: Fitted, scores: Sequence[Score], tick: Tick, *, most: int
 ) -> tuple[Candidate, ...]:
-    """Fit the best few effects of a screening, each added to the model ``before``; best held-out gain first."""
-    best = max((s.gain for s in scores), default=0.0)
-    worth = [s for s in scores if s.kept and s.gain >= WORTH_A_FIT * best]
-    chosen = sorted(worth, key=lambda s: -s.gain)[:most]
+    """Fit the best few effects of a screening, each added to the model ``before``; best held-out gain first.
+
+    Args:
+        fitter: fits.
+        before: the model so far.
+        scores: of the effects that are not in it.
+        tick: told which effect is fitted.
+        most: effects that are fitted in any case, if they are worth it; as long as none of them explains the pushes,
+            twice as many. Far from the plain cell a score test says little of what a fit will find.
+    """
+    ordered = sorted((s for s in scores if s.kept), key=lambda s: -s.gain)
+    worth = [s for s in ordered if s.gain >= WORTH_A_FIT * ordered[0].gain][:most]
+    rest = [s for s in ordered[len(worth) :] if s.gain >= WORTH_A_TRY * ordered[0].gain]
+    more = rest[: 2 * most - len(worth)]
     plain = push_scores(before)
-    found = []
-    for k, one in enumerate(chosen):
-        tick(f"fit with {one.kind.name}", k, len(chosen))
+    found: list[Candidate] = []
+    for k, one in enumerate((*worth, *more)):
+        if k >= len(worth) and any(c.fitted.reduced_chi2 <= STUCK for c in found):
+            break
+        tick(f"fit with {one.kind.name}", k, len(worth))
         found.append(_candidate(fitter, before, one, plain, persistent=k < PERSISTENT))
     return tuple(sorted(found, key=lambda c: (c.degenerate, -c.gain)))
 

@@ -173,10 +173,10 @@ def _model_with(fitter: Fitter, candidate: Candidate) -> Fitted:
     state = candidate.fitted.state
     effects = tuple(e.freed(fitter.case) for e in state.effects)
     near = fitter.fit(dc.replace(state, effects=effects), rounds=3, renew=True)
-    if near.reduced_chi2 <= EXPLAINED:
+    if near.reduced_chi2 <= EXPLAINED or near.reduced_chi2 > HOPELESS:
         return near
     # The pushes' unknowns may have been imitating what is missing: once more, without them at first.
-    far = fitter.fit(fitter.start(near.state.u, near.state.effects), rounds=6, careful=2, renew=True)
+    far = fitter.fit(fitter.start(near.state.u, near.state.effects), rounds=4, careful=1, renew=True)
     return far if far.score > near.score else near
 
 
