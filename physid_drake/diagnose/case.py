@@ -63,6 +63,13 @@ class Case:
     around: Surroundings
     config: CellConfig
 
+    def louder(self, factor: float) -> Case:
+        """The case with ``factor`` times the noise."""
+        noise = self.noise.louder(factor)
+        pushes = self.recording.pushes
+        features = tuple(features_of(push, p, noise) for push, p in zip(pushes, self.problems, strict=True))
+        return dc.replace(self, noise=noise, features=features)
+
     def vectors(self, predictions: Sequence[Prediction | None], owners: Sequence[int]) -> list[Array | None]:
         """Features of predictions, each of the push ``owners`` says."""
         return [None if p is None else self.features[i].of(p) for p, i in zip(predictions, owners, strict=True)]

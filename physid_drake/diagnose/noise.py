@@ -29,6 +29,7 @@ class TrackerNoise:
         correlation_time: of first-order autoregressive noise, position and rotation (2,) [s]; 0 is white.
         jitter: standard deviation of the time stamps [s], as far as moving samples show more noise than resting ones.
         stated: whether the recording states the standard deviations, and they are believed.
+        known: whether they were stated or seen; if not, what the plain cell leaves has to serve.
         warnings: what was found to contradict the recording.
     """
 
@@ -37,12 +38,22 @@ class TrackerNoise:
     correlation_time: tuple[float, float]
     jitter: float
     stated: bool
+    known: bool = True
     warnings: tuple[str, ...] = ()
 
     @property
     def sigmas(self) -> Array:
         """Standard deviations (3,) of x, y, yaw [m, m, rad]."""
         return np.array([self.position, self.position, self.rotation])
+
+    def louder(self, factor: float) -> TrackerNoise:
+        """The same noise, ``factor`` times as large, which says so."""
+        position, rotation = factor * self.position, factor * self.rotation
+        said = (
+            f"neither stated nor seen at rest: the object's noise is taken to be what the plain cell leaves,"
+            f" {1e3 * position:.2g} mm and {math.degrees(rotation):.2g} deg"
+        )
+        return dc.replace(self, position=position, rotation=rotation, warnings=(*self.warnings, said))
 
     def correlation(self, times: Array, dof: int) -> Array:
         """Correlation matrix (n, n) of the noise of x, y (dof 0, 1) or yaw (dof 2) at times (n,)."""
@@ -74,6 +85,7 @@ def tracker_noise(recording: Recording) -> tuple[TrackerNoise, Noise]:
         correlation_time=(tau_xy, tau_yaw),
         jitter=_jitter(recording.pushes),
         stated=plain.source["position"] == "stated" and not warnings,
+        known=seen_xy is not None or plain.source["position"] != "assumed",
         warnings=tuple(warnings),
     )
     return noise, dc.replace(plain, position=position, rotation=rotation)

@@ -71,6 +71,11 @@ def gather(
     kinds = applicable(case.around, effects)
     rough = coarse(case)
     first = _first(rough, search_rng, tick, memory)
+    if not case.noise.known:
+        # Only ratios can speak then: the plain cell is taken to leave noise, and effects must leave less of it.
+        factor = float(np.sqrt(max(1.0, first.reduced_chi2)))
+        case, rough = case.louder(factor), rough.louder(factor)
+        first = Fitter(rough).linearise(first.state)
     guard, found = _looks(rough, first, kinds, tick, memory)
     allowed = tolerances(rough, found)
     fitter = Fitter(rough, guard, allowed)

@@ -54,6 +54,21 @@ def test_leaving_a_push_out_is_the_same_as_fitting_without_it():
         np.testing.assert_allclose(residuals[k], push.residual - push.shared @ others.beta, atol=1e-7)
 
 
+def test_leaving_a_half_out_is_the_same_as_fitting_to_the_other_half():
+    pushes = made(np.random.default_rng(12), beta=np.array([0.3, -0.2, 0.5]))
+    mean, std = np.zeros(3), np.array([1.0, np.inf, np.inf])
+    halves = ((0, 2, 4, 6, 8), (1, 3, 5, 7, 9))
+    scores, _ = left_out_scores(pushes, 1.0, mean, std, halves)
+    for own, other in (halves, halves[::-1]):
+        fitted = solve(Whitened.of([pushes[k] for k in other], 1.0), mean, std)
+        for k in own:
+            spread = (
+                pushes[k].covariance(1.0) + pushes[k].shared @ np.linalg.inv(fitted.precision) @ pushes[k].shared.T
+            )
+            expected = stats.multivariate_normal(pushes[k].shared @ fitted.beta, spread).logpdf(pushes[k].residual)
+            assert scores[k] == pytest.approx(expected, rel=1e-6)
+
+
 @pytest.mark.parametrize("scatter", [0.6, 1.0, 3.0])
 def test_the_scatter_of_friction_is_learnt(scatter):
     pushes = made(np.random.default_rng(3), pushes=80, scatter=scatter)

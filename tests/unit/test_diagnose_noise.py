@@ -4,7 +4,7 @@ import dataclasses as dc
 
 import numpy as np
 import pytest
-from recovery.worlds import POSITION_STD, pushes_of, recorded
+from recovery.worlds import POSITION_STD, endpoints, pushes_of, recorded
 from reference.scenes import OBJECTS, Theta
 
 from physid_drake.diagnose.features import features_of
@@ -49,6 +49,17 @@ def test_a_stated_noise_that_the_rests_contradict_is_not_believed(recording):
     noise, _ = tracker_noise(wrong)
     assert noise.position == pytest.approx(POSITION_STD, rel=0.15)
     assert "position" in noise.warnings[0]
+
+
+def test_a_noise_that_is_neither_stated_nor_seen_is_not_known(recording):
+    bare = dc.replace(recording.sensors, object_position_std=None, object_rotation_std=None)
+    ends = endpoints(dc.replace(recording, sensors=bare))
+    noise, _ = tracker_noise(ends)
+    assert not noise.known
+    louder = noise.louder(3.0)
+    assert louder.position == pytest.approx(3.0 * noise.position)
+    assert "neither stated nor seen" in louder.warnings[-1]
+    assert tracker_noise(recording)[0].known and tracker_noise(dc.replace(recording, sensors=bare))[0].known
 
 
 def test_features_of_pure_noise_have_the_covariance_that_is_written_down(recording):
