@@ -25,6 +25,7 @@ UNLIKELY = 0.05  # of the signed-rank test of held-out gains
 STUCK = 1.6  # cost per degree of freedom after which a fit is tried again from elsewhere
 PERSISTENT = 2  # candidates that are worth that
 FELL_SHORT = 0.8  # of the gain that the score test promised
+FAR_OFF = 3.0  # cost per degree of freedom from which the pushes' unknowns would imitate what is missing
 FAR = 0.3  # of theta's unit cube
 
 
@@ -118,7 +119,10 @@ def confirm(
 def _candidate(fitter: Fitter, before: Fitted, one: Score, plain: Array, *, persistent: bool) -> Candidate:
     start = start_of(fitter, one)
     state = dc.replace(before.state, effects=(*before.state.effects, start))
-    fitted = fitter.fit(state, rounds=4, like=before)
+    if before.reduced_chi2 > FAR_OFF:
+        fitted = fitter.fit(fitter.start(state.u, state.effects), rounds=7, careful=4, like=before)
+    else:
+        fitted = fitter.fit(state, rounds=4, like=before)
     promised = 0.5 * one.gain
     if persistent and fitted.reduced_chi2 > STUCK and fitted.score - before.score < FELL_SHORT * promised:
         # Far from the plain cell its derivatives mislead: from the score test's theta, with derivatives taken there.

@@ -391,7 +391,9 @@ class Fitter:
         u = np.clip(state.u + np.clip(beta[:d], -MOST_THETA_MOVE, MOST_THETA_MOVE), 1e-3, 1.0 - 1e-3)
         effects, at = [], d
         for e in state.effects:
-            effects.append(e.moved(self.case, beta[at : at + len(e.free)]))
+            # Coordinates of shape (a place, a speed) go no further in a step than their prior says they are unsure.
+            longest = np.array([e.chart(self.case)[j].std for j in e.free])
+            effects.append(e.moved(self.case, np.clip(beta[at : at + len(e.free)], -longest, longest)))
             at += len(e.free)
         own = []
         for push, old in zip(fitted.pushes, state.own, strict=True):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from physid_drake.cell import CellConfig
 from physid_drake.diagnose.case import Case
+from physid_drake.diagnose.confirm import FAR_OFF
 from physid_drake.diagnose.fit import Fitted, Fitter, State
 from physid_drake.identify.problem import spec_of
 from physid_drake.identify.rollouts import RolloutPool
@@ -21,7 +22,6 @@ Tick = Callable[[str, int, int], None]
 CANDIDATES = 300
 BUDGET = 24
 CAREFUL = 3  # rounds
-FAR_OFF = 3.0  # cost per degree of freedom
 SOME_PUSHES = 6  # the search needs a start, not an answer
 
 

@@ -226,7 +226,7 @@ def screen(fitted: Fitted, found: Sequence[Signature], rng: np.random.Generator)
     for signature in found:
         one = score(fitted, signature)
         name = signature.kind.name
-        if name not in best or one.log_p < best[name].log_p:
+        if name not in best or (one.log_p, -one.gain) < (best[name].log_p, -best[name].gain):
             best[name] = one
     scores = tuple(sorted(best.values(), key=lambda s: (s.log_p, -s.gain)))
     null = _null_draws(fitted, found, rng)
