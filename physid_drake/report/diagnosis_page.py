@@ -51,7 +51,12 @@ MOST_ERRORS, MOST_STRIPS, MOST_RANKED = 4, 8, 8  # shown before the reader asks 
 
 
 def diagnosis_page(
-    diagnosis: Diagnosis, recording: Recording, shown: Sequence[ShownPush], wrenches: Sequence[MissingWrench]
+    diagnosis: Diagnosis,
+    recording: Recording,
+    shown: Sequence[ShownPush],
+    wrenches: Sequence[MissingWrench],
+    *,
+    scene: str | None = None,
 ) -> str:
     """The page as HTML; the same arguments give the same bytes.
 
@@ -60,6 +65,7 @@ def diagnosis_page(
         recording: what it was made from.
         shown: its pushes, in the recording's order.
         wrenches: what is missing from the plain cell, window by window.
+        scene: name of the file with the pushes in Meshcat, if it lies beside the page.
     """
     friction = diagnosis.theta.get("support_friction")
     view = TableView(
@@ -69,7 +75,7 @@ def diagnosis_page(
         friction=None if friction is None else _told(friction),
     )
     with drawn():
-        content = _content(diagnosis, recording, view)
+        content = {"scene": scene, **_content(diagnosis, recording, view)}
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["degrees"] = lambda angle: fixed(math.degrees(angle))
     environment.filters.update(number=number, fixed=fixed, quantity=quantity, chance=chance, tiny=tiny)
@@ -98,6 +104,7 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "left_out": len({w.push for w in view.wrenches}) - len(strips),
         "fits": _fits(diagnosis),
         "bars": _bars(diagnosis),
+        "regimes": _regimes(diagnosis),
         "ranking": _ranking(diagnosis)[:MOST_RANKED],
         "more_ranking": _ranking(diagnosis)[MOST_RANKED:],
         "theta": [_theta_row(name, t) for name, t in diagnosis.theta.items()],
@@ -180,6 +187,13 @@ def _bars(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             ],
         }
         for name, before, after in rows
+    ]
+
+
+def _regimes(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
+    """What was fitted to, what was tested on, and the gain."""
+    return [
+        (r.fitted_on, r.tested_on, f"{tenths(r.gain)} ± {tenths(r.standard_error)}") for r in diagnosis.fit.regimes
     ]
 
 
