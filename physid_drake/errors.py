@@ -23,3 +23,7 @@ class CellError(PhysidError, ValueError):
 
 class OutputError(PhysidError, OSError):
     """A folder or file of results cannot be written."""
+
+
+class ProofError(PhysidError, RuntimeError):
+    """The proof cannot run: something it needs is missing, or a folder is not as it left it."""

@@ -156,9 +156,9 @@ def write(
     """
     folder.write("diagnosis.json", diagnosis_json(diagnosis))
     pushes = shown_pushes(diagnosis, evidence)
-    folder.write(page, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches))
+    folder.write(page, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches, scene=scene))
     folder.write("model.yaml", model_of(diagnosis, evidence).dump())
-    folder.write("scene.html", staged(evidence).StaticHtml())
+    folder.write(scene, staged(evidence).StaticHtml())
 
 
 def staged(evidence: Evidence, meshcat: Meshcat | None = None) -> Meshcat:

@@ -18,11 +18,10 @@ from types import FrameType
 
 from rich.console import Console
 
-from physid_drake.errors import ConfigError, OutputError
+from physid_drake.errors import ConfigError, OutputError, ProofError
 from physid_drake.prove.diagnosing import RESULT, Attempt, Task, attempt_of, diagnose_all, diagnose_command
 from physid_drake.prove.figures import figures_of
 from physid_drake.prove.make import world_id
-from physid_drake.prove.mujoco_world import ProofError
 from physid_drake.prove.score import read_outcomes
 from physid_drake.prove.seal import SEALED, check_seal, shut, unlock
 from physid_drake.report.progress import progress_bar

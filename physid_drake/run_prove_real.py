@@ -14,9 +14,9 @@ from physid_drake.errors import ConfigError, OutputError, PhysidError
 from physid_drake.identify.problem import PushProblem, noise_of, problems_of
 from physid_drake.model import ModelCell, load_model
 from physid_drake.prove.diagnosing import RESULT, Task, diagnose_command
-from physid_drake.prove.mujoco_world import height_of
 from physid_drake.prove.real import RealCase, chosen_cases, prepare
 from physid_drake.prove.real_score import FRESH_ERRORS, RealOutcome, real_outcome
+from physid_drake.prove.shapes import height_of
 from physid_drake.recording import MeshShape, read_recording
 from physid_drake.report.proof_pictures import drawn
 from physid_drake.report.real import pressure_picture, real_json, real_markdown, real_table

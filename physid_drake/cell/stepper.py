@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,37 +21,23 @@ from physid_drake.cell.forces import (
     total_wrenches,
 )
 from physid_drake.cell.hand_path import HandPath
-from physid_drake.cell.impact import routh_impulse
 from physid_drake.cell.motion import Log, Motion, Outcome, Start, planar_pose
 from physid_drake.cell.setters import Body
+from physid_drake.cell.touch import Planar, Tip, Touch, blow
 
 Array = NDArray[np.float64]
 
 REST_SPEED = 2e-4  # m/s of any point: Drake's regularised friction lets a stopped object creep below this
 NEAR = 3  # ticks: the hand is near when it could arrive within so many
 SMALLEST_STEP = 1e-7  # s
-GENTLE = 1e-3  # m/s: below this closing speed a touch needs no impact law
 SURELY_HELD = 0.5  # of the friction: a resting object under less does not slide
 FALLEN = 0.05  # m below the table top: it does not come back
 PARKED = (0.0, 0.0, 10.0)  # m: a hand that takes no part
 FASTEST = 50.0  # m/s: beyond it a rollout has diverged
 
 
-class _Touch(NamedTuple):
-    """Object and hand at one time: the section's pose and twist, gap, normal, lever from Bo, the gap's rate."""
-
-    pose: tuple[float, float, float]
-    twist: tuple[float, float, float]
-    gap: float
-    nx: float
-    ny: float
-    rx: float
-    ry: float
-    rate: float
-
-
 class Stepper:
-    """Steps one scene. It owns no physics but the touch: gaps, impacts and the hand's overwriting."""
+    """Steps one scene: stops at touches, applies impacts and the laws' forces, and overwrites the hand."""
 
     def __init__(
         self,
@@ -66,7 +51,7 @@ class Stepper:
         """Prepare to step ``scene``; ``tilt_depth`` is the rest depth [m] of a hydroelastic support, else None."""
         self._scene, self._simulator, self._solver = scene, simulator, solver
         self._tilt_gain = 0.0 if tilt_depth is None else 1.0 / tilt_depth
-        self._radius = hand_radius or 0.0
+        self._tip = Tip(scene.solid.outline, hand_radius or 0.0)
         plant = scene.plant
         self._root = simulator.get_mutable_context()
         self._context = plant.GetMyMutableContextFromRoot(self._root)
@@ -140,16 +125,12 @@ class Stepper:
 
     # The object's planar state, as plain floats.
 
-    def _pose(self) -> tuple[float, float, float]:
-        w, x, y, z, px, py = self._x[self._q : self._q + 6].tolist()
-        return planar_pose(w, x, y, z, px, py)
-
-    def _twist(self) -> tuple[float, float, float]:
+    def _twist(self) -> Planar:
         """Planar velocity vx, vy, wz of Bo in W."""
         v = self._v
         return float(self._x[v + 3]), float(self._x[v + 4]), float(self._x[v + 2])
 
-    def _section(self) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    def _section(self) -> tuple[Planar, Planar]:
         """Pose and twist of the object's section at the tip's height.
 
         A can that leans by 1 mrad has moved there by more than the contact is deep.
@@ -192,7 +173,7 @@ class Stepper:
     def _clear_of_hand(self, px: float, py: float, yaw: float) -> tuple[float, float]:
         """An object recorded a hair inside the hand starts touching it, or the contact would fling it."""
         assert self._hand is not None
-        gap, nx, ny = self._gap_at(px, py, yaw, *self._hand[0])
+        gap, nx, ny = self._tip.gap(px, py, yaw, *self._hand[0])
         overlap = max(0.0, -gap)
         return px + overlap * nx, py + overlap * ny
 
@@ -202,40 +183,18 @@ class Stepper:
     def _record(self, time: float, force: tuple[float, float, float]) -> None:
         self._log.add(self._begin + time, self._x[self._q : self._q + 7].copy(), force)
 
-    # The touch.
-
-    def _gap_at(self, px: float, py: float, yaw: float, hx: float, hy: float) -> tuple[float, float, float]:
-        """Gap [m] between tip and outline, and the unit normal in W from the hand into the object."""
-        c, s = math.cos(yaw), math.sin(yaw)
-        dx, dy = hx - px, hy - py
-        distance, nx, ny = self._scene.solid.outline.nearest(c * dx + s * dy, c * dy - s * dx)
-        return distance - self._radius, -(c * nx - s * ny), -(s * nx + c * ny)
-
-    def _closing(
-        self,
-        pose: tuple[float, float, float],
-        twist: tuple[float, float, float],
-        hand: list[float],
-        velocity: tuple[float, float],
-    ) -> tuple[float, float, float, float, float, float]:
-        """Gap, normal, lever of the contact point from Bo, and the gap's rate [m/s]."""
-        gap, nx, ny = self._gap_at(*pose, *hand)
-        rx = hand[0] + (self._radius + gap) * nx - pose[0]
-        ry = hand[1] + (self._radius + gap) * ny - pose[1]
-        vx, vy, wz = twist
-        rate = nx * (vx - wz * ry - velocity[0]) + ny * (vy + wz * rx - velocity[1])
-        return gap, nx, ny, rx, ry, rate
-
-    def _touch(self, hand: list[float], velocity: tuple[float, float]) -> _Touch:
+    def _touch(self, hand: list[float], velocity: tuple[float, float]) -> Touch:
         """The touch as it is now."""
         pose, twist = self._section()
-        return _Touch(pose, twist, *self._closing(pose, twist, hand, velocity))
+        return self._tip.touch(pose, twist, hand, velocity)
+
+    # Ticks.
 
     def _resting(self, k: int) -> bool:
         vx, vy, wz = self._twist()
         if math.hypot(vx, vy) + abs(wz) * 0.05 > REST_SPEED or self._scene.solid.rolling_radius is not None:
             return False
-        if self._hand is not None and self._gap_at(*self._section()[0], *self._hand[k])[0] <= 1e-6:
+        if self._hand is not None and self._tip.gap(*self._section()[0], *self._hand[k])[0] <= 1e-6:
             return False
         return self._holds(k * self._solver.time_step_s)
 
@@ -246,7 +205,7 @@ class Stepper:
         if self._hand is not None:
             m = (
                 next(
-                    (i for i in range(k + 1, count + 1) if self._gap_at(*pose, *self._hand[i])[0] <= 0.0),
+                    (i for i in range(k + 1, count + 1) if self._tip.gap(*pose, *self._hand[i])[0] <= 0.0),
                     count + 1,
                 )
                 - 1
@@ -289,10 +248,10 @@ class Stepper:
         self._cross(k * dt, m * dt, self._hand[k], self._hand[m], velocity, touch)
         return m
 
-    def _far(self, k: int, count: int, pose: tuple[float, float, float]) -> bool:
+    def _far(self, k: int, count: int, pose: Planar) -> bool:
         ahead = min(k + NEAR * self._slide_ticks, count)
         assert self._hand is not None
-        return self._gap_at(*pose, *self._hand[ahead])[0] > 0.0
+        return self._tip.gap(*pose, *self._hand[ahead])[0] > 0.0
 
     @staticmethod
     def _hand_velocity(start: list[float], end: list[float], span: float) -> tuple[float, float]:
@@ -305,16 +264,16 @@ class Stepper:
         start: list[float],
         goal: list[float],
         velocity: tuple[float, float],
-        touch: _Touch,
+        touch: Touch,
     ) -> None:
         """Advance over one tick, stopping at a touch to apply the impact law."""
         time, hand = begin, start
-        seen: _Touch | None = touch  # valid until the object or the hand has moved
+        seen: Touch | None = touch  # valid until the object or the hand has moved
         for _ in range(3):
             if not self._solver.impact_law:
                 break
             seen = seen or self._touch(hand, velocity)
-            until = self._time_to_touch(seen, hand, velocity, end - time)
+            until = self._tip.time_to_touch(seen, hand, velocity, end - time)
             if until is None:
                 break
             if not self._discrete and until > SMALLEST_STEP:
@@ -328,44 +287,6 @@ class Stepper:
                 return
         self._step(end, time, (hand, goal, velocity), seen)
 
-    def _time_to_touch(
-        self, touch: _Touch, hand: list[float], velocity: tuple[float, float], span: float
-    ) -> float | None:
-        """When within ``span`` the gap closes faster than gently, or None."""
-        pose, twist, gap = touch.pose, touch.twist, touch.gap
-        if gap <= 0.0:
-            # Already touching: only a blow is an impact (the object swung into a moving face).
-            return 0.0 if touch.rate < -GENTLE and gap > -1e-8 else None
-        low, low_gap = 0.0, gap
-        high, high_gap = span, self._gap_after(pose, twist, hand, velocity, span)
-        if high_gap > 0.0:
-            return None
-        for _ in range(30):
-            middle = low + (high - low) * min(max(low_gap / (low_gap - high_gap), 0.01), 0.99)
-            middle_gap = self._gap_after(pose, twist, hand, velocity, middle)
-            if middle_gap > 0.0:
-                low, low_gap = middle, middle_gap
-            else:
-                high, high_gap = middle, middle_gap
-            if high - low < 1e-9 or low_gap < 1e-10:
-                break
-        later = (pose[0] + low * twist[0], pose[1] + low * twist[1], pose[2] + low * twist[2])
-        reached = [hand[0] + low * velocity[0], hand[1] + low * velocity[1]]
-        return low if self._closing(later, twist, reached, velocity)[-1] < -GENTLE else None
-
-    def _gap_after(
-        self,
-        pose: tuple[float, float, float],
-        twist: tuple[float, float, float],
-        hand: list[float],
-        velocity: tuple[float, float],
-        span: float,
-    ) -> float:
-        return self._gap_at(
-            pose[0] + span * twist[0], pose[1] + span * twist[1], pose[2] + span * twist[2],
-            hand[0] + span * velocity[0], hand[1] + span * velocity[1],
-        )[0]  # fmt: skip
-
     def _strike(self, hand: list[float], velocity: tuple[float, float], until: float) -> None:
         """Apply Routh's impact to the object's velocity.
 
@@ -374,25 +295,13 @@ class Stepper:
             velocity: of the tip [m/s].
             until: for discrete schemes, which cannot stop inside a step: time to the touch [s].
         """
-        body = self._body
-        (px, py, yaw), (vx, vy, wz) = self._section()
-        _, nx, ny, rx, ry, rate = self._closing((px, py, yaw), (vx, vy, wz), hand, velocity)
-        c, s = math.cos(yaw), math.sin(yaw)
-        cx, cy = float(body.p_BBcm[0]), float(body.p_BBcm[1])
-        mx, my = rx - (c * cx - s * cy), ry - (s * cx + c * cy)  # contact point from Bcm
-        slip = -ny * (vx - wz * ry - velocity[0]) + nx * (vy + wz * rx - velocity[1])
-        impulse = routh_impulse(
-            lever_n=mx * nx + my * ny, lever_t=-mx * ny + my * nx, approach=rate, slip=slip, mass=body.mass,
-            inertia=self._inertia, friction=body.hand_friction, restitution=body.restitution,
-        )  # fmt: skip
-        jx = impulse.normal * nx - impulse.tangent * ny
-        jy = impulse.normal * ny + impulse.tangent * nx
-        gain = self._kick(yaw, jx, jy, mx * jy - my * jx)
+        touch = self._touch(hand, velocity)
+        gain = self._kick(touch.pose[2], *blow(touch, velocity, self._body, self._inertia))
         if until > 0.0:
             self._shift(-until * gain[0], -until * gain[1], -until * gain[2])
         self._drift = 0.0
 
-    def _kick(self, yaw: float, jx: float, jy: float, spin: float) -> tuple[float, float, float]:
+    def _kick(self, yaw: float, jx: float, jy: float, spin: float) -> Planar:
         """Give the object a planar impulse [N s] at Bcm and an angular one [N m s]; returns Bo's gain in velocity."""
         body = self._body
         c, s = math.cos(yaw), math.sin(yaw)
@@ -414,12 +323,12 @@ class Stepper:
         for wrench in self._wrenches(state):
             self._kick(state.yaw, span * wrench.fx, span * wrench.fy, span * wrench.torque)
             if wrench.at_table:
-                self._tip(state.yaw, span * wrench.fx, span * wrench.fy)
+                self._rock(state.yaw, span * wrench.fx, span * wrench.fy)
 
     def _wrenches(self, state: ObjectState) -> list[Wrench]:
         return total_wrenches(state, self._laws, self._frictions)
 
-    def _tip(self, yaw: float, jx: float, jy: float) -> None:
+    def _rock(self, yaw: float, jx: float, jy: float) -> None:
         """The pitch and roll that a horizontal impulse at the table gives, half the height below Bcm."""
         arm = -0.5 * self._scene.solid.height
         scale = self._body.mass * self._body.inertia_ratio
@@ -471,7 +380,7 @@ class Stepper:
         end: float,
         begin: float,
         move: tuple[list[float], list[float], tuple[float, float]] | None,
-        seen: _Touch | None,
+        seen: Touch | None,
     ) -> None:
         """Let Drake advance from ``begin`` to ``end``.
 
@@ -524,9 +433,7 @@ class Stepper:
             self._learn_drift(before, move, span)
         self._record(end, force)
 
-    def _without_tilt_friction(
-        self, before: tuple[float, float, float], after: tuple[float, float, float], span: float
-    ) -> tuple[float, float, float]:
+    def _without_tilt_friction(self, before: Planar, after: Planar, span: float) -> Planar:
         """Take back the friction that a tilted rigid face on a compliant table feels too much of.
 
         A face that leans by n and slides at v is predicted to lift by v n dt in a step, as if the table were
@@ -552,7 +459,7 @@ class Stepper:
 
     def _learn_drift(
         self,
-        before: _Touch,
+        before: Touch,
         move: tuple[list[float], list[float], tuple[float, float]],
         span: float,
     ) -> None:
@@ -563,5 +470,5 @@ class Stepper:
         pose, after = self._section()
         nx, ny, rx, ry = before.nx, before.ny, before.rx, before.ry
         rate = nx * (after[0] - after[2] * ry - velocity[0]) + ny * (after[1] + after[2] * rx - velocity[1])
-        now, *_ = self._gap_at(*pose, *goal)
+        now, *_ = self._tip.gap(*pose, *goal)
         self._drift = now - (before.gap + span * rate)

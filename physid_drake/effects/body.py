@@ -149,13 +149,9 @@ class RotationalInertia(Effect):
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """Log ratio."""
         del around
-        return (Coordinate(name="log_ratio", step=0.05, lower=math.log(0.1), upper=math.log(5.0), tolerance=0.01),)
-
-    @classmethod
-    def at(cls, point: Array, around: Surroundings) -> RotationalInertia:
-        """From the log ratio."""
-        del around
-        return cls(ratio=math.exp(point[0]))
+        return (
+            Coordinate(name="ratio", log=True, step=0.05, lower=math.log(0.1), upper=math.log(5.0), tolerance=0.01),
+        )
 
     def body(self, body: Body, facts: PushFacts) -> Body:
         """The body with its inertia scaled."""
@@ -214,17 +210,10 @@ class SizeError(Effect):
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """Log ratio."""
+        most = math.log(2.0)
         return (
-            Coordinate(
-                name="log_ratio", step=0.006, lower=math.log(0.5), upper=math.log(2.0), tolerance=1e-4 / around.radius
-            ),
+            Coordinate(name="ratio", log=True, step=0.006, lower=-most, upper=most, tolerance=1e-4 / around.radius),
         )
-
-    @classmethod
-    def at(cls, point: Array, around: Surroundings) -> SizeError:
-        """From the log ratio."""
-        del around
-        return cls(ratio=math.exp(point[0]))
 
     def reshaped(self, shape: Shape) -> Shape:
         """The shape, scaled."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses as dc
+import math
 from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
@@ -72,7 +73,8 @@ class Coordinate:
     """One coordinate of an effect's chart.
 
     Attributes:
-        name: of the coordinate.
+        name: of the coordinate; where the chart's are the effect's parameters, of the parameter.
+        log: whether it is the logarithm of the parameter.
         step: for differences: moves an object by about a millimetre.
         lower, upper: bounds.
         std: prior standard deviation about the chart point where a fit starts; inf where nothing is known.
@@ -81,11 +83,16 @@ class Coordinate:
     """
 
     name: str
+    log: bool = False
     step: float
     lower: float = -np.inf
     upper: float = np.inf
     std: float = np.inf
     tolerance: float = 0.0
+
+    def parameter_at(self, value: float) -> float:
+        """The parameter at a value of the coordinate."""
+        return math.exp(value) if self.log else float(value)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -194,9 +201,8 @@ class Effect:
 
     @classmethod
     def at(cls, point: Array, around: Surroundings) -> Self:
-        """The effect at a chart point (k,); the default takes the coordinates for the parameters."""
-        names = [c.name for c in cls.chart(around)]
-        return cls(**{name: float(value) for name, value in zip(names, point, strict=True)})
+        """The effect at a chart point (k,); the default takes the coordinates for the parameters or their logs."""
+        return cls(**{c.name: c.parameter_at(value) for c, value in zip(cls.chart(around), point, strict=True)})
 
     # Seams.
 

@@ -216,7 +216,7 @@ class Magnet(Effect):
             Coordinate(name="strength", step=1.0 * around.slight * spacing**2, lower=0.0),
             Coordinate(name="x", step=0.05 * spacing, std=spacing),
             Coordinate(name="y", step=0.05 * spacing, std=spacing),
-            Coordinate(name="log_core", step=0.1, lower=math.log(0.002), upper=math.log(0.3), std=0.7),
+            Coordinate(name="core", log=True, step=0.1, lower=math.log(0.002), upper=math.log(0.3), std=0.7),
         )
 
     @classmethod
@@ -224,12 +224,6 @@ class Magnet(Effect):
         """A grid of places."""
         places, _ = grid_of_places(around)
         return tuple(Family(point=(0.0, float(x), float(y), math.log(0.03)), free=(0,)) for x, y in places)
-
-    @classmethod
-    def at(cls, point: Array, around: Surroundings) -> Magnet:
-        """From strength, place and log core."""
-        del around
-        return cls(strength=float(point[0]), x=float(point[1]), y=float(point[2]), core=math.exp(point[3]))
 
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
         """The attraction."""
@@ -275,8 +269,8 @@ class Sloshing(Effect):
         del around
         return (
             Coordinate(name="fraction", step=0.02, lower=0.0, upper=0.8),
-            Coordinate(name="log_frequency", step=0.02, lower=math.log(0.3), upper=math.log(40.0), std=0.7),
-            Coordinate(name="log_damping", step=0.2, lower=math.log(1e-3), upper=math.log(2.0), std=1.0),
+            Coordinate(name="frequency", log=True, step=0.02, lower=math.log(0.3), upper=math.log(40.0), std=0.7),
+            Coordinate(name="damping", log=True, step=0.2, lower=math.log(1e-3), upper=math.log(2.0), std=1.0),
         )
 
     @classmethod
@@ -287,12 +281,6 @@ class Sloshing(Effect):
             Family(point=(0.0, math.log(frequency), math.log(0.05)), free=(0,), size=3.0)
             for frequency in (1.5, 3.0, 5.0, 9.0)
         )
-
-    @classmethod
-    def at(cls, point: Array, around: Surroundings) -> Sloshing:
-        """From fraction and logs."""
-        del around
-        return cls(fraction=float(point[0]), frequency=math.exp(point[1]), damping=math.exp(point[2]))
 
     def body(self, body: Body, facts: PushFacts) -> Body:
         """The rigid rest: lighter, with the friction and the inertia of the whole."""

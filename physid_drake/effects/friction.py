@@ -79,7 +79,7 @@ class StribeckFriction(Effect):
         del around
         return (
             Coordinate(name="excess", step=2.0 * SLIGHT_SHARE, lower=0.0, upper=3.0),
-            Coordinate(name="log_speed", step=0.05, lower=math.log(2e-3), upper=math.log(1.0), std=1.0),
+            Coordinate(name="speed", log=True, step=0.05, lower=math.log(2e-3), upper=math.log(1.0), std=1.0),
         )
 
     @classmethod
@@ -87,12 +87,6 @@ class StribeckFriction(Effect):
         """A few speeds below the object's top speed."""
         speeds = [v for v in (0.01, 0.03, 0.07, 0.15, 0.3) if v < around.top_speed] or [0.3 * around.top_speed]
         return tuple(Family(point=(0.0, math.log(v)), free=(0,)) for v in speeds)
-
-    @classmethod
-    def at(cls, point: Array, around: Surroundings) -> StribeckFriction:
-        """From excess and log speed."""
-        del around
-        return cls(excess=float(point[0]), speed=math.exp(point[1]))
 
     def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:
         """The law."""
@@ -215,10 +209,10 @@ class FrictionPatch(Effect):
         """Log ratio, place, log radius."""
         _, spacing = grid_of_places(around)
         return (
-            Coordinate(name="log_ratio", step=0.04, lower=-2.0, upper=2.0),
+            Coordinate(name="ratio", log=True, step=0.04, lower=-2.0, upper=2.0),
             Coordinate(name="x", step=0.05 * spacing, std=spacing),
             Coordinate(name="y", step=0.05 * spacing, std=spacing),
-            Coordinate(name="log_radius", step=0.05, lower=math.log(0.005), upper=math.log(1.0), std=0.5),
+            Coordinate(name="radius", log=True, step=0.05, lower=math.log(0.005), upper=math.log(1.0), std=0.5),
         )
 
     @classmethod
@@ -226,12 +220,6 @@ class FrictionPatch(Effect):
         """A grid of places, with a radius that covers the gaps between them."""
         places, spacing = grid_of_places(around)
         return tuple(Family(point=(0.0, float(x), float(y), math.log(0.6 * spacing)), free=(0,)) for x, y in places)
-
-    @classmethod
-    def at(cls, point: Array, around: Surroundings) -> FrictionPatch:
-        """From log ratio, place and log radius."""
-        del around
-        return cls(ratio=math.exp(point[0]), x=float(point[1]), y=float(point[2]), radius=math.exp(point[3]))
 
     def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:
         """The law."""

@@ -94,13 +94,7 @@ class TrackerScale(Effect):
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """Log ratio."""
         del around
-        return (Coordinate(name="log_ratio", step=3e-3, lower=math.log(0.7), upper=math.log(1.4)),)
-
-    @classmethod
-    def at(cls, point: Array, around: Surroundings) -> TrackerScale:
-        """From the log ratio."""
-        del around
-        return cls(ratio=math.exp(point[0]))
+        return (Coordinate(name="ratio", log=True, step=3e-3, lower=math.log(0.7), upper=math.log(1.4)),)
 
     def true_pose(self, pose: Pose) -> Pose:
         """The object's pose for a tracked one."""

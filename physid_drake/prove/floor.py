@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from physid_drake.prove.mujoco_world import Array
+from physid_drake.prove.shapes import Array
 from physid_drake.recording import Push
 
 WINDOWS = 14

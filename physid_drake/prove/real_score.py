@@ -13,8 +13,8 @@ from typing import Any, Final
 import numpy as np
 
 from physid_drake.prove.diagnosing import RESULT, attempt_of
-from physid_drake.prove.mujoco_world import Array
 from physid_drake.prove.real import RealCase
+from physid_drake.prove.shapes import Array
 from physid_drake.recording import read_recording
 
 FRESH_ERRORS: Final = "fresh.json"

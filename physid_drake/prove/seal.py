@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from physid_drake.prove.mujoco_world import ProofError
+from physid_drake.errors import ProofError
 
 SEALED: Final = "sealed"
 LINES: Final = "seal.txt"

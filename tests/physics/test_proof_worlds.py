@@ -13,21 +13,15 @@ pytest.importorskip("mujoco")
 
 from reference import planar
 
+from physid_drake.errors import ProofError
 from physid_drake.prove import make, mujoco_world
-from physid_drake.prove import world_effects as fx
 from physid_drake.prove.drawing import draw_knob, draw_scene
-from physid_drake.prove.mujoco_world import (
-    GRAVITY,
-    HandPath,
-    Plan,
-    PushWorld,
-    feet_of,
-    gyration_squared,
-    height_of,
-    outline_of,
-    plan_moments,
-    weighted_feet,
-)
+from physid_drake.prove.effects import catalogue as fx
+from physid_drake.prove.effects.effect import parameters_of
+from physid_drake.prove.feet import feet_of, weighted_feet
+from physid_drake.prove.mujoco_world import PushWorld
+from physid_drake.prove.shapes import distance_outside, gyration_squared, height_of, outline_of, plan_moments
+from physid_drake.prove.world_plan import GRAVITY, HandPath, Plan
 from physid_drake.recording import Box, Cylinder, Prism, read_recording
 
 MASS, MU = 0.2, 0.3
@@ -96,7 +90,7 @@ def test_feet_have_the_moments_of_the_underside(shape):
     np.testing.assert_allclose(weights @ feet, 0, atol=1e-9)
     assert weights @ (feet**2).sum(axis=1) == pytest.approx(moments[:2].sum(), rel=1e-9)
     np.testing.assert_allclose(weights @ feet**2, moments[:2], rtol=0.02)
-    assert mujoco_world.distance_outside(shape, feet).max() < 0
+    assert distance_outside(shape, feet).max() < 0
 
 
 def spin_angle(shape, spin, arm):
@@ -354,9 +348,9 @@ def test_a_larger_object_is_touched_earlier():
 
 def test_the_package_shares_nothing_with_the_diagnosis():
     forbidden = {"effects", "cell", "identify", "diagnose"}
-    for file in Path(mujoco_world.__file__).parent.glob("*.py"):
-        if file.stem not in ("make", "drawing", "mujoco_world", "world_effects", "__init__"):
-            continue
+    folder = Path(mujoco_world.__file__).parent
+    worlds = ("make", "drawing", "shapes", "feet", "world_plan", "contact", "mujoco_xml", "mujoco_world")
+    for file in [*(folder / f"{name}.py" for name in worlds), *(folder / "effects").glob("*.py")]:
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
@@ -371,7 +365,7 @@ def test_missing_mujoco_says_what_to_install(monkeypatch):
         raise ImportError(name)
 
     monkeypatch.setattr(mujoco_world.importlib, "import_module", missing)
-    with pytest.raises(mujoco_world.ProofError, match=r"pip install 'physid_drake\[proof\]'"):
+    with pytest.raises(ProofError, match=r"pip install 'physid_drake\[proof\]'"):
         PushWorld(PLAN)
 
 
@@ -421,5 +415,5 @@ def test_a_world_is_made_again_bit_for_bit_and_tells_nothing(tmp_path, short_sce
 
 def test_parameters_are_plain_numbers():
     for effect in (fx.CATALOGUED | fx.OTHERS).values():
-        written = json.loads(json.dumps(fx.parameters_of(effect())))
+        written = json.loads(json.dumps(parameters_of(effect())))
         assert set(written) == {field.name for field in fields(effect)}

@@ -18,6 +18,7 @@ from physid_drake.diagnose.values import (
     NextPush,
     ParameterEstimate,
     Ranked,
+    RegimeGain,
     ThetaEstimate,
     Window,
 )
@@ -225,6 +226,32 @@ def test_what_is_not_a_number_is_a_dash(page):
     cells = [re.sub(r"<.*?>", "", row) for row in re.findall(r"<tr>(.*?)</tr>", page, flags=re.S)]
     weights = next(c for c in cells if "uneven_support" in c)
     assert "–" in weights and "∞" in weights and not re.search(r"\b(nan|inf)\b", " ".join(Tags(page).words))
+
+
+def test_gains_across_regimes_are_shown_where_there_are_any(page):
+    gains = (
+        RegimeGain(fitted_on="slow", tested_on="fast <i>", gain=-12.34, standard_error=3.0),
+        RegimeGain(fitted_on="one heading", tested_on="the other", gain=5.0, standard_error=math.nan),
+    )
+    d = diagnosis_with()
+    tags = Tags(
+        diagnosis_page(dc.replace(d, fit=dc.replace(d.fit, regimes=gains)), recording_of(), shown_pushes(), ())
+    )
+    assert not tags.open and {"slow", "fast <i>", "−12.3 ± 3.0", "one heading", "the other", "5.0 ± –"} <= set(
+        tags.words
+    )
+    fit, ranking = (
+        tags.words.index(h) for h in ("How well pushes are predicted that were left out", "Why the others lose")
+    )
+    assert fit < tags.words.index("gain in log density") < ranking
+    assert "gain in log density" not in page
+
+
+def test_a_scene_beside_the_page_is_linked(page):
+    linked = diagnosis_page(diagnosis_with(), recording_of(), shown_pushes(), WRENCHES, scene="scene.html")
+    assert linked.count('<a href="scene.html">') == 1 and not Tags(linked).open
+    assert linked.index("Where it is") < linked.index("scene.html") < linked.index("What is missing over time")
+    assert "<a" not in page
 
 
 def test_every_law_is_drawn():

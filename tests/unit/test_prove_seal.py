@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from physid_drake.prove.mujoco_world import ProofError
+from physid_drake.errors import ProofError
 from physid_drake.prove.seal import check_seal, seal_of, shut, unlock, write_seal
 from physid_drake.resources import shipped
 

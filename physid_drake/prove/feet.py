@@ -1,0 +1,78 @@
+"""Feet under an object: points that carry it, with the moments of its underside and the pressure asked for."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from physid_drake.prove.shapes import Array, Solid, gyration_squared, outline_of
+from physid_drake.prove.world_plan import Plan
+from physid_drake.recording import Box, Cylinder, Prism
+
+
+def weighted_feet(plan: Plan) -> tuple[Array, Array]:
+    """Places (n, 2) in B [m] and stiffness shares (n,) of the feet; those without weight are left out."""
+    feet, weights = feet_of(plan.shape)
+    if plan.pressure is None:
+        return feet, weights
+    grid = np.array(plan.pressure)
+    if isinstance(plan.shape, Cylinder):
+        low, high = np.outer([-1.0, 1.0], [plan.shape.radius] * 2)
+    else:
+        corners = outline_of(plan.shape)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+    cells = np.clip(((feet - low) / (high - low) * grid.shape).astype(int), 0, np.array(grid.shape) - 1)
+    weights = weights * grid[cells[:, 0], cells[:, 1]]
+    keep = weights > 1e-6 * weights.max()
+    return feet[keep], weights[keep] / weights[keep].sum()
+
+
+def feet_of(shape: Solid) -> tuple[Array, Array]:
+    """Places (n, 2) in B [m] and shares (n,) of a uniform pressure; their second moments are the underside's."""
+    if isinstance(shape, Box):
+        return _grid_feet(shape)
+    if isinstance(shape, Cylinder):
+        return _ring_feet(shape.radius)
+    return _triangle_feet(shape)
+
+
+def _grid_feet(shape: Box) -> tuple[Array, Array]:
+    long_side = shape.size[0] / shape.size[1]
+    nx = min(15, max(5, round(math.sqrt(80.0 * long_side))))
+    ny = max(5, math.ceil(72 / nx))
+    # Middles of cells have 1 - 1/n^2 of the second moment; spreading them out restores it.
+    x, y = (
+        ((np.arange(n) + 0.5) / n - 0.5) * side / math.sqrt(1.0 - 1.0 / n**2)
+        for n, side in ((nx, shape.size[0]), (ny, shape.size[1]))
+    )
+    grid = np.meshgrid(x, y, indexing="ij")
+    return np.column_stack([axis.ravel() for axis in grid]), np.full(nx * ny, 1.0 / (nx * ny))
+
+
+def _ring_feet(radius: float, rings: int = 4) -> tuple[Array, Array]:
+    counts = 6 * np.arange(1, rings + 1)
+    edges = np.sqrt(np.concatenate([[0], np.cumsum(counts)]) / counts.sum()) * radius
+    places = []
+    for ring, count in enumerate(counts.tolist()):
+        middle = math.sqrt((edges[ring] ** 2 + edges[ring + 1] ** 2) / 2.0)
+        angles = 2.0 * math.pi * (np.arange(count) + 0.5 * (ring % 2)) / count
+        places.append(middle * np.column_stack([np.cos(angles), np.sin(angles)]))
+    return np.concatenate(places), np.full(counts.sum(), 1.0 / counts.sum())
+
+
+def _triangle_feet(shape: Prism) -> tuple[Array, Array]:
+    corners = outline_of(shape)
+    parts = math.ceil(math.sqrt(72 / len(corners)))
+    places, shares = [], []
+    for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        area = (a[0] * b[1] - a[1] * b[0]) / 2.0
+        for i in range(parts):
+            for j in range(parts - i):
+                # The upright and the inverted small triangle of one cell of the subdivision.
+                thirds = [1.0 / 3.0, 2.0 / 3.0][: 2 if i + j < parts - 1 else 1]
+                places += [((i + t) * a + (j + t) * b) / parts for t in thirds]
+                shares += [area / parts**2] * len(thirds)
+    feet, weights = np.array(places), np.array(shares) / np.sum(shares)
+    lacking = gyration_squared(shape) / float(weights @ (feet**2).sum(axis=1))
+    return feet * math.sqrt(lacking), weights

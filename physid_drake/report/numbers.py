@@ -1,0 +1,68 @@
+"""Numbers and units as a page writes them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number for reading: significant digits, a true minus sign, powers of ten; a dash where there is none."""
+    if value is None or math.isnan(value):
+        return "–"
+    if math.isinf(value):
+        return "∞" if value > 0.0 else "−∞"
+    text = f"{value:.{digits}g}"
+    if "e" in text:
+        mantissa, power = text.split("e")
+        if -5 < int(power) < 7:
+            text = f"{value:.{max(0, digits - 1 - int(power))}f}"
+        else:
+            raised = str(int(power)).translate(str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻"))
+            text = f"{mantissa} × 10{raised}"
+    return text.replace("-", "−")
+
+
+def fixed(value: float) -> str:
+    """Two decimals, so that the numbers of a column are alike."""
+    return f"{value:.2f}".replace("-", "−") if abs(value) < 1e4 else number(value)
+
+
+def tenths(value: float | None) -> str:
+    """One decimal; a dash where there is no number."""
+    return "–" if value is None or not math.isfinite(value) else f"{value:.1f}".replace("-", "−")
+
+
+def tiny(value: float) -> str:
+    """A probability that may be too small for a float."""
+    return "< 10⁻³⁰⁰" if value < 1e-300 else number(value, 2)
+
+
+def chance(value: float) -> str:
+    """A probability that something is so; never quite certain."""
+    return "> 0.99" if value > 0.99 else fixed(value)
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "-" else unit.replace("*", "·").replace("^2", "²")
+
+
+def quantity(value: float | None, unit: str, digits: int = 3) -> str:
+    """A number with its unit; angles in degrees too."""
+    text = f"{number(value, digits)} {_unit(unit)}".strip()
+    if unit == "rad" and value is not None and math.isfinite(value):
+        text += f" ({number(math.degrees(value), digits)}°)"
+    return text
+
+
+def interval(ends: Sequence[float] | None, unit: str) -> str:
+    """From one end to the other, angles in degrees too; a dash where there is none."""
+    if ends is None:
+        return "–"
+    scale = f" ({number(math.degrees(ends[0]))}° to {number(math.degrees(ends[1]))}°)" if unit == "rad" else ""
+    return f"{number(ends[0])} to {number(ends[1])} {_unit(unit)}".strip() + scale
+
+
+def share(value: float, longest: float) -> float:
+    """Of the longest: the length of a bar [%]."""
+    return 100.0 * min(1.0, max(0.0, value / longest)) if math.isfinite(value) else 0.0
