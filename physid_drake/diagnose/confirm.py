@@ -18,13 +18,13 @@ Tick = Callable[[str, int, int], None]
 
 WORTH_A_FIT = 0.35  # of the best score test's gain
 WORTH_A_TRY = 0.1  # where no better one explains the pushes
+ENOUGH = 280  # rollouts per push after which no further effect is tried
 SURE = 2.0  # standard errors
 LEAST = 4.0  # nats of held-out gain
 CERTAIN = 40.0  # nats of held-out gain, the best push not counted
 UNLIKELY = 0.05  # of the signed-rank test of held-out gains
 STUCK = 1.6  # cost per degree of freedom after which a fit is tried again from elsewhere
-PERSISTENT = 2  # candidates that are worth that
-FELL_SHORT = 0.8  # of the gain that the score test promised
+PERSISTENT = 2  # candidates that are worth that, where none explains the pushes
 FAR_OFF = 3.0  # cost per degree of freedom from which the pushes' unknowns would imitate what is missing
 FAR = 0.3  # of theta's unit cube
 
@@ -109,30 +109,54 @@ def confirm(
     plain = push_scores(before)
     found: list[Candidate] = []
     for k, one in enumerate((*worth, *more)):
-        if k >= len(worth) and any(c.fitted.reduced_chi2 <= STUCK for c in found):
+        if k >= len(worth) and (_explained(found) or _spent(fitter)):
             break
         tick(f"fit with {one.kind.name}", k, len(worth))
-        found.append(_candidate(fitter, before, one, plain, persistent=k < PERSISTENT))
-    return tuple(sorted(found, key=lambda c: (c.degenerate, -c.gain)))
+        found.append(_candidate(fitter, one, _fit(fitter, before, one), plain))
+    found = _ranked(found)
+    for k, candidate in enumerate(found[:PERSISTENT]):
+        if _explained(found) or _spent(fitter):
+            break
+        tick(f"fit with {candidate.name} once more", k, PERSISTENT)
+        again = _fit_from_afar(fitter, before, candidate)
+        if again.score > candidate.fitted.score:
+            found[k] = _candidate(fitter, candidate.score, again, plain)
+    return tuple(_ranked(found))
 
 
-def _candidate(fitter: Fitter, before: Fitted, one: Score, plain: Array, *, persistent: bool) -> Candidate:
-    start = start_of(fitter, one)
-    state = dc.replace(before.state, effects=(*before.state.effects, start))
-    if before.reduced_chi2 > FAR_OFF:
-        fitted = fitter.fit(fitter.start(state.u, state.effects), rounds=7, careful=4, like=before)
-    else:
-        fitted = fitter.fit(state, rounds=4, like=before)
-    promised = 0.5 * one.gain
-    if persistent and fitted.reduced_chi2 > STUCK and fitted.score - before.score < FELL_SHORT * promised:
-        # Far from the plain cell its derivatives mislead: from the score test's theta, with derivatives taken there.
-        u = np.clip(before.state.u + np.clip(one.theta, -FAR, FAR), 1e-3, 1.0 - 1e-3)
-        again = fitter.fit(fitter.start(u, state.effects), rounds=4, careful=1, renew=True)
-        fitted = again if again.score > fitted.score else fitted
+def _ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
+    return sorted(candidates, key=lambda c: (c.degenerate, -c.gain))
+
+
+def _explained(candidates: Sequence[Candidate]) -> bool:
+    return any(c.fitted.reduced_chi2 <= STUCK for c in candidates)
+
+
+def _spent(fitter: Fitter) -> bool:
+    return fitter.case.pool.count > ENOUGH * len(fitter.case.problems)
+
+
+def _candidate(fitter: Fitter, one: Score, fitted: Fitted, plain: Array) -> Candidate:
     point = fitted.state.effects[-1]
     return Candidate(
         score=one, fitted=fitted, gains=push_scores(fitted) - plain, degenerate=_degenerate(fitter, one, point)
     )  # fmt: skip
+
+
+def _fit(fitter: Fitter, before: Fitted, one: Score) -> Fitted:
+    """The model with an effect, from where the score test says, with the derivatives of the model before."""
+    effects = (*before.state.effects, start_of(fitter, one))
+    if before.reduced_chi2 > FAR_OFF:
+        return fitter.fit(fitter.start(before.state.u, effects), rounds=7, careful=4, like=before)
+    return fitter.fit(dc.replace(before.state, effects=effects), rounds=4, like=before)
+
+
+def _fit_from_afar(fitter: Fitter, before: Fitted, candidate: Candidate) -> Fitted:
+    """The same from the score test's theta too, all derivatives taken on the way: far off, the plain ones mislead."""
+    one = candidate.score
+    u = np.clip(before.state.u + np.clip(one.theta, -FAR, FAR), 1e-3, 1.0 - 1e-3)
+    effects = (*before.state.effects, start_of(fitter, one))
+    return fitter.fit(fitter.start(u, effects), rounds=4, careful=2, renew=True)
 
 
 def _degenerate(fitter: Fitter, one: Score, point: EffectPoint) -> bool:

@@ -32,6 +32,7 @@ Tick = Callable[[str, int, int], None]
 
 MOST_EFFECTS = 3
 LEAST_SHARE = 0.25  # of the cost beyond noise that an effect must take away unless nothing is left
+LONGEST = 450  # rollouts per push after which no further effect is looked for
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
 HOPELESS = 6.0  # cost per degree of freedom with an effect: no second one of the catalogue will make up for that
 
@@ -84,7 +85,11 @@ def gather(
     current, remaining, at = plain, screening, found
     steps: list[tuple[Candidate, ...]] = []
     rejected: tuple[Candidate, ...] = ()
-    while len(steps) < min(MOST_EFFECTS, len(kinds)) and mismatch(current, remaining) < alpha:
+    while (
+        len(steps) < min(MOST_EFFECTS, len(kinds))
+        and rough.pool.count < LONGEST * len(case.problems)
+        and mismatch(current, remaining) < alpha
+    ):
         candidates = confirm(fitter, current, remaining.scores, tick, most=CANDIDATES - len(steps))
         if not candidates or not candidates[0].accepted or not _worthwhile(current, candidates[0].fitted):
             rejected = candidates
