@@ -34,7 +34,8 @@ MOST_EFFECTS = 3
 LEAST_SHARE = 0.25  # of the cost beyond noise that an effect must take away unless nothing is left
 LONGEST = 450  # rollouts per push after which no further effect is looked for
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
-HOPELESS = 6.0  # cost per degree of freedom with an effect: no second one of the catalogue will make up for that
+HOPELESS = 6.0  # cost per degree of freedom with an effect: no second one of the catalogue will make up for that,
+PROMISING = 0.3  # unless so little is left of what there was before
 
 
 def diagnose(
@@ -96,8 +97,8 @@ def gather(
             break
         steps.append(candidates)
         tick(f"model with {candidates[0].name}", 0, 0)
-        current = _model_with(fitter, candidates[0])
-        if current.reduced_chi2 > HOPELESS:
+        before, current = current, _model_with(fitter, candidates[0])
+        if current.reduced_chi2 > max(HOPELESS, PROMISING * before.reduced_chi2):
             break
         # The signatures at the plain cell are near enough to ask whether anything is left.
         left = [s for s in at if s.kind not in {e.kind for e in current.state.effects}]
