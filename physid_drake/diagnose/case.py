@@ -63,9 +63,9 @@ class Case:
     around: Surroundings
     config: CellConfig
 
-    def louder(self, factor: float) -> Case:
-        """The case with ``factor`` times the noise."""
-        noise = self.noise.louder(factor)
+    def louder(self, factor: float, force_factor: float) -> Case:
+        """The case with ``factor`` times the noise of the poses, and ``force_factor`` times the force's wandering."""
+        noise = self.noise.louder(factor, force_factor)
         pushes = self.recording.pushes
         features = tuple(features_of(push, p, noise) for push, p in zip(pushes, self.problems, strict=True))
         return dc.replace(self, noise=noise, features=features)

@@ -19,6 +19,7 @@ from physid_drake.recording import Push, rest_segments
 Array = NDArray[np.float64]
 
 WINDOWS = 14  # while the object moves
+FORCE_MEMORY = 0.3  # s: over which a force that wanders with the place on the table is the same
 # What is left of the cell's own error after the touch: about a constant [m, m, rad].
 FLOOR = np.array([5e-5, 5e-5, 1.0e-3])
 
@@ -73,7 +74,7 @@ def features_of(push: Push, problem: PushProblem, noise: TrackerNoise) -> PushFe
         part = slice(dof * count, (dof + 1) * count)
         blocks[part, part] = averaging @ covariance @ averaging.T
         blocks[part, part] += (FLOOR[dof] / noise.sigmas[dof]) ** 2 * (0.9 + 0.1 * np.eye(count))
-    blocks[3 * count :, 3 * count :] = np.eye(2 * len(force_std))
+    blocks[3 * count :, 3 * count :] = _force_noise(problem, noise.force_scatter)
     made = PushFeatures(
         averaging=averaging,
         middles=averaging @ times,
@@ -83,6 +84,20 @@ def features_of(push: Push, problem: PushProblem, noise: TrackerNoise) -> PushFe
         force_std=force_std,
     )
     return dc.replace(made, recorded=made._vector(problem.poses, problem.forces))
+
+
+def _force_noise(problem: PushProblem, scatter: float) -> Array:
+    """Covariance (2k, 2k) of force windows in their deviations: white noise, and friction that wanders on the way."""
+    k = len(problem.force_std)
+    if not k:
+        return np.zeros((0, 0))
+    size = float(np.sqrt((problem.forces**2).sum(axis=1).mean())) * scatter
+    gaps = np.abs(problem.force_times[:, None] - problem.force_times[None, :])
+    wandering = size**2 * np.exp(-gaps / FORCE_MEMORY) / np.outer(problem.force_std, problem.force_std)
+    block = np.eye(k) + wandering
+    zero = np.zeros((k, k))
+    noise: Array = np.block([[block, zero], [zero, block]])
+    return noise
 
 
 def _averaging(push: Push, problem: PushProblem) -> Array:

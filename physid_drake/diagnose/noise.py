@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 LONGEST = 60  # samples of a rest that are looked at together
 FEWEST = 40  # samples at rest, in all, that tell a noise
+FORCE_SCATTER = 0.03
+UNKNOWN = "neither stated nor seen at rest"
 CONTRADICTS = 1.5  # seen over stated: beyond it the stated figure is not believed
 
 
@@ -30,6 +32,7 @@ class TrackerNoise:
         jitter: standard deviation of the time stamps [s], as far as moving samples show more noise than resting ones.
         stated: whether the recording states the standard deviations, and they are believed.
         known: whether they were stated or seen; if not, what the plain cell leaves has to serve.
+        force_scatter: by how much of itself the hand's force wanders on its way [-].
         warnings: what was found to contradict the recording.
     """
 
@@ -39,6 +42,7 @@ class TrackerNoise:
     jitter: float
     stated: bool
     known: bool = True
+    force_scatter: float = FORCE_SCATTER
     warnings: tuple[str, ...] = ()
 
     @property
@@ -46,14 +50,17 @@ class TrackerNoise:
         """Standard deviations (3,) of x, y, yaw [m, m, rad]."""
         return np.array([self.position, self.position, self.rotation])
 
-    def louder(self, factor: float) -> TrackerNoise:
-        """The same noise, ``factor`` times as large, which says so."""
+    def louder(self, factor: float, force_factor: float = 1.0) -> TrackerNoise:
+        """The same noise, ``factor`` times as large, forces wandering ``force_factor`` times as much; it says so."""
         position, rotation = factor * self.position, factor * self.rotation
         said = (
-            f"neither stated nor seen at rest: the object's noise is taken to be what the plain cell leaves,"
+            f"{UNKNOWN}: the object's noise is taken to be what the plain cell leaves,"
             f" {1e3 * position:.2g} mm and {math.degrees(rotation):.2g} deg"
         )
-        return dc.replace(self, position=position, rotation=rotation, warnings=(*self.warnings, said))
+        return dc.replace(
+            self, position=position, rotation=rotation, force_scatter=force_factor * self.force_scatter,
+            warnings=(*(w for w in self.warnings if not w.startswith(UNKNOWN)), said),
+        )  # fmt: skip
 
     def correlation(self, times: Array, dof: int) -> Array:
         """Correlation matrix (n, n) of the noise of x, y (dof 0, 1) or yaw (dof 2) at times (n,)."""

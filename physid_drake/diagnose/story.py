@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.conclude import class_of, conclude
 from physid_drake.diagnose.confirm import Candidate, confirm, push_scores
+from physid_drake.diagnose.estimates import rms
 from physid_drake.diagnose.evidence import EXPLAINED, Evidence, mismatch
 from physid_drake.diagnose.fit import Fitted, Fitter, State
+from physid_drake.diagnose.linear import own_unknowns
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
 from physid_drake.diagnose.memory import Memory
 from physid_drake.diagnose.next_push import next_push
@@ -33,6 +35,7 @@ Tick = Callable[[str, int, int], None]
 MOST_EFFECTS = 3
 LEAST_SHARE = 0.25  # of the cost beyond noise that an effect must take away unless nothing is left
 LONGEST = 450  # rollouts per push after which no further effect is looked for
+LOUDER = 4  # rounds in which an unknown noise is found
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
 HOPELESS = 6.0  # cost per degree of freedom with an effect: no second one of the catalogue will make up for that,
 PROMISING = 0.3  # unless so little is left of what there was before
@@ -75,9 +78,7 @@ def gather(
     first = _first(rough, search_rng, tick, memory)
     if not case.noise.known:
         # Only ratios can speak then: the plain cell is taken to leave noise, and effects must leave less of it.
-        factor = float(np.sqrt(max(1.0, first.reduced_chi2)))
-        case, rough = case.louder(factor), rough.louder(factor)
-        first = Fitter(rough).linearise(first.state)
+        case, rough, first = _as_loud_as_left(case, rough, first)
     guard, found = _looks(rough, first, kinds, tick, memory)
     allowed = tolerances(rough, found)
     fitter = Fitter(rough, guard, allowed)
@@ -136,6 +137,34 @@ def _first(case: Case, rng: np.random.Generator, tick: Tick, memory: Memory) -> 
     # Linearised again, so that a run that goes on from here has the same bits.
     memory.keep("plain", [first.state.u, np.array(first.state.scatter), *first.state.own])
     return first
+
+
+def _as_loud_as_left(case: Case, rough: Case, fitted: Fitted) -> tuple[Case, Case, Fitted]:
+    """Noise so large that the plain model leaves just that, in poses and in forces, for both cases."""
+    for _ in range(LOUDER):
+        factors = _left_over(rough, fitted)
+        case, rough = case.louder(*factors), rough.louder(*factors)
+        fitted = Fitter(rough).linearise(fitted.state)
+        if fitted.reduced_chi2 < 1.1:
+            break
+    return case, rough, fitted
+
+
+def _left_over(case: Case, fitted: Fitted) -> tuple[float, float]:
+    """How many times their deviations poses and forces (relative to a scatter of one) are off, at least 1."""
+    poses, forces = [], []
+    for push, features in zip(fitted.pushes, case.features, strict=True):
+        own = own_unknowns(push, fitted.state.scatter, fitted.solution.beta)
+        left = push.residual - push.shared @ fitted.solution.beta - push.own @ own
+        count = 3 * len(features.middles)
+        poses.append(left[:count])
+        if len(left) > count:
+            white = np.linalg.solve(np.linalg.cholesky(push.noise[count:, count:]), left[count:])
+            forces.append(white)
+    # The pushes' unknowns took a part of what is left: the cost says how much.
+    share = float(np.sqrt(fitted.reduced_chi2 / np.mean(np.concatenate([*poses, *forces]) ** 2)))
+    sizes = [share * rms(np.concatenate(values)) if values else 1.0 for values in (poses, forces)]
+    return max(1.0, sizes[0]), max(1.0, sizes[1])
 
 
 def _looks(
