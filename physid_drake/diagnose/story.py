@@ -133,10 +133,10 @@ def _first(case: Case, rng: np.random.Generator, tick: Tick, memory: Memory) -> 
     if kept is not None:
         u, scatter, *own = kept
         return Fitter(case).linearise(State(u=u, effects=(), own=tuple(own), scatter=float(scatter)))
-    first = fit_plain(case, rng, tick)
-    # Linearised again, so that a run that goes on from here has the same bits.
-    memory.keep("plain", [first.state.u, np.array(first.state.scatter), *first.state.own])
-    return first
+    found = fit_plain(case, rng, tick).state
+    memory.keep("plain", [found.u, np.array(found.scatter), *found.own])
+    # All derivatives here, so that a run that goes on from what was kept has the same bits.
+    return Fitter(case).linearise(found)
 
 
 def _as_loud_as_left(case: Case, rough: Case, fitted: Fitted) -> tuple[Case, Case, Fitted]:
