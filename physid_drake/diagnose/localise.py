@@ -90,6 +90,11 @@ class MissingWrench:
     yaw: float
     place: Array
 
+    @property
+    def stands_out(self) -> bool:
+        """Whether the force along or across is more than two standard deviations from nothing."""
+        return bool((np.abs(self.wrench[:2]) > 2.0 * self.std[:2]).any())
+
 
 def missing_wrenches(fitter: Fitter, plain: Fitted) -> tuple[MissingWrench, ...]:
     """The missing wrench in all windows; ``fitter`` may be of a coarse case."""

@@ -158,7 +158,7 @@ def arrow_figure(view: TableView) -> Markup | None:
     scale = largest / (0.25 * max(box[2] - box[0], box[3] - box[1]))  # N per mm of arrow
     for phase, colour in (("contact", CONTACT), ("free_slide", FREE)):
         for sure in (False, True):
-            chosen = [k for k, w in enumerate(places) if (w.phase == phase, _stands_out(w)) == (True, sure)]
+            chosen = [k for k, w in enumerate(places) if (w.phase == phase, w.stands_out) == (True, sure)]
             if chosen:
                 at = MM * np.array([places[k].place for k in chosen])
                 axes.quiver(
@@ -173,10 +173,6 @@ def _turned(force: Array, heading: float) -> Array:
     """From along and across the motion to W."""
     c, s = math.cos(heading), math.sin(heading)
     return np.array([c * force[0] - s * force[1], s * force[0] + c * force[1]])
-
-
-def _stands_out(w: MissingWrench) -> bool:
-    return bool((np.abs(w.wrench[:2]) > 2.0 * w.std[:2]).any())
 
 
 def _around(places: Sequence[MissingWrench]) -> Box:

@@ -35,9 +35,9 @@ Array = NDArray[np.float64]
 
 RECORDED = np.array([0.95, 0.55, 0.15, 0.45])  # the ghost
 SIMULATED = np.array([0.20, 0.45, 0.80, 1.0])
-MISSING = (0.80, 0.10, 0.20, 1.0)
+MISSING = (0.80, 0.10, 0.20)
 ARROW = 0.05  # m
-SURE = 2.0  # standard deviations
+FAINT = 0.25
 FRAMES_PER_SECOND = 32.0
 PAUSE = 0.4  # s between two pushes
 LONGEST = 60.0  # s of the whole animation; longer recordings are shown faster
@@ -139,37 +139,30 @@ class Stage:
             f"paths/simulated/{name}", simulated[:, :: max(1, simulated.shape[1] // 300)], 2.0, Rgba(*SIMULATED)
         )
 
-    def show_missing(self, wrenches: Sequence[MissingWrench], unit_force: float) -> int:
+    def show_missing(self, wrenches: Sequence[MissingWrench], unit_force: float) -> None:
         """Arrows of the force that is missing from the plain cell, where the object was when it was missing.
 
         Args:
-            wrenches: window by window; those within two standard deviations of nothing are not drawn.
+            wrenches: window by window; those within two standard deviations of nothing are drawn faint.
             unit_force: that is drawn as long as ``ARROW`` [N].
-
-        Returns:
-            How many arrows there are.
         """
         self.meshcat.Delete("missing")
         height = 1.1 * self._solid.height
-        count = 0
-        for wrench in wrenches:
+        for count, wrench in enumerate(wrenches):
             force = np.hypot(*wrench.wrench[:2])
-            if force < SURE * np.hypot(*wrench.std[:2]):
-                continue
             heading = wrench.heading + float(np.arctan2(wrench.wrench[1], wrench.wrench[0]))
-            length = ARROW * float(np.clip(force / unit_force, 0.05, 3.0))
-            self._arrow(f"missing/{count}", np.array([*wrench.place, height]), heading, length)
-            count += 1
-        return count
+            length = ARROW * float(np.clip(force / unit_force, 0.1, 3.0))
+            colour = Rgba(*MISSING, 1.0 if wrench.stands_out else FAINT)
+            self._arrow(f"missing/{count}", np.array([*wrench.place, height]), heading, length, colour)
 
-    def _arrow(self, path: str, start: Array, heading: float, length: float) -> None:
+    def _arrow(self, path: str, start: Array, heading: float, length: float, colour: Rgba) -> None:
         """A horizontal arrow: a shaft with a cone, whose axes Meshcat draws along z."""
         turn = RotationMatrix.MakeZRotation(heading) @ RotationMatrix.MakeYRotation(0.5 * np.pi)
         ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
         head = min(0.35 * length, 0.012)
-        self.meshcat.SetObject(f"{path}/shaft", Cylinder(0.0012, length - head), Rgba(*MISSING))
+        self.meshcat.SetObject(f"{path}/shaft", Cylinder(0.0012, length - head), colour)
         self.meshcat.SetTransform(f"{path}/shaft", RigidTransform(turn, start + 0.5 * (length - head) * ahead))
-        self.meshcat.SetObject(f"{path}/head", MeshcatCone(head, 0.004, 0.004), Rgba(*MISSING))
+        self.meshcat.SetObject(f"{path}/head", MeshcatCone(head, 0.004, 0.004), colour)
         # A cone's tip is at its origin, its base above it.
         back = RotationMatrix.MakeZRotation(heading) @ RotationMatrix.MakeYRotation(-0.5 * np.pi)
         self.meshcat.SetTransform(f"{path}/head", RigidTransform(back, start + length * ahead))
