@@ -168,7 +168,8 @@ class Tether(Effect):
         pull = math.hypot(fx, fy)
         # Taut at the middle: pull = k (d - rest), towards the anchor.
         stretch = 1.0 + (k * rest / pull if pull > 0.0 else 0.0)
-        return cls(stiffness=k, x=middle[0] + stretch * fx / k, y=middle[1] + stretch * fy / k, rest_length=rest)
+        x, y = middle + stretch * np.array([fx, fy]) / k
+        return cls(stiffness=k, x=float(x), y=float(y), rest_length=rest)
 
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
         """The spring."""
