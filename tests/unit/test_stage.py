@@ -1,0 +1,34 @@
+"""What is put on Meshcat's stage."""
+
+import numpy as np
+import pytest
+
+from physid_drake.diagnose.localise import MissingWrench
+from physid_drake.recording import read_recording
+from physid_drake.report.stage import Stage
+from physid_drake.resources import shipped
+
+
+@pytest.fixture(scope="module")
+def stage():
+    return Stage(read_recording(shipped("recordings") / "eraser_reference"))
+
+
+def missing(along, across, std):
+    return MissingWrench(
+        push=0, start=0.1, end=0.2, wrench=np.array([along, across, 0.0]), std=np.full(3, std), phase="contact",
+        speed=0.1, heading=0.5, yaw=0.0, place=np.array([0.05, -0.02]),
+    )  # fmt: skip
+
+
+def test_every_missing_wrench_is_an_arrow(stage):
+    stage.show_missing([missing(0.2, 0.0, 0.01), missing(0.0, -0.1, 0.5)], unit_force=0.1)
+    paths = [f"missing/{k}/{part}" for k in (0, 1) for part in ("shaft", "head")]
+    assert all(stage.meshcat.HasPath(path) for path in paths)
+    stage.show_missing([missing(0.2, 0.0, 0.01)], unit_force=0.1)
+    assert stage.meshcat.HasPath(paths[0]) and not stage.meshcat.HasPath(paths[2])
+
+
+def test_a_wrench_stands_out_beyond_two_standard_deviations():
+    assert missing(0.25, 0.0, 0.1).stands_out and missing(0.0, -0.25, 0.1).stands_out
+    assert not missing(0.19, 0.19, 0.1).stands_out
