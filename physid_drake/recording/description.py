@@ -49,11 +49,16 @@ class _Loader(yaml.SafeLoader):
     """Reads ``1e-3`` as a number, which YAML 1.1 takes for text."""
 
 
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?[0-9][0-9]*(\.[0-9]*)?[eE][-+]?[0-9]+$"),
-    list("-+0123456789"),
-)
+class Dumper(yaml.SafeDumper):
+    """Quotes a text that ``_Loader`` would read as a number: a name like ``66e70658``."""
+
+
+for _resolves in (_Loader, Dumper):
+    _resolves.add_implicit_resolver(
+        "tag:yaml.org,2002:float",
+        re.compile(r"^[-+]?[0-9][0-9]*(\.[0-9]*)?[eE][-+]?[0-9]+$"),
+        list("-+0123456789"),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

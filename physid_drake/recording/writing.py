@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 import yaml
 
 from physid_drake.errors import OutputError
-from physid_drake.recording.description import DESCRIPTION_FILE, FORMAT
+from physid_drake.recording.description import DESCRIPTION_FILE, FORMAT, Dumper
 from physid_drake.recording.reading import (
     FORCE,
     HAND_POSITION,
@@ -72,7 +72,9 @@ def _write_into(recording: Recording, files: list[str], staging: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         _write_push(push, path)
     description = _describe(recording, files, staging)
-    text = yaml.safe_dump(description, sort_keys=False, allow_unicode=True, default_flow_style=None, width=100)
+    text = yaml.dump(
+        description, Dumper=Dumper, sort_keys=False, allow_unicode=True, default_flow_style=None, width=100
+    )
     (staging / DESCRIPTION_FILE).write_text(text, encoding="utf-8")
 
 

@@ -72,6 +72,13 @@ def test_every_shape_is_read_back(tmp_path, shape):
     assert read_recording(tmp_path / "r") == recording
 
 
+@pytest.mark.parametrize("name", ["66e70658", "1e-3", "0x1f", "12", "yes", "null", "2026-11-21"])
+def test_a_name_that_looks_like_something_else_is_read_back(tmp_path, name):
+    recording = replace(random_recording(), name=name)
+    write_recording(recording, tmp_path / "r")
+    assert read_recording(tmp_path / "r") == recording
+
+
 def test_a_recording_without_hand_and_sensors_is_read_back(tmp_path):
     full = random_recording()
     pushes = tuple(replace(push, hand=None, force=None) for push in full.pushes)
