@@ -24,6 +24,7 @@ LEAST = 4.0  # nats of held-out gain
 CERTAIN = 40.0  # nats of held-out gain, the best push not counted
 UNLIKELY = 0.05  # of the signed-rank test of held-out gains
 STUCK = 1.6  # cost per degree of freedom after which a fit is tried again from elsewhere
+FELL_SHORT = 0.8  # of the gain that the score test promised: such a fit is tried again too
 PERSISTENT = 2  # candidates that are worth that, where none explains the pushes
 FAR_OFF = 3.0  # cost per degree of freedom from which the pushes' unknowns would imitate what is missing
 FAR = 0.3  # of theta's unit cube
@@ -115,8 +116,9 @@ def confirm(
         found.append(_candidate(fitter, one, _fit(fitter, before, one), plain))
     found = _ranked(found)
     for k, candidate in enumerate(found[:PERSISTENT]):
-        if _explained(found) or _spent(fitter):
-            break
+        short = candidate.fitted.score - before.score < FELL_SHORT * 0.5 * candidate.score.gain
+        if (_explained(found) and not short) or _spent(fitter):
+            continue
         tick(f"fit with {candidate.name} once more", k, PERSISTENT)
         again = _fit_from_afar(fitter, before, candidate)
         if again.score > candidate.fitted.score:

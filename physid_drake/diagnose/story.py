@@ -35,6 +35,7 @@ Tick = Callable[[str, int, int], None]
 MOST_EFFECTS = 3
 LEAST_SHARE = 0.25  # of the cost beyond noise that an effect must take away unless nothing is left
 LONGEST = 450  # rollouts per push after which no further effect is looked for
+ANOTHER_BASIN = 10.0  # nats by which a plain fit must be better to be another one
 LOUDER = 4  # rounds in which an unknown noise is found
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
 HOPELESS = 6.0  # cost per degree of freedom with an effect: no second one of the catalogue will make up for that,
@@ -93,6 +94,14 @@ def gather(
         and mismatch(current, remaining) < alpha
     ):
         candidates = confirm(fitter, current, remaining.scores, tick, most=CANDIDATES - len(steps))
+        if current is plain and candidates:
+            better = _plain_from(fitter, plain, candidates[0], tick)
+            if better is not None:
+                # The effect only led out of a wrong basin of theta: everything again from the better plain fit.
+                plain = current = better
+                at = found = signatures(Fitter(rough), Fitter(rough).linearise(plain.state), kinds)
+                screening = remaining = screen(plain, found, screen_rng)
+                continue
         if not candidates or not candidates[0].accepted or not _worthwhile(current, candidates[0].fitted):
             rejected = candidates
             break
@@ -119,6 +128,15 @@ def gather(
         case=case, fitter=fine, plain=refined, screening=screening, signatures=tuple(found), steps=tuple(steps),
         rejected=rejected, final=final, remaining=remaining,
     )  # fmt: skip
+
+
+def _plain_from(fitter: Fitter, plain: Fitted, candidate: Candidate, tick: Tick) -> Fitted | None:
+    """A better plain fit from the theta at which an effect's fit ended; None where there is none."""
+    if candidate.fitted.score - plain.score < ANOTHER_BASIN:
+        return None
+    tick("plain fit from there", 0, 0)
+    again = fitter.fit(fitter.start(candidate.fitted.state.u), rounds=4, careful=2, renew=True)
+    return again if again.score - plain.score > ANOTHER_BASIN else None
 
 
 def _worthwhile(before: Fitted, after: Fitted) -> bool:
