@@ -27,7 +27,8 @@ from physid_drake.prove.seal import SEALED, check_seal, shut, unlock
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.proof import Proof, proof_json, proof_markdown, proof_tables
 from physid_drake.report.proof_page import proof_page
-from physid_drake.report.proof_pictures import confusion_picture, drawn
+from physid_drake.report.proof_pictures import confusion_picture
+from physid_drake.report.svg import drawn
 from physid_drake.run_folder import RunFolder
 
 WORLDS, QUICK = 200, 10

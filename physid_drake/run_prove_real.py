@@ -18,8 +18,8 @@ from physid_drake.prove.real import RealCase, chosen_cases, prepare
 from physid_drake.prove.real_score import FRESH_ERRORS, RealOutcome, real_outcome
 from physid_drake.prove.shapes import height_of
 from physid_drake.recording import MeshShape, read_recording
-from physid_drake.report.proof_pictures import drawn
 from physid_drake.report.real import pressure_picture, real_json, real_markdown, real_table
+from physid_drake.report.svg import drawn
 from physid_drake.run_folder import RunFolder
 from physid_drake.run_prove import Commander, check_running, claim, ended_softly, run_tasks, wide_console
 

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import io
 import math
-import re
-from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
@@ -21,36 +18,26 @@ from physid_drake.cell.outline import Polygon as OutlinePolygon
 from physid_drake.cell.solid import solid_of
 from physid_drake.plan import DistanceToGoal, Ending, InsideRegion, Plan, SweepRow, Trajectory
 from physid_drake.report.plan import plan_rows, push_files, title_of
+from physid_drake.report.svg import MUTED, drawn, svg_of
 
 Array = NDArray[np.float64]
 
-INK, MUTED, RULE = "#1c2330", "#667085", "#dfe3ea"
 OBJECT, HAND, GOAL, LOST = "#2563c9", "#b4540a", "#1d7a46", "#b42318"
 MM = 1e3
 FLATTEST = 0.6  # of the longer side of a view from above
 
-_STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none", "font.family": "DejaVu Sans", "font.size": 8.5, "text.color": INK,
-    "text.parse_math": False, "axes.edgecolor": "#c3c9d4", "axes.labelcolor": MUTED, "axes.linewidth": 0.6,
-    "axes.axisbelow": True, "axes.spines.top": False, "axes.spines.right": False, "grid.color": RULE,
-    "grid.linewidth": 0.5, "xtick.color": "#c3c9d4", "ytick.color": "#c3c9d4", "xtick.labelcolor": MUTED,
-    "ytick.labelcolor": MUTED, "legend.frameon": False, "savefig.transparent": True,
-}  # fmt: skip
-
 
 def curve_svg(plan: Plan, *, size: tuple[float, float] = (5.2, 3.4)) -> Markup:
     """Cost against the swept setting, with its spread, as inline SVG; ``size`` in inches."""
-    with mpl.rc_context():
-        _style()
+    with drawn():
         figure = Figure(figsize=size, layout="constrained")
         _draw_curve(figure.add_subplot(), plan)
-        return _svg(figure, "curve", f"Cost against {plan.policy.swept}")
+        return svg_of(figure, "plan curve", f"Cost against {plan.policy.swept}")
 
 
 def plan_png(plan: Plan) -> bytes:
     """The table from above and the cost's curve, side by side, as PNG."""
-    with mpl.rc_context():
-        _style()
+    with drawn():
         figure = Figure(figsize=(11.0, 4.2), layout="constrained")
         axes = figure.subplots(1, 2, width_ratios=[1.25, 1.0])
         _draw_table(axes[0], plan)
@@ -70,11 +57,10 @@ def plan_page(plan: Plan, *, seed: int, with_effects: tuple[Trajectory, float] |
         with_effects: trajectory and cost of the same push under the model with its effects, where it was planned
             without them.
     """
-    with mpl.rc_context():
-        _style()
+    with drawn():
         above = Figure(figsize=(6.4, 4.4), layout="constrained")
         _draw_table(above.add_subplot(), plan, with_effects)
-        picture = _svg(above, "above", "The table from above: the object, its predicted path, the goal")
+        picture = svg_of(above, "plan above", "The table from above: the object, its predicted path, the goal")
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     return environment.from_string(_PAGE).render(
         title=title_of(plan), rows=plan_rows(plan, with_effects=with_effects), above=picture,
@@ -197,26 +183,6 @@ def _placed(outline: Array, pose: Array) -> Array:
     """The outline at a pose (n, 2) [mm]."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     return np.asarray(MM * (outline @ np.array([[c, s], [-s, c]]) + pose[:2]))
-
-
-def _style() -> None:
-    mpl.rcdefaults()
-    mpl.rcParams.update(_STYLE)
-
-
-def _svg(figure: Figure, salt: str, label: str) -> Markup:
-    """A figure as inline SVG that scales with its column; ``salt`` keeps its ids apart from the others'."""
-    mpl.rcParams["svg.hashsalt"] = f"plan {salt}"
-    file = io.BytesIO()
-    figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
-    text = file.getvalue().decode()
-    text = re.sub(
-        r"<!--.*?-->|<metadata>.*?</metadata>|<style .*?</style>", "", text[text.index("<svg") :], flags=re.S
-    )
-    box = re.search(r'viewBox="[^"]*"', text)
-    assert box is not None
-    body = re.sub(r'<g id="[^"]*">', "<g>", text[text.index(">") + 1 :]).replace("xlink:href", "href")
-    return Markup('<svg {} role="img" aria-label="{}">\n{}').format(Markup(box[0]), label, Markup(body.strip()))
 
 
 _PAGE = """<!doctype html>

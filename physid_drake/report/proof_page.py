@@ -7,16 +7,16 @@ from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
+from matplotlib.figure import Figure
 
 from physid_drake.prove.figures import held_out_table, power_table, table
 from physid_drake.report.proof import AT_BEST, HELD_OUT, MAIN, POWER, Proof, said_of, truth_of
 from physid_drake.report.proof_pictures import (
     calibration_picture,
     confusion_picture,
-    drawn,
     power_picture,
-    svg_of,
 )
+from physid_drake.report.svg import drawn, svg_of
 
 
 def proof_page(proof: Proof) -> str:
@@ -27,22 +27,28 @@ def proof_page(proof: Proof) -> str:
     """
     with drawn():
         pictures = {
-            "confusion": svg_of(confusion_picture(proof.figures)),
-            "power": svg_of(power_picture(proof.figures)),
-            "calibration": svg_of(calibration_picture(proof.figures)),
+            "confusion": _picture(confusion_picture(proof.figures), "what was said of what"),
+            "power": _picture(power_picture(proof.figures), "power against the size of the effect"),
+            "calibration": _picture(calibration_picture(proof.figures), "stated probabilities and what came true"),
         }
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     return environment.from_string(_PAGE).render(_content(proof, pictures)) + "\n"
 
 
-def _content(proof: Proof, pictures: dict[str, str]) -> dict[str, Any]:
+def _picture(figure: Figure, label: str) -> Markup:
+    """The figure, no wider than it was drawn."""
+    width = 96.0 * float(figure.get_figwidth())
+    return Markup('<figure style="max-width: {:.0f}px">{}</figure>').format(width, svg_of(figure, label, label))
+
+
+def _content(proof: Proof, pictures: dict[str, Markup]) -> dict[str, Any]:
     figures = proof.figures
     median, longest = figures.seconds
     return {
         "style": Markup(_CSS),
         "proof": proof,
         "worlds": figures.worlds,
-        "pictures": {name: Markup(svg) for name, svg in pictures.items()},
+        "pictures": pictures,
         "main": (MAIN, table(figures)),
         "power": (POWER, power_table(figures)),
         "held_out": (HELD_OUT, held_out_table(figures)),
@@ -72,8 +78,7 @@ table { border-collapse: collapse; font-size: 14px; line-height: 1.4; font-varia
 th { text-align: left; color: var(--muted); font-weight: 500; font-size: 12.5px; vertical-align: bottom; }
 th, td { padding: 6px 18px 6px 0; border-bottom: 1px solid var(--rule); vertical-align: top; }
 td.part { padding-left: 18px; }
-figure { margin: 12px 0; } svg { display: block; max-width: 100%; height: auto; }
-svg text { font-family: inherit !important; }
+figure { margin: 12px 0; } svg { display: block; width: 100%; height: auto; }
 .columns { display: grid; grid-template-columns: repeat(2, minmax(0, 1fr)); gap: 24px; }
 @media (max-width: 800px) { .columns { grid-template-columns: minmax(0, 1fr); } main { padding: 22px 16px; } }
 """
@@ -100,13 +105,13 @@ A diagnosis took {{ seconds }} on this machine.</p>
 {{ rows(main) }}
 <p class="note">A world without a diagnosis counts as nothing found; where there is no effect, as a false alarm.</p>
 <h2>What was said of what</h2>
-<figure>{{ pictures.confusion }}</figure>
+{{ pictures.confusion }}
 <p class="note">Worlds with one effect or none. Framed: the right answer. Colour: share of the row.</p>
 <h2>Power against the size of the effect</h2>
-<figure>{{ pictures.power }}</figure>
+{{ pictures.power }}
 {{ rows(power) }}
 <h2>Stated probabilities</h2>
-<figure>{{ pictures.calibration }}</figure>
+{{ pictures.calibration }}
 <p class="note">Each dot: the names that were given with such a probability, how many, and a 95 % interval.
 Brier score {{ brier }}.</p>
 <h2>Pushes predicted while left out</h2>

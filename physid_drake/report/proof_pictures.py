@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import io
-import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any
+from collections.abc import Sequence
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -16,52 +11,14 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from physid_drake.prove.figures import NOT_CATALOGUED, NOTHING, Figures, Share, size_words
+from physid_drake.report.svg import AFTER, BEFORE, INK, MUTED
 
-INK, MUTED, RULE = "#1c2330", "#667085", "#dfe3ea"
-FOUND, NAMED = "#98a1b0", "#2563c9"
+FOUND, NAMED = BEFORE, AFTER
 LAST = ("unexplained", "consistent", "underpowered", "failed")
 """What is said without a name: the last columns of the confusion."""
 
 RIGHT = {NOTHING: "consistent", NOT_CATALOGUED: "unexplained"}
 """What is right where there is no name to be said."""
-
-_STYLE: dict[Any, Any] = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "proof",
-    "font.family": "DejaVu Sans",
-    "font.size": 8.0,
-    "text.color": INK,
-    "axes.edgecolor": "#c3c9d4",
-    "axes.labelcolor": MUTED,
-    "axes.linewidth": 0.6,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "grid.color": RULE,
-    "grid.linewidth": 0.5,
-    "xtick.color": "#c3c9d4",
-    "ytick.color": "#c3c9d4",
-    "xtick.labelcolor": MUTED,
-    "ytick.labelcolor": MUTED,
-}
-
-
-@contextmanager
-def drawn() -> Iterator[None]:
-    """Draw in the proof's style while the block runs, whatever the user's own is."""
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        mpl.rcParams.update(_STYLE)
-        yield
-
-
-def svg_of(figure: Figure) -> str:
-    """A figure as text that stands in a page by itself; the same figure gives the same bytes."""
-    stream = io.StringIO()
-    figure.savefig(stream, format="svg", metadata={"Date": None}, transparent=True)
-    text = stream.getvalue()
-    # What names the format is of no use within HTML, and points to addresses.
-    return re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
 
 
 def confusion_picture(figures: Figures) -> Figure:

@@ -1,4 +1,4 @@
-"""Colours and style of a diagnosis' figures, and figures as SVG that stands in a page."""
+"""Colours and style of all figures, and figures as SVG that stands in a page."""
 
 from __future__ import annotations
 

@@ -11,7 +11,8 @@ from physid_drake.prove.figures import NOT_CATALOGUED, NOTHING, figures_of, tabl
 from physid_drake.prove.score import HeldOut, Outcome, failed_outcome, outcome
 from physid_drake.report.proof import Proof, proof_json, proof_markdown, proof_tables
 from physid_drake.report.proof_page import proof_page
-from physid_drake.report.proof_pictures import confusion_picture, drawn
+from physid_drake.report.proof_pictures import confusion_picture
+from physid_drake.report.svg import drawn
 
 DRAG, TILT, SWIRL = ("viscous_drag",), ("table_tilt",), ("other_swirl",)
 
