@@ -18,14 +18,17 @@ Tick = Callable[[str, int, int], None]
 
 WORTH_A_FIT = 0.35  # of the best score test's gain
 WORTH_A_TRY = 0.1  # where no better one explains the pushes
-ENOUGH = 280  # rollouts per push after which no further effect is tried
+ENOUGH = 180  # rollouts per push in one step after which no further effect is tried
 SURE = 2.0  # standard errors
 LEAST = 4.0  # nats of held-out gain
 CERTAIN = 40.0  # nats of held-out gain, the best push not counted
 UNLIKELY = 0.05  # of the signed-rank test of held-out gains
+BOUND = 10.0  # nats: no push counts more, for or against
 STUCK = 1.6  # cost per degree of freedom after which a fit is tried again from elsewhere
 FELL_SHORT = 0.8  # of the gain that the score test promised: such a fit is tried again too
 PERSISTENT = 2  # candidates that are worth that, where none explains the pushes
+EXPLAINED = 1.5  # cost per degree of freedom above which something is still missing
+LEAST_SHARE = 0.25  # of the cost beyond noise that an effect must take away unless nothing is left
 FAR_OFF = 3.0  # cost per degree of freedom from which the pushes' unknowns would imitate what is missing
 FAR = 0.3  # of theta's unit cube
 
@@ -66,13 +69,15 @@ class Candidate:
         """Whether held-out pushes confirm the effect.
 
         Either most of them do, or, for what only a few pushes feel (a patch, a magnet), more than one does far beyond
-        what the simulator's own error explains.
+        what the simulator's own error explains. Pushes differ in what they feel of an effect, so that the sum of
+        their gains is as unsure as the largest of them; gains are bounded before they are compared with their spread.
         """
         if self.degenerate or self.gain < LEAST:
             return False
+        bounded = np.clip(self.gains, -BOUND, BOUND)
         some = np.sort(self.gains)[:-1]
         local = some.sum() > CERTAIN and (self.gains > CERTAIN / 4.0).sum() >= 2
-        return bool((self.gain > SURE * self.standard_error and self._most_gain()) or local)
+        return bool((bounded.sum() > SURE * standard_error(bounded) and self._most_gain()) or local)
 
     def _most_gain(self) -> bool:
         """Whether gains outweigh losses in number and size; one large gain does not make an effect."""
@@ -100,24 +105,25 @@ def confirm(
         before: the model so far.
         scores: of the effects that are not in it.
         tick: told which effect is fitted.
-        most: effects that are fitted in any case, if they are worth it; as long as none of them explains the pushes,
-            twice as many. Far from the plain cell a score test says little of what a fit will find.
+        most: effects that are fitted in any case, if they are worth it; as long as none takes a good part of the
+            mismatch away, twice as many. Far from the plain cell a score test says little of what a fit will find.
     """
     ordered = sorted((s for s in scores if s.kept), key=lambda s: -s.gain)
     worth = [s for s in ordered if s.gain >= WORTH_A_FIT * ordered[0].gain][:most]
     rest = [s for s in ordered[len(worth) :] if s.gain >= WORTH_A_TRY * ordered[0].gain]
     more = rest[: 2 * most - len(worth)]
     plain = push_scores(before)
+    spent = fitter.case.pool.count + ENOUGH * len(fitter.case.problems)
     found: list[Candidate] = []
     for k, one in enumerate((*worth, *more)):
-        if k >= len(worth) and (_explained(found) or _spent(fitter)):
+        if k >= len(worth) and (any(worthwhile(before, c) for c in found) or fitter.case.pool.count > spent):
             break
         tick(f"fit with {one.kind.name}", k, len(worth))
         found.append(_candidate(fitter, one, _fit(fitter, before, one), plain))
     found = _ranked(found)
     for k, candidate in enumerate(found[:PERSISTENT]):
         short = candidate.fitted.score - before.score < FELL_SHORT * 0.5 * candidate.score.gain
-        if (_explained(found) and not short) or _spent(fitter):
+        if (_explained(found) and not short) or fitter.case.pool.count > spent:
             continue
         tick(f"fit with {candidate.name} once more", k, PERSISTENT)
         again = _fit_from_afar(fitter, before, candidate)
@@ -126,16 +132,25 @@ def confirm(
     return tuple(_ranked(found))
 
 
+def worthwhile(before: Fitted, candidate: Candidate) -> bool:
+    """Whether an accepted effect takes away a good part of what noise does not account for, where much is left."""
+    after = candidate.fitted.reduced_chi2
+    enough = after <= EXPLAINED or after - 1.0 <= (1.0 - LEAST_SHARE) * (before.reduced_chi2 - 1.0)
+    return candidate.accepted and enough
+
+
+def rejudged(candidates: Sequence[Candidate], plain: Fitted) -> tuple[Candidate, ...]:
+    """The candidates with their gains over another model."""
+    before = push_scores(plain)
+    return tuple(_ranked([dc.replace(c, gains=push_scores(c.fitted) - before) for c in candidates]))
+
+
 def _ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
     return sorted(candidates, key=lambda c: (c.degenerate, -c.gain))
 
 
 def _explained(candidates: Sequence[Candidate]) -> bool:
     return any(c.fitted.reduced_chi2 <= STUCK for c in candidates)
-
-
-def _spent(fitter: Fitter) -> bool:
-    return fitter.case.pool.count > ENOUGH * len(fitter.case.problems)
 
 
 def _candidate(fitter: Fitter, one: Score, fitted: Fitted, plain: Array) -> Candidate:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.confirm import Candidate
+from physid_drake.diagnose.confirm import EXPLAINED, Candidate
 from physid_drake.diagnose.fit import Fitted, Fitter
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.screen import Screening, Signature
@@ -21,7 +21,6 @@ Tick = Callable[[str, int, int], None]
 
 # The cell's own error that guard, floor and tolerances leave: cost per degree of freedom where nothing is missing.
 SLACK = 1.15
-EXPLAINED = 1.5  # cost per degree of freedom above which something is still missing
 
 
 @dc.dataclass(frozen=True, kw_only=True)

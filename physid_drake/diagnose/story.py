@@ -10,22 +10,16 @@ from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.conclude import class_of, conclude
-from physid_drake.diagnose.confirm import Candidate, confirm, push_scores
+from physid_drake.diagnose.confirm import EXPLAINED, Candidate, confirm, push_scores, rejudged, worthwhile
 from physid_drake.diagnose.estimates import rms
-from physid_drake.diagnose.evidence import EXPLAINED, Evidence, mismatch
+from physid_drake.diagnose.evidence import Evidence, mismatch
 from physid_drake.diagnose.fit import Fitted, Fitter, State
 from physid_drake.diagnose.linear import own_unknowns
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
 from physid_drake.diagnose.memory import Memory
 from physid_drake.diagnose.next_push import next_push
 from physid_drake.diagnose.plain import coarse, fit_plain, numerics
-from physid_drake.diagnose.screen import (
-    Signature,
-    empty_signatures,
-    screen,
-    signatures,
-    tolerances,
-)
+from physid_drake.diagnose.screen import Screening, Signature, empty_signatures, screen, signatures, tolerances
 from physid_drake.diagnose.values import Diagnosis
 from physid_drake.effects import Effect, applicable
 
@@ -33,13 +27,11 @@ Array = NDArray[np.float64]
 Tick = Callable[[str, int, int], None]
 
 MOST_EFFECTS = 3
-LEAST_SHARE = 0.25  # of the cost beyond noise that an effect must take away unless nothing is left
-LONGEST = 450  # rollouts per push after which no further effect is looked for
+LONGEST = 600  # rollouts per push after which no further effect is looked for
 ANOTHER_BASIN = 10.0  # nats by which a plain fit must be better to be another one
 LOUDER = 4  # rounds in which an unknown noise is found
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
-HOPELESS = 6.0  # cost per degree of freedom with an effect: no second one of the catalogue will make up for that,
-PROMISING = 0.3  # unless so little is left of what there was before
+HOPELESS = 6.0  # cost per degree of freedom with two effects: no third one of the catalogue will make up for that
 
 
 def diagnose(
@@ -83,66 +75,123 @@ def gather(
     guard, found = _looks(rough, first, kinds, tick, memory)
     allowed = tolerances(rough, found)
     fitter = Fitter(rough, guard, allowed)
-    plain = fitter.guard(first)
-    screening = screen(plain, found, screen_rng)
-    current, remaining, at = plain, screening, found
-    steps: list[tuple[Candidate, ...]] = []
-    rejected: tuple[Candidate, ...] = ()
-    while (
-        len(steps) < min(MOST_EFFECTS, len(kinds))
-        and rough.pool.count < LONGEST * len(case.problems)
-        and mismatch(current, remaining) < alpha
-    ):
-        candidates = confirm(fitter, current, remaining.scores, tick, most=CANDIDATES - len(steps))
-        if current is plain and candidates:
-            better = _plain_from(fitter, plain, candidates[0], tick)
-            if better is not None:
-                # The effect only led out of a wrong basin of theta: everything again from the better plain fit.
-                plain = current = better
-                at = found = signatures(Fitter(rough), Fitter(rough).linearise(plain.state), kinds)
-                screening = remaining = screen(plain, found, screen_rng)
-                continue
-        if not candidates or not candidates[0].accepted or not _worthwhile(current, candidates[0].fitted):
-            rejected = candidates
-            break
-        steps.append(candidates)
-        tick(f"model with {candidates[0].name}", 0, 0)
-        before, current = current, _model_with(fitter, candidates[0])
-        if current.reduced_chi2 > max(HOPELESS, PROMISING * before.reduced_chi2):
-            break
-        # The signatures at the plain cell are near enough to ask whether anything is left.
-        left = [s for s in at if s.kind not in {e.kind for e in current.state.effects}]
-        remaining = screen(current, left, screen_rng)
-        if mismatch(current, remaining) < alpha and len(steps) < MOST_EFFECTS:
-            tick("score tests of what is left", 0, 0)
-            missing = [k for k in kinds if k not in {e.kind for e in current.state.effects}]
-            at = signatures(Fitter(rough), current, missing)
-            remaining = screen(current, at, screen_rng)
-    steps = [_reconsidered(fitter, plain, current, k, step, tick) for k, step in enumerate(steps)]
+    grown = _grown(fitter, _Looked.at(fitter.guard(first), found, screen_rng), kinds, alpha, screen_rng, tick)
+    grown = _pruned(fitter, grown, screen_rng, tick)
+    plain = grown.base.fitted
+    steps = [_reconsidered(fitter, plain, grown.last.fitted, k, step, tick) for k, step in enumerate(grown.steps)]
     fine = Fitter(case, guard, allowed)
     tick("on short ticks", 0, 0)
     refined = fine.refine(plain)
-    final = fine.refine(current) if steps else refined
+    final = fine.refine(grown.last.fitted) if steps else refined
     case.pool.count += rough.pool.count
     return Evidence(
-        case=case, fitter=fine, plain=refined, screening=screening, signatures=tuple(found), steps=tuple(steps),
-        rejected=rejected, final=final, remaining=remaining,
+        case=case, fitter=fine, plain=refined, screening=grown.base.screening, signatures=grown.base.signatures,
+        steps=tuple(steps), rejected=grown.rejected, final=final, remaining=grown.last.screening,
     )  # fmt: skip
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class _Looked:
+    """A model, what the catalogue's effects would change of it, and their score tests."""
+
+    fitted: Fitted
+    signatures: tuple[Signature, ...]
+    screening: Screening
+
+    @classmethod
+    def at(cls, fitted: Fitted, signatures: Sequence[Signature], rng: np.random.Generator) -> _Looked:
+        return cls(fitted=fitted, signatures=tuple(signatures), screening=screen(fitted, signatures, rng))
+
+    @property
+    def p_value(self) -> float:
+        """Of "nothing is missing"."""
+        return mismatch(self.fitted, self.screening)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class _Grown:
+    """A model grown effect by effect: the plain one, the last, the steps between, and what a last step rejected."""
+
+    base: _Looked
+    last: _Looked
+    steps: tuple[tuple[Candidate, ...], ...]
+    rejected: tuple[Candidate, ...]
+
+
+def _grown(
+    fitter: Fitter,
+    base: _Looked,
+    kinds: Sequence[type[Effect]],
+    alpha: float,
+    rng: np.random.Generator,
+    tick: Tick,
+) -> _Grown:
+    """Add the effect that pushes left out confirm most, as long as something is missing."""
+    last, steps = base, list[tuple[Candidate, ...]]()
+    longest = LONGEST * len(fitter.case.problems)
+    while len(steps) < min(MOST_EFFECTS, len(kinds)) and fitter.case.pool.count < longest and last.p_value < alpha:
+        candidates = confirm(fitter, last.fitted, last.screening.scores, tick, most=CANDIDATES - len(steps))
+        if not steps and candidates:
+            better = _plain_from(fitter, base.fitted, candidates[0], tick)
+            if better is not None:
+                # The effect led out of a wrong basin of theta, and perhaps did nothing else.
+                if better.reduced_chi2 <= EXPLAINED:
+                    base = last = _Looked.at(better, signatures(Fitter(fitter.case), better, kinds), rng)
+                    continue
+                base = last = _Looked.at(better, base.signatures, rng)
+                candidates = rejudged(candidates, better)
+        if not candidates or not worthwhile(last.fitted, candidates[0]):
+            return _Grown(base=base, last=last, steps=tuple(steps), rejected=candidates)
+        steps.append(candidates)
+        tick(f"model with {candidates[0].name}", 0, 0)
+        model = _model_with(fitter, candidates[0])
+        hopeless = len(steps) > 1 and model.reduced_chi2 > HOPELESS
+        more = not hopeless and len(steps) < MOST_EFFECTS and fitter.case.pool.count < longest
+        last = _what_is_left(fitter, model, last.signatures, kinds, rng, tick, alpha if more else 0.0)
+        if hopeless:
+            break
+    return _Grown(base=base, last=last, steps=tuple(steps), rejected=())
+
+
+def _pruned(fitter: Fitter, grown: _Grown, rng: np.random.Generator, tick: Tick) -> _Grown:
+    """Without the effects that a later one made superfluous: they had stood in for what was still missing."""
+    last, steps = grown.last, list(grown.steps)
+    for k in reversed(range(len(steps) - 1)):
+        name = steps[k][0].name
+        tick(f"model without {name}", 0, 0)
+        effects = tuple(e for e in last.fitted.state.effects if e.kind.name != name)
+        without = fitter.fit(dc.replace(last.fitted.state, effects=effects), rounds=4, like=last.fitted)
+        gains = push_scores(last.fitted) - push_scores(without)
+        if not dc.replace(steps[k][0], fitted=last.fitted, gains=gains).accepted:
+            missed = [s for s in grown.base.signatures if s.kind.name == name]
+            last = _Looked.at(without, (*last.signatures, *missed), rng)
+            del steps[k]
+    return dc.replace(grown, last=last, steps=tuple(steps))
+
+
+def _what_is_left(
+    fitter: Fitter, model: Fitted, before: Sequence[Signature], kinds: Sequence[type[Effect]],
+    rng: np.random.Generator, tick: Tick, alpha: float,
+) -> _Looked:  # fmt: skip
+    """The score tests of what a model leaves; signatures are taken anew only if something is missing at ``alpha``."""
+    present = {e.kind for e in model.state.effects}
+    # Those of the model before are near enough to ask whether anything is left.
+    looked = _Looked.at(model, [s for s in before if s.kind not in present], rng)
+    if looked.p_value >= alpha:
+        return looked
+    tick("score tests of what is left", 0, 0)
+    fresh = signatures(Fitter(fitter.case), model, [k for k in kinds if k not in present])
+    return _Looked.at(model, fresh, rng)
 
 
 def _plain_from(fitter: Fitter, plain: Fitted, candidate: Candidate, tick: Tick) -> Fitted | None:
     """A better plain fit from the theta at which an effect's fit ended; None where there is none."""
-    if candidate.fitted.score - plain.score < ANOTHER_BASIN:
+    lost = candidate.fitted.reduced_chi2 > HOPELESS  # and so is its theta
+    if lost or candidate.fitted.score - plain.score < ANOTHER_BASIN:
         return None
     tick("plain fit from there", 0, 0)
     again = fitter.fit(fitter.start(candidate.fitted.state.u), rounds=4, careful=2, renew=True)
     return again if again.score - plain.score > ANOTHER_BASIN else None
-
-
-def _worthwhile(before: Fitted, after: Fitted) -> bool:
-    """Whether an effect takes away a good part of what noise does not account for, where much is left."""
-    excess = after.reduced_chi2 - 1.0
-    return after.reduced_chi2 <= EXPLAINED or excess <= (1.0 - LEAST_SHARE) * (before.reduced_chi2 - 1.0)
 
 
 def _first(case: Case, rng: np.random.Generator, tick: Tick, memory: Memory) -> Fitted:

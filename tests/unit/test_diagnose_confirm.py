@@ -25,6 +25,8 @@ def candidate(gains, *, degenerate=False):
         ),  # as a simulator's own error gives
         ([-1.0, -0.5, 120.0, 0.2, -1.5, 260.0, 90.0, -0.3, -0.2], True),  # a patch that three pushes cross
         ([-1.0, -0.5, 500.0, 0.2, -1.5, 0.3, -0.4, -0.3, -0.2], False),  # one odd push is no physics
+        # Every push that feels it gains, one far more than the others.
+        ([-0.8, -1.1, 12.8, -0.2, 0.5, 2.3, 1.4, 41.2, 9.9, 2.2, -0.4, 0.0, 3.2, 8.7, 0.2], True),
         ([-3.0, -2.0, -4.0, -1.0, -2.0, -3.5], False),
     ],
 )
