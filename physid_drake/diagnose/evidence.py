@@ -21,6 +21,8 @@ Tick = Callable[[str, int, int], None]
 
 # The cell's own error that guard, floor and tolerances leave: cost per degree of freedom where nothing is missing.
 SLACK = 1.15
+LAW_ERROR = 0.1  # of an effect's motion: two honest implementations of a spring or a liquid differ by that much
+MOST_LEFT = 3.0  # cost per degree of freedom that is never explained
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -67,6 +69,7 @@ def mismatch(fitted: Fitted, screening: Screening | None) -> float:
     return float(-np.expm1(2.0 * np.log1p(-min(best, 1.0 - 1e-16))))
 
 
-def unexplained(fitted: Fitted) -> bool:
-    """Whether what is left is more than noise and the cell's own error."""
-    return fitted.reduced_chi2 > EXPLAINED
+def unexplained(plain: Fitted, final: Fitted) -> bool:
+    """Whether a model leaves more than noise, the cell's error and what two honest laws of an effect differ by."""
+    allowed = min(EXPLAINED + LAW_ERROR**2 * max(0.0, plain.reduced_chi2 - 1.0), MOST_LEFT)
+    return final.reduced_chi2 > allowed
