@@ -9,7 +9,9 @@ from physid_drake.plan.robot import SimulatedRobot as SimulatedRobot
 from physid_drake.plan.story import Plan as Plan
 from physid_drake.plan.story import Spread as Spread
 from physid_drake.plan.story import SweepRow as SweepRow
+from physid_drake.plan.story import outcome_under as outcome_under
 from physid_drake.plan.story import plan as plan
+from physid_drake.plan.task import policy_for as policy_for
 from physid_drake.plan.trajectory import Ending as Ending
 from physid_drake.plan.trajectory import Situation as Situation
 from physid_drake.plan.trajectory import Trajectory as Trajectory
