@@ -19,6 +19,8 @@ THETA_STEP = 0.006  # of the unit cube
 OWN_STEP = 0.5  # of the prior standard deviation
 MOST_OWN = 3.0  # standard deviations: unknowns are linearised no further out
 FAILED = 1e4  # standard deviations: features of a rollout that diverged
+SETTLED = 0.5  # of the cost: a step that gained less is the last
+REFINEMENTS = 3  # steps on short ticks
 RENEWED = 5.0  # of the cost, per push: a step that gained as much has left the place of its derivatives
 MOST_THETA_MOVE = 0.25  # of the unit cube in one iteration
 Say = Callable[[str], None]
@@ -165,7 +167,13 @@ class Fitter:
     # Linearisation.
 
     def linearise(
-        self, state: State, *, learn_scatter: bool = True, like: Fitted | None = None, fresh_theta: bool = False
+        self,
+        state: State,
+        *,
+        learn_scatter: bool = True,
+        like: Fitted | None = None,
+        fresh_theta: bool = False,
+        at: Fitted | None = None,
     ) -> Fitted:
         """All derivatives at a state, by differences.
 
@@ -175,23 +183,40 @@ class Fitter:
             like: a fitted model whose derivatives with respect to theta and the pushes' unknowns are near enough:
                 only those of the effects are taken.
             fresh_theta: take those of theta nevertheless.
+            at: a model at this very state, whose rollouts need not be made again.
         """
         theta, own = like is None or fresh_theta, like is None
         tasks: list[Task] = []
         owners: list[int] = []
         for i in range(len(self.case.problems)):
-            mine = self._tasks_of(state, i, theta=theta, own=own)
+            mine = self._tasks_of(state, i, theta=theta, own=own)[0 if at is None else 1 :]
             tasks += mine
             owners += [i] * len(mine)
         vectors = self.vectors(tasks)
         pushes, predicted = [], []
         for i in range(len(self.case.problems)):
-            mine_vectors = [v for v, owner in zip(vectors, owners, strict=True) if owner == i]
+            mine_vectors = [] if at is None else [at.predicted[i]]
+            mine_vectors += [v for v, owner in zip(vectors, owners, strict=True) if owner == i]
             pushes.append(
                 self._linear_push(state, i, mine_vectors, None if like is None else like.pushes[i], theta=theta)
             )
             predicted.append(mine_vectors[0])
         return self._fitted(state, tuple(pushes), tuple(predicted), learn_scatter)
+
+    def _seen_from(self, best: Fitted, state: State, *, learn_scatter: bool = True) -> Fitted:
+        """The model at another state with the derivatives of ``best``: one rollout per push."""
+        predicted = self.vectors([self.task(state, i) for i in range(len(self.case.problems))])
+        pushes = tuple(
+            dc.replace(push, residual=self._residual(state, i, base, push.own))
+            for i, (push, base) in enumerate(zip(best.pushes, predicted, strict=True))
+        )
+        return self._fitted(state, pushes, tuple(predicted), learn_scatter)
+
+    def _residual(self, state: State, i: int, predicted: Array, own: Array) -> Array:
+        """Recorded less predicted (m,), as if the push's unknowns were zero."""
+        values = np.clip(state.own[i], -MOST_OWN, MOST_OWN)
+        residual: Array = self.case.features[i].recorded - predicted + own[:, : len(values)] @ values
+        return residual
 
     def _theta_steps(self, state: State) -> list[Array]:
         steps = []
@@ -254,9 +279,8 @@ class Fitter:
             all_own = own if self.extra is None else np.column_stack([own, self.extra[i]])
         else:
             all_own = like.own
-            own = like.own[:, : len(state.own[i])]
         return LinearPush(
-            residual=self.case.features[i].recorded - base + own @ np.clip(state.own[i], -MOST_OWN, MOST_OWN),
+            residual=self._residual(state, i, base, all_own),
             shared=self._with_tolerances(i, columns),
             own=all_own,
             noise=self.case.features[i].noise,
@@ -348,23 +372,23 @@ class Fitter:
         for k in range(rounds):
             if say is not None:
                 say(f"round {k + 1} of at most {rounds}")
-            trial = self._tried(best, like, cautious=k < careful, released=k + 1 >= careful)
+            released = k + 1 >= careful
+            trial = self._tried(best, cautious=k < careful, released=released)
             gained = actual_cost(best) - actual_cost(trial)
             if gained <= 0.0 and k + 1 != careful:
                 break
-            best = trial
-            if gained < 0.5 and k >= careful:
-                break
-            if renew and k + 1 < rounds and gained > RENEWED * len(best.pushes):
-                like = best = self.linearise(best.state, learn_scatter=k + 1 >= careful)
+            if gained < SETTLED and k >= careful:
+                return trial
+            anew = renew and k + 1 < rounds and gained > RENEWED * len(best.pushes)
+            best = self.linearise(trial.state, learn_scatter=released, like=None if anew else like, at=trial)
+            like = best if anew else like
         return best
 
-    def _tried(self, best: Fitted, like: Fitted | None, *, cautious: bool, released: bool) -> Fitted:
-        """One step, shorter where a long one fails.
+    def _tried(self, best: Fitted, *, cautious: bool, released: bool) -> Fitted:
+        """One step, shorter where a long one fails; the derivatives stay those of where it starts.
 
         Args:
             best: where it starts.
-            like: gives derivatives.
             cautious: keep the pushes' unknowns at zero.
             released: learn the scatter; in the step that is both, the cost changes its meaning and is not compared.
         """
@@ -373,16 +397,21 @@ class Fitter:
             step = self.stepped(best, share)
             if cautious:
                 step = dc.replace(step, own=tuple(np.zeros_like(o) for o in step.own))
-            trial = self.linearise(step, learn_scatter=released, like=like)
+            trial = self._seen_from(best, step, learn_scatter=released)
             if actual_cost(trial) < actual_cost(best) or (cautious and released):
                 break
         return trial
 
     def refine(self, rough: Fitted) -> Fitted:
-        """What another cell's fit left, here: theta's and effects' derivatives anew, then a step if it helps."""
-        start = self.linearise(rough.state, like=rough, fresh_theta=True)
-        moved = self.linearise(self.stepped(start), like=start)
-        return moved if actual_cost(moved) < actual_cost(start) else start
+        """What another cell's fit left, here: derivatives of theta and effects anew, then steps while they help."""
+        best = self.linearise(rough.state, like=rough, fresh_theta=True)
+        for _ in range(REFINEMENTS):
+            moved = self._seen_from(best, self.stepped(best))
+            gained = actual_cost(best) - actual_cost(moved)
+            best = moved if gained > 0.0 else best
+            if gained < SETTLED:
+                break
+        return best
 
     def stepped(self, fitted: Fitted, share: float = 1.0) -> State:
         """The state after a Gauss-Newton step."""
