@@ -23,20 +23,24 @@ class ThetaConfig:
 
 @dc.dataclass
 class SearchConfig:
-    """Greedy entropy search.
+    """The search over theta.
 
     Attributes:
+        method: a name in ``search.SEARCHES``.
         candidates: number of thetas in the candidate set.
         budget: thetas tried.
         batch: thetas per update of the belief.
         entropy_tolerance_nats: the search stops when the entropy of P_min moves less than this.
         patience: over so many updates.
+        refine_every: trials after which the candidates gather where the best theta may be; 0 keeps one fixed set.
         jobs: processes; 0 takes the machine's cores.
     """
 
+    method: str = "greedy_entropy"
     candidates: int = 1000
     budget: int = 40
     batch: int = 1
     entropy_tolerance_nats: float = 0.1
     patience: int = 5
+    refine_every: int = 5
     jobs: int = 0

@@ -23,7 +23,7 @@ from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems
 from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.recording import Recording
-from physid_drake.search import GreedyEntropySearch, SearchResult, search_minimum
+from physid_drake.search import SearchResult, search_minimum, search_named
 from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
@@ -152,7 +152,7 @@ class Identifier:
             recording.object, solid.outline, (cell.friction_cells[0], cell.friction_cells[1]), theta,
             cell.default_mass_kg,
         )  # fmt: skip
-        self._config = search
+        self._config, self._chooser = search, search_named(search.method)
         self.pool = RolloutPool(spec_of(recording, cell), self.thetas, jobs=search.jobs)
         self._streams = np.random.SeedSequence(seed).spawn(2)
         train, held = split_pushes(len(self.problems), held_out_share, np.random.default_rng(self._streams[0]))
@@ -181,7 +181,7 @@ class Identifier:
         return self._identification(found, polisher.run(start))
 
     def search(self) -> SearchResult:
-        """Greedy entropy search over a candidate set."""
+        """The configured search, over candidates drawn from the prior."""
         rng = np.random.default_rng(self._streams[1])
         space, config = self.thetas.space, self._config
         candidates = space.sample(rng, config.candidates, from_prior=True)
@@ -193,12 +193,12 @@ class Identifier:
                 part = self._state.with_suffix(".part")
                 belief.to_npz(part)
                 part.replace(self._state)
-            self._progress("greedy entropy search", belief.n_trials, config.budget)
+            self._progress(f"search ({config.method.replace('_', ' ')})", belief.n_trials, config.budget)
 
         return search_minimum(
-            self._objective, space, candidates, GreedyEntropySearch(), budget=config.budget, rng=rng,
+            self._objective, space, candidates, self._chooser, budget=config.budget, rng=rng,
             batch=config.batch, entropy_tolerance=config.entropy_tolerance_nats, patience=config.patience,
-            on_trial=keep, resume_from=resume,
+            refine_every=config.refine_every, on_trial=keep, resume_from=resume,
         )  # fmt: skip
 
     def _saved_belief(self, candidates: Array) -> Belief | None:
@@ -206,8 +206,9 @@ class Identifier:
         if self._state is None or not self._state.exists():
             return None
         belief = Belief.from_npz(self._state)
-        same = belief.candidates.shape == candidates.shape and np.array_equal(belief.candidates, candidates)
-        return belief if same else None
+        # Candidates follow the belief, but the first trial is one of those that the search began with.
+        begun = belief.n_trials == 0 or bool(np.any(np.all(belief.thetas[0] == candidates, axis=1)))
+        return belief if begun and belief.candidates.shape == candidates.shape else None
 
     def _objective(self, thetas: Array) -> Array:
         """Log of the rms misfit in standard deviations (k,): its minimum is the misfit's, and it spans decades."""
