@@ -19,10 +19,11 @@ from physid_drake.errors import ConfigError, PhysidError
 from physid_drake.identify import Identification, Identifier
 from physid_drake.identify.nuisance import nuisance_of
 from physid_drake.identify.rollouts import Task, simulate
-from physid_drake.identify.system import PUSH_PERIOD, IdentificationSystem, RecordingPlayer
+from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, RecordingPlayer
 from physid_drake.plan import Plan
 from physid_drake.plan.system import Planner, PolicySystem, identified_model, planner_of
 from physid_drake.recording import Recording, read_recording
+from physid_drake.report.cells import cells_table
 from physid_drake.report.page import result_page
 from physid_drake.report.plan import plan_table, push_files
 from physid_drake.report.progress import progress_bar
@@ -89,6 +90,8 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     result, plan = _identify(identifier, planner, recording, console)
     console.print()
     console.print(estimates_table(result, recording.name))
+    if result.cells is not None:
+        console.print(cells_table(result.cells))
     console.print(accuracy_table(result))
     console.print(verdict(result))
     if identifier.pool.diverged:
@@ -176,8 +179,7 @@ def _identify(
         player = builder.AddSystem(RecordingPlayer(recording.pushes))
         system = builder.AddSystem(
             IdentificationSystem(
-                lambda _: identifier.run(bar),
-                after=len(recording.pushes),
+                BatchLearner(lambda _: identifier.run(bar), after=len(recording.pushes)),
                 dimension=identifier.thetas.space.dimension,
                 nominal=identifier.thetas.space.nominal,
             )

@@ -263,6 +263,7 @@ class Belief:
         header = {
             "format": _FORMAT,
             "parameters": [asdict(p) for p in self.space.parameters],
+            "correlation": self.space.correlation,
             "settings": asdict(self.settings),
             "n_at_fit": self.gaussian_process.n_at_fit,
             "prior_power": self.prior_power,
@@ -293,7 +294,9 @@ class Belief:
             saved: dict[str, Any] = {name: arrays[name] for name in _SAVED}
             amplitude, noise = (float(v) for v in arrays["variances"])
             hyper = Hyperparameters(amplitude=amplitude, lengths=arrays["lengths"], noise=noise)
-        space = ParameterSpace(parameters=tuple(Parameter(**p) for p in header["parameters"]))
+        space = ParameterSpace(
+            parameters=tuple(Parameter(**p) for p in header["parameters"]), correlation=header["correlation"]
+        )
         process = GaussianProcess(
             u=space.to_unit(saved["thetas"]),
             targets=_targets(saved["errors"]),

@@ -15,6 +15,7 @@ from physid_drake.belief import Belief
 from physid_drake.cell import CellConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
+from physid_drake.identify.cells import CellsTold, cells_told, tied_cells
 from physid_drake.identify.config import SearchConfig, ThetaConfig
 from physid_drake.identify.misfit import whitened_residual
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
@@ -87,6 +88,7 @@ class Identification:
         training, held_out: names of the pushes.
         before, after: accuracy on held-out pushes with the prior's theta and with the estimate.
         fitted: accuracy on the training pushes.
+        cells: what the pushes tell about friction cells; None without a grid of them.
     """
 
     thetas: ThetaMap
@@ -101,6 +103,7 @@ class Identification:
     before: Accuracy | None
     after: Accuracy | None
     fitted: Accuracy
+    cells: CellsTold | None = None
 
 
 Progress = Callable[[str, int, int], None]
@@ -148,10 +151,11 @@ class Identifier:
         self.recording = recording
         self.noise = noise_of(recording)
         self.problems = problems_of(recording, self.noise, solid.height)
-        self.thetas = theta_map(
+        free = theta_map(
             recording.object, solid.outline, (cell.friction_cells[0], cell.friction_cells[1]), theta,
             cell.default_mass_kg,
         )  # fmt: skip
+        self.thetas = tied_cells(free, solid.outline, theta)
         self._config, self._chooser = search, search_named(search.method)
         self.pool = RolloutPool(spec_of(recording, cell), self.thetas, jobs=search.jobs)
         self._streams = np.random.SeedSequence(seed).spawn(2)
@@ -238,8 +242,7 @@ class Identifier:
     def accuracy(self, problems: Sequence[PushProblem], theta: Array) -> Accuracy:
         """How well theta (d,) predicts some pushes."""
         predictions = self.pool.run([self._task(problem, theta) for problem in problems])
-        pairs = [(p, r) for p, r in zip(problems, predictions, strict=True) if r is not None]
-        return _accuracy(pairs, self.noise, len(problems) - len(pairs))
+        return accuracy_of(list(zip(problems, predictions, strict=True)), self.noise)
 
     def _identification(self, found: SearchResult, polished: Polished) -> Identification:
         theta = polished.theta
@@ -259,6 +262,7 @@ class Identifier:
             before=self.accuracy(held, self.thetas.space.nominal) if held else None,
             after=self.accuracy(held, theta) if held else None,
             fitted=self.accuracy(self.training, theta),
+            cells=cells_told(self.thetas, polished),
         )
 
 
@@ -275,7 +279,7 @@ def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
     information = polished.jacobian.T @ polished.jacobian
     covariance = np.linalg.inv(information)
     prior_rows = polished.jacobian[-space.dimension :]
-    prior_spread = np.sqrt(1.0 / np.diag(prior_rows.T @ prior_rows))
+    prior_spread = np.sqrt(np.diag(np.linalg.inv(prior_rows.T @ prior_rows)))
     curvature = np.sqrt(np.diag(covariance))
     z, spread = float(stats.norm.ppf(0.95)), curvature
     pushes, free = len(polished.residuals), len(polished.residuals) - space.dimension
@@ -324,7 +328,10 @@ def _pulls(polished: Polished) -> Array:
     return np.array(pulls)
 
 
-def _accuracy(pairs: list[tuple[PushProblem, Prediction]], noise: Noise, diverged: int) -> Accuracy:
+def accuracy_of(made: Sequence[tuple[PushProblem, Prediction | None]], noise: Noise) -> Accuracy:
+    """The accuracy of predictions, those that diverged (None) left out and counted."""
+    pairs = [(p, r) for p, r in made if r is not None]
+    diverged = len(made) - len(pairs)
     if not pairs:
         nothing = float("inf")
         return Accuracy(
