@@ -38,6 +38,8 @@ class SearchConfig:
         patience: over so many updates.
         refine_every: trials after which the candidates gather where the best theta may be; 0 keeps one fixed set.
         jobs: processes; 0 takes the machine's cores.
+        online: learn from one push after another, with a small search for each, instead of from all at once. Every
+            push is learned from, none is held out.
     """
 
     method: str = "greedy_entropy"
@@ -48,3 +50,4 @@ class SearchConfig:
     patience: int = 5
     refine_every: int = 5
     jobs: int = 0
+    online: bool = False

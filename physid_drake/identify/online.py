@@ -108,7 +108,7 @@ class OnlineIdentifier:
 
     def __init__(
         self, recording: Recording, *, cell: CellConfig, theta: ThetaConfig, search: SearchConfig, seed: int,
-        budget: int = BUDGET, progress: Progress | None = None,
+        budget: int = BUDGET, pool: RolloutPool | None = None, progress: Progress | None = None,
     ) -> None:  # fmt: skip
         """Prepare.
 
@@ -119,13 +119,14 @@ class OnlineIdentifier:
             search: its method and number of processes; the other numbers are those of the batch search.
             seed: of everything random.
             budget: rollouts of the search on a new push.
+            pool: of the same cell and theta, to share; None makes one.
             progress: told stage, steps done, steps in all.
         """
         solid = solid_of(recording.object.shape)
         grid = (cell.friction_cells[0], cell.friction_cells[1])
         free = theta_map(recording.object, solid.outline, grid, theta, cell.default_mass_kg)
         self.thetas: ThetaMap = tied_cells(free, solid.outline, theta)
-        self.pool = RolloutPool(spec_of(recording, cell), self.thetas, jobs=search.jobs)
+        self.pool = pool or RolloutPool(spec_of(recording, cell), self.thetas, jobs=search.jobs)
         self._recording, self._height = recording, solid.height
         self._chooser, self._seed, self._budget = search_named(search.method), seed, budget
         self._progress: Progress = progress or (lambda stage, done, total: None)
