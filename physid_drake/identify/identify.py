@@ -89,6 +89,8 @@ class Identification:
         before, after: accuracy on held-out pushes with the prior's theta and with the estimate.
         fitted: accuracy on the training pushes.
         cells: what the pushes tell about friction cells; None without a grid of them.
+        foreseen: accuracy on each push before it was learned from; None where all were learned at once. ``fitted`` is
+            then each push's right after.
     """
 
     thetas: ThetaMap
@@ -104,6 +106,7 @@ class Identification:
     after: Accuracy | None
     fitted: Accuracy
     cells: CellsTold | None = None
+    foreseen: Accuracy | None = None
 
 
 Progress = Callable[[str, int, int], None]
@@ -351,6 +354,21 @@ def accuracy_of(made: Sequence[tuple[PushProblem, Prediction | None]], noise: No
         sigmas=_rms(whitened),
         diverged=diverged,
     )
+
+
+def pooled(accuracies: Sequence[Accuracy]) -> Accuracy:
+    """The root mean square of several accuracies, each counting alike; those of nothing are left out."""
+    fine = [a for a in accuracies if math.isfinite(a.sigmas)]
+    forces = [a.force for a in fine if a.force is not None]
+
+    def rms(name: str) -> float:
+        return _rms(np.array([getattr(a, name) for a in fine])) if fine else float("inf")
+
+    return Accuracy(
+        position=rms("position"), rotation=rms("rotation"), end_position=rms("end_position"),
+        end_rotation=rms("end_rotation"), force=_rms(np.array(forces)) if forces else None, sigmas=rms("sigmas"),
+        diverged=sum(a.diverged for a in accuracies),
+    )  # fmt: skip
 
 
 def _rms(values: Array) -> float:

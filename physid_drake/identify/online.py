@@ -14,7 +14,7 @@ from physid_drake.cell import CellConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.identify.cells import cells_told, tied_cells
 from physid_drake.identify.config import SearchConfig, ThetaConfig
-from physid_drake.identify.identify import Accuracy, Identification, accuracy_of, estimates_of
+from physid_drake.identify.identify import Accuracy, Identification, accuracy_of, estimates_of, pooled
 from physid_drake.identify.linearise import PushTerm, linearised, prior_slope
 from physid_drake.identify.misfit import whitened_residual
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
@@ -32,7 +32,7 @@ Progress = Callable[[str, int, int], None]
 BUDGET = 12  # rollouts of the search on a new push
 CANDIDATES = 256
 PRIOR_SHARE = 0.1  # of the candidates, drawn from P_0: what the Gaussian rules out may still be tried
-ROUNDS = 3  # linearisations of a new push
+ROUNDS = 5  # linearisations of a new push, at most
 SETTLED = 0.3  # posterior standard deviations: a smaller step ends the rounds
 STALE = 1.0  # posterior standard deviations from where an earlier push was linearised
 RELINEARISED = 1  # earlier pushes that are linearised again with a new one
@@ -55,7 +55,7 @@ class OnlineBelief:
         noise: of the recording; None before the first push.
         search: of the newest push; its belief was begun from P_{t-1}. None before the first push.
         foreseen: how well each push was predicted before it was learned from; None where that rollout diverged.
-        fitted: how well the newest push is predicted after it.
+        fitted: how well each push was predicted right after.
         rollouts: made so far.
     """
 
@@ -67,7 +67,7 @@ class OnlineBelief:
     noise: Noise | None = None
     search: SearchResult | None = None
     foreseen: tuple[Accuracy, ...] = ()
-    fitted: Accuracy | None = None
+    fitted: tuple[Accuracy, ...] = ()
     rollouts: int = 0
 
     @property
@@ -163,13 +163,13 @@ class OnlineIdentifier:
         return dc.replace(
             learned,
             foreseen=(*belief.foreseen, accuracy_of([(problem, expected)], noise)),
-            fitted=accuracy_of([(problem, fitted)], noise),
+            fitted=(*belief.fitted, accuracy_of([(problem, fitted)], noise)),
             rollouts=belief.rollouts + self.pool.count - before,
         )
 
     def identification(self, belief: OnlineBelief) -> Identification | None:
         """The belief as an identification, with intervals; None before the first push."""
-        if belief.noise is None or belief.search is None or belief.fitted is None:
+        if belief.noise is None or belief.search is None:
             return None
         polished = _polished(belief)
         return Identification(
@@ -177,7 +177,7 @@ class OnlineIdentifier:
             search=belief.search, polished=polished,
             reduced_chi2=polished.chi2 / max(1, polished.samples - len(belief.mean)),
             training=tuple(term.problem.name for term in belief.terms), held_out=(), before=None, after=None,
-            fitted=belief.fitted, cells=cells_told(self.thetas, polished),
+            fitted=pooled(belief.fitted), cells=cells_told(self.thetas, polished), foreseen=pooled(belief.foreseen),
         )  # fmt: skip
 
     def _search(

@@ -80,6 +80,7 @@ def result_page(
     rows = [
         ("held out, before", result.before),
         ("held out, after", result.after),
+        ("each push, before it was learned from", result.foreseen),
         ("fitted, after", result.fitted),
     ]
     environment = Environment(undefined=StrictUndefined, autoescape=True)

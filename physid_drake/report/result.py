@@ -45,6 +45,7 @@ def result_json(result: Identification, recording: Recording, seed: int, version
             "after": _numbers(result.after),
         },
         "training": {"pushes": list(result.training), "after": _numbers(result.fitted)},
+        **({} if result.foreseen is None else {"foreseen": _numbers(result.foreseen)}),
         "reduced_chi2": result.reduced_chi2,
         "friction_scatter": result.polished.friction_scatter,
         "push_unknowns": dict(zip(result.training, result.polished.unknowns, strict=True)),

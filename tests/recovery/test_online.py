@@ -92,10 +92,10 @@ def test_the_search_on_a_push_begins_from_what_is_believed(learned):
 def test_a_push_costs_a_bounded_number_of_rollouts(learned):
     _, beliefs = learned
     made = np.diff([b.rollouts for b in beliefs])
-    # Search, its two checks, and at most three linearisations of the new push and one of an old.
-    largest = 12 + 2 + 4 * (1 + 8 + 2 * 2)
+    # Search, its two checks, and at most five linearisations of the new push and one of an old.
+    largest = 12 + 2 + 6 * (1 + 8 + 2 * 2)
     assert made.max() <= largest
-    assert made.mean() <= 55  # 50
+    assert made.mean() <= 60  # 50
 
 
 def test_the_prior_is_all_that_is_believed_before_a_push(recording):
