@@ -295,7 +295,7 @@ class Belief:
             amplitude, noise = (float(v) for v in arrays["variances"])
             hyper = Hyperparameters(amplitude=amplitude, lengths=arrays["lengths"], noise=noise)
         space = ParameterSpace(
-            parameters=tuple(Parameter(**p) for p in header["parameters"]), correlation=header["correlation"]
+            parameters=tuple(Parameter(**p) for p in header["parameters"]), correlation=header.get("correlation", ())
         )
         process = GaussianProcess(
             u=space.to_unit(saved["thetas"]),

@@ -48,7 +48,7 @@ class OnlineBelief:
 
     Attributes:
         space: of theta.
-        terms: of the pushes so far.
+        terms: of the pushes so far, but for those whose rollouts diverged.
         mean: (d,) of the Gaussian, in the unit cube.
         scatter: of friction from push to push [-].
         inflation: by which the noise is widened where the pushes are not explained, at least 1.
@@ -143,11 +143,16 @@ class OnlineIdentifier:
         begins from P_t, as in the paper. Gauss-Newton steps on the new push and the earlier pushes' information go
         on from the trial of least posterior cost.
 
+        A push whose rollouts diverge changes nothing but is counted in ``foreseen``.
+
+        Raises:
+            KeyboardInterrupt: when interrupted; the belief is as it was.
+
         Source: Zhu, Kimmel, Boularias, section III.B, for the search; B. Bell and F. Cathey, IEEE Trans. Automatic
             Control 38, 1993, for the iterated Kalman update as Gauss-Newton.
         """
         before = self.pool.count
-        count = len(belief.terms)
+        count = len(belief.foreseen)
         rng = np.random.default_rng([self._seed, count])
         # The noise is what sensors state, or what the first push shows: weights must not change under the terms.
         noise = belief.noise or noise_of(dc.replace(self._recording, pushes=(push,)))
@@ -156,6 +161,8 @@ class OnlineIdentifier:
         )
         expected = self._predicted(problem, [belief.theta])[0]
         found = self._search(belief, problem, noise, rng)
+        if found.stop_reason == "interrupted":
+            raise KeyboardInterrupt
         self._progress("what the push tells", count, 0)
         start = _best_start(belief, found, problem, noise, expected)
         learned = self._updated(dc.replace(belief, noise=noise, search=found), problem, start)
@@ -198,9 +205,11 @@ class OnlineIdentifier:
         terms, u, best = belief.terms, start, None
         for _ in range(ROUNDS):
             term = linearised(self.pool, [problem], belief.noise, u, belief.scatter)[0]
+            if term.diverged and best is None:
+                return belief  # no trial of this push ends: it says nothing
             trial = _solved(dc.replace(belief, terms=(*terms, term)))
             cost = _cost_at(trial, u)
-            if best is not None and cost > best[0]:
+            if best is not None and (term.diverged or cost > best[0]):
                 u = 0.5 * (u + best[1].terms[-1].u)  # the linear step went too far
                 continue
             best = (cost, trial)

@@ -130,6 +130,30 @@ def test_a_term_is_the_polishers_own_linearisation(recording, learned):
     np.testing.assert_allclose(residual, whiteners[0].apply(polisher._residuals(theta)[0]), atol=1e-9)
 
 
+def test_a_push_whose_rollouts_diverge_changes_nothing_but_is_counted(recording, learned, monkeypatch):
+    _, beliefs = learned
+    one = learner(recording)
+    monkeypatch.setattr(one.pool, "run", lambda tasks: [None] * len(tasks))
+    belief = one.learn(beliefs[2], recording.pushes[2])
+    np.testing.assert_array_equal(belief.mean, beliefs[2].mean)
+    assert len(belief.terms) == 2
+    assert [a.diverged for a in belief.foreseen] == [0, 0, 1]
+
+
+def test_an_interrupt_in_the_search_is_not_taken_for_its_end(recording, monkeypatch):
+    one = learner(recording)
+    run = one.pool.run
+
+    def interrupted(tasks):
+        if one.pool.count > 3:
+            raise KeyboardInterrupt
+        return run(tasks)
+
+    monkeypatch.setattr(one.pool, "run", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        one.learn(one.start(), recording.pushes[0])
+
+
 # The system: the belief is the Context's.
 
 
