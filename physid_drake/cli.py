@@ -189,7 +189,10 @@ def _register_plan(subparsers: Subparsers) -> None:
     parser.add_argument("--travel", type=float, metavar="M", help="of the hand from the touch to the brake")
     parser.add_argument("--tolerance", type=float, default=0.01, metavar="M", help="of a success (default 0.01)")
     parser.add_argument(
-        "--search", default="greedy_entropy", metavar="NAME", help="greedy_entropy (default) or random"
+        "--search",
+        default="greedy_entropy",
+        metavar="NAME",
+        help="greedy_entropy (default), entropy_search or random",
     )
     parser.add_argument("--budget", type=int, metavar="N", help="settings tried (default: 24, 48 or 64, by policy)")
     parser.add_argument("--draws", type=int, default=16, metavar="N", help="of theta, for the spread (default 16)")

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -16,13 +17,15 @@ from rich.console import Console
 from physid_drake.diagnose import case_of
 from physid_drake.diagnose.memory import Memory
 from physid_drake.errors import ConfigError, PhysidError
-from physid_drake.identify import Identification, Identifier
+from physid_drake.identify import Identification, Identifier, OnlineIdentifier
+from physid_drake.identify.identify import Progress
 from physid_drake.identify.nuisance import nuisance_of
 from physid_drake.identify.rollouts import Task, simulate
-from physid_drake.identify.system import PUSH_PERIOD, IdentificationSystem, RecordingPlayer
+from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
 from physid_drake.plan import Plan
 from physid_drake.plan.system import Planner, PolicySystem, identified_model, planner_of
 from physid_drake.recording import Recording, read_recording
+from physid_drake.report.cells import cells_table
 from physid_drake.report.page import result_page
 from physid_drake.report.plan import plan_table, push_files
 from physid_drake.report.progress import progress_bar
@@ -86,9 +89,11 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     planner = None if arguments.no_plan else _planner(scenario, recording, identifier, console)
     folder = RunFolder.open(out, dump_scenario(name, scenario))
     stage = None if arguments.no_view else _live(recording, console)
-    result, plan = _identify(identifier, planner, recording, console)
+    result, plan = _identify(identifier, planner, scenario, recording, console)
     console.print()
     console.print(estimates_table(result, recording.name))
+    if result.cells is not None:
+        console.print(cells_table(result.cells))
     console.print(accuracy_table(result))
     console.print(verdict(result))
     if identifier.pool.diverged:
@@ -168,7 +173,7 @@ def _planner(scenario: Scenario, recording: Recording, identifier: Identifier, c
 
 
 def _identify(
-    identifier: Identifier, planner: Planner | None, recording: Recording, console: Console
+    identifier: Identifier, planner: Planner | None, scenario: Scenario, recording: Recording, console: Console
 ) -> tuple[Identification, Plan | None]:
     """Wire and run the diagram: the recording's player, the system that learns from its pushes, and the policy's."""
     with progress_bar(console) as bar:
@@ -176,8 +181,7 @@ def _identify(
         player = builder.AddSystem(RecordingPlayer(recording.pushes))
         system = builder.AddSystem(
             IdentificationSystem(
-                lambda _: identifier.run(bar),
-                after=len(recording.pushes),
+                _learner(identifier, scenario, recording, bar),
                 dimension=identifier.thetas.space.dimension,
                 nominal=identifier.thetas.space.nominal,
             )
@@ -198,6 +202,16 @@ def _identify(
         plan = None if policy is None else policy.plan(policy.GetMyContextFromRoot(root))
     assert result is not None
     return result, plan
+
+
+def _learner(identifier: Identifier, scenario: Scenario, recording: Recording, bar: Progress) -> Learner[Any]:
+    """What learns from the pushes: from all at once, or from one after another."""
+    if not scenario.search.online:
+        return BatchLearner(lambda _: identifier.run(bar), after=len(recording.pushes))
+    return OnlineIdentifier(
+        recording, cell=scenario.cell, theta=scenario.theta, search=scenario.search, seed=scenario.seed,
+        pool=identifier.pool, progress=bar,
+    )  # fmt: skip
 
 
 def _scenes(result: Identification, identifier: Identifier, recording: Recording) -> list[Scene]:

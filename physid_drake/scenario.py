@@ -16,6 +16,7 @@ from physid_drake.errors import ConfigError
 from physid_drake.policies import POLICIES
 from physid_drake.resources import shipped
 from physid_drake.scenario_schema import Scenario
+from physid_drake.search import SEARCHES
 
 DEFAULT = "eraser.yaml"
 SCHEMES = ("cenic", "lagged", "similar", "sap", "tamsi")
@@ -184,6 +185,8 @@ def _checked(scenario: Scenario, where: str) -> Scenario:
         ("cell.friction_cells", cell.friction_cells,
          len(cell.friction_cells) == 2 and all(1 <= n <= 10 for n in cell.friction_cells), "[nx, ny] from 1 to 10"),
         ("cell.default_mass_kg", cell.default_mass_kg, cell.default_mass_kg > 0.0, "above 0 kg"),
+        ("search.method", search.method, search.method in SEARCHES, f"one of {', '.join(SEARCHES)}"),
+        ("search.refine_every", search.refine_every, search.refine_every >= 0, "at least 0"),
         ("search.candidates", search.candidates, search.candidates >= 2, "at least 2"),
         ("search.budget", search.budget, search.budget >= 1, "at least 1"),
         ("search.batch", search.batch, search.batch >= 1, "at least 1"),

@@ -17,7 +17,7 @@ class Scenario:
         seed: of everything random.
         cell: contact, solver, friction cells.
         theta: the unknowns.
-        search: greedy entropy search.
+        search: how theta is searched for.
         plan: the sweep over a policy with what was identified.
     """
 

@@ -100,15 +100,19 @@ class ParameterSpace:
 
     Attributes:
         parameters: At least one, names unique; their order is the order of `theta`.
+        correlation: Of the normal priors on their scales, (d, d) as rows, before truncation; 0 between a uniform
+            prior and any other. Empty where the priors are independent.
 
     Raises:
-        ParameterError: When empty or when a name occurs twice.
+        ParameterError: When empty, when a name occurs twice, or when the correlation is none.
     """
 
     parameters: tuple[Parameter, ...]
+    correlation: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "parameters", tuple(self.parameters))
+        object.__setattr__(self, "correlation", tuple(tuple(float(v) for v in row) for row in self.correlation))
         if not self.parameters:
             raise ParameterError("parameter space: at least one parameter is needed, but got none.")
         for name in self.names:
@@ -117,6 +121,8 @@ class ParameterSpace:
                     f"parameter '{name}': names are unique in a space, but it occurs"
                     f" {self.names.count(name)} times; rename or drop one."
                 )
+        if self.correlation:
+            self._check_correlation()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -228,13 +234,16 @@ class ParameterSpace:
         Raises:
             ParameterError: When a name is unknown or given twice, or none is given.
         """
-        return ParameterSpace(parameters=tuple(self.parameters[self.index(name)] for name in names))
+        places = [self.index(name) for name in names]
+        rows = tuple(tuple(self.correlation[i][j] for j in places) for i in places) if self.correlation else ()
+        return ParameterSpace(parameters=tuple(self.parameters[i] for i in places), correlation=rows)
 
     def log_prior(self, theta: npt.ArrayLike) -> Array:
         """Log density of the prior with respect to the unit cube: 0 for a uniform prior.
 
         Taken in unit-cube coordinates it does not depend on units, its maximum is where `prior_whitened`
-        is least, and it equals -0.5 |prior_whitened|^2 up to a constant.
+        is least, and it equals -0.5 |prior_whitened|^2 up to a constant. Where priors are correlated it is not
+        normalised over the box.
 
         Args:
             theta: Points (..., d), each entry in its unit.
@@ -246,6 +255,8 @@ class ParameterSpace:
             ParameterError: As `check`.
         """
         self.check(theta)
+        if self.correlation:
+            return np.asarray(-0.5 * np.sum(self.prior_whitened(theta) ** 2, axis=-1))
         x = self._to_scale(self._shaped(theta))
         total = np.zeros(x.shape[:-1])
         for i, p in enumerate(self.parameters):
@@ -255,6 +266,9 @@ class ParameterSpace:
 
     def prior_whitened(self, theta: npt.ArrayLike) -> Array:
         """Residuals of the prior for least squares: (x - mean) / std on the scale, 0 where uniform.
+
+        Correlated priors are whitened by the Cholesky factor of their correlation: a residual is then what the
+        parameters before it in the space do not say.
 
         Args:
             theta: Points (..., d), each entry in its unit.
@@ -269,7 +283,10 @@ class ParameterSpace:
         x = self._to_scale(self._shaped(theta))
         mean = self._to_scale(self.nominal)
         inverse = np.array([0.0 if p.prior_std is None else 1.0 / p.prior_std for p in self.parameters])
-        return np.asarray((x - mean) * inverse)
+        scores = (x - mean) * inverse
+        if not self.correlation:
+            return np.asarray(scores)
+        return np.asarray(np.linalg.solve(self._factor, scores[..., np.newaxis])[..., 0])
 
     def as_dict(self, theta: npt.ArrayLike) -> dict[str, float]:
         """Point (d,) as a mapping from name to value in its unit.
@@ -313,6 +330,26 @@ class ParameterSpace:
     def _from_scale(self, xs: Array) -> Array:
         return np.stack([p.from_scale(xs[..., i]) for i, p in enumerate(self.parameters)], axis=-1)
 
+    @cached_property
+    def _factor(self) -> Array:
+        """Lower Cholesky factor (d, d) of the priors' correlation."""
+        return np.asarray(np.linalg.cholesky(np.array(self.correlation)))
+
+    def _check_correlation(self) -> None:
+        matrix = np.array(self.correlation, dtype=object)
+        if matrix.shape != (self.dimension, self.dimension):
+            raise ParameterError(
+                f"correlation: needs {self.dimension} rows of {self.dimension} numbers, but its shape is"
+                f" {matrix.shape}."
+            )
+        values = matrix.astype(np.float64)
+        symmetric = np.array_equal(values, values.T) and np.array_equal(np.diag(values), np.ones(self.dimension))
+        if not symmetric or np.linalg.eigvalsh(values)[0] <= 0.0:
+            raise ParameterError("correlation: must be symmetric, 1 on its diagonal and positive definite.")
+        uniform = [p.prior_std is None for p in self.parameters]
+        if np.any(values[uniform] != np.eye(self.dimension)[uniform]):
+            raise ParameterError("correlation: a uniform prior is correlated with nothing; give it a prior_std.")
+
     def _truncated(self, i: int) -> Any:
         p = self.parameters[i]
         mean, std = float(p.to_scale(p.prior_mean)), p.prior_std or 1.0
@@ -320,8 +357,30 @@ class ParameterSpace:
         return truncnorm(low, low + self._scale_width[i] / std, loc=mean, scale=std)
 
     def _inverse_prior_cdf(self, u: Array) -> Array:
+        if self.correlation:
+            return self._tied_inverse_cdf(u)
         xs = self._scale_lower + u * self._scale_width
         for i, p in enumerate(self.parameters):
             if p.prior_std is not None:
                 xs[:, i] = self._truncated(i).ppf(u[:, i])
+        return np.asarray(xs)
+
+    def _tied_inverse_cdf(self, u: Array) -> Array:
+        """Points (n, d) on the scale from u (n, d): each parameter's normal given those before it, cut to its bounds.
+
+        That is the truncated normal itself but for the chance that later bounds leave an earlier value, which is
+        neglected.
+
+        Source: the sequential sampler of Geweke, Hajivassiliou and Keane, as in Genz, JCGS 1, 1992.
+        """
+        xs = self._scale_lower + u * self._scale_width
+        scores = np.zeros_like(xs)
+        for i, p in enumerate(self.parameters):
+            if p.prior_std is None:
+                continue
+            mean = p.to_scale(p.prior_mean) + p.prior_std * (scores[:, :i] @ self._factor[i, :i])
+            std = p.prior_std * self._factor[i, i]
+            low = (self._scale_lower[i] - mean) / std
+            scores[:, i] = truncnorm.ppf(u[:, i], low, low + self._scale_width[i] / std)
+            xs[:, i] = mean + std * scores[:, i]
         return np.asarray(xs)

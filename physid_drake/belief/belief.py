@@ -28,6 +28,8 @@ class BeliefSettings:
     Attributes:
         n_samples: Functions drawn for P_min; its entropy cannot exceed log(n_samples).
         exact_limit: Candidates up to which joint samples are exact; above they are pathwise.
+        sample_limit: Most candidates that are sampled. Where more may be the minimiser, those that are least likely
+            to be below the best are left out; hardly any of them would be chosen by one of n_samples functions.
         refit_growth: Hyperparameters are fitted again when the trials grew by this factor since last time;
             1 fits at every update.
         n_restarts: Optimiser runs beside the one from the default hyperparameters.
@@ -36,14 +38,22 @@ class BeliefSettings:
 
     n_samples: int = 500
     exact_limit: int = 1000
+    sample_limit: int = 3000
     refit_growth: float = 1.25
     n_restarts: int = 2
     length_prior: bool = True
 
     def __post_init__(self) -> None:
-        if self.n_samples < 2 or self.exact_limit < 0 or self.refit_growth < 1.0 or self.n_restarts < 0:
+        if (
+            self.n_samples < 2
+            or self.exact_limit < 0
+            or self.sample_limit < 1
+            or self.refit_growth < 1.0
+            or self.n_restarts < 0
+        ):
             raise ParameterError(
-                "belief settings: n_samples >= 2, exact_limit >= 0, refit_growth >= 1 and n_restarts >= 0,"
+                "belief settings: n_samples >= 2, exact_limit >= 0, sample_limit >= 1, refit_growth >= 1 and"
+                " n_restarts >= 0,"
                 f" but got {self}."
             )
 
@@ -253,6 +263,7 @@ class Belief:
         header = {
             "format": _FORMAT,
             "parameters": [asdict(p) for p in self.space.parameters],
+            "correlation": self.space.correlation,
             "settings": asdict(self.settings),
             "n_at_fit": self.gaussian_process.n_at_fit,
             "prior_power": self.prior_power,
@@ -283,7 +294,9 @@ class Belief:
             saved: dict[str, Any] = {name: arrays[name] for name in _SAVED}
             amplitude, noise = (float(v) for v in arrays["variances"])
             hyper = Hyperparameters(amplitude=amplitude, lengths=arrays["lengths"], noise=noise)
-        space = ParameterSpace(parameters=tuple(Parameter(**p) for p in header["parameters"]))
+        space = ParameterSpace(
+            parameters=tuple(Parameter(**p) for p in header["parameters"]), correlation=header.get("correlation", ())
+        )
         process = GaussianProcess(
             u=space.to_unit(saved["thetas"]),
             targets=_targets(saved["errors"]),
@@ -308,7 +321,7 @@ class Belief:
     def _with_p_min(self, rng: np.random.Generator) -> "Belief":
         s = self.settings.n_samples
         process = self.gaussian_process
-        possible = process.possible_minima(self.candidates_u, 0.01 / s)
+        possible = process.possible_minima(self.candidates_u, 0.01 / s, self.settings.sample_limit)
         u = self.candidates_u[possible]
         samples = process.sample(u, s, rng, exact_limit=self.settings.exact_limit)
         p_min = np.zeros(len(self.candidates))

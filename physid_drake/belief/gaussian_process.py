@@ -116,6 +116,11 @@ class GaussianProcess:
         spread = float(self.targets.std()) if len(self.targets) else 0.0
         return spread if spread > 1e-12 * max(1.0, abs(self.offset)) else 1.0
 
+    @property
+    def noise_variance(self) -> float:
+        """Variance of one target about the function, in the targets' unit squared."""
+        return float(self.scale**2 * (self.hyperparameters.noise + _JITTER))
+
     @cached_property
     def _residuals(self) -> Array:
         return np.asarray((self.targets - self.offset) / self.scale)
@@ -208,15 +213,17 @@ class GaussianProcess:
             return self.sample_exact(u, n_samples, rng)
         return self.sample_pathwise(u, n_samples, rng)
 
-    def possible_minima(self, u: Array, tolerance: float) -> npt.NDArray[np.intp]:
+    def possible_minima(self, u: Array, tolerance: float, limit: int | None = None) -> npt.NDArray[np.intp]:
         """Indices, ascending, of the points of u (n, d) that may be the minimiser.
 
         The others are each below the point of least mean with so little probability that their sum, which
-        bounds the probability that the minimiser is among them, is at most `tolerance`.
+        bounds the probability that the minimiser is among them, is at most `tolerance`. With a `limit` no more
+        points than that are left, the likeliest, and the bound no longer holds.
         """
         below = self.probability_below_best(u)
         order = np.argsort(below, kind="stable")
         n_dropped = int(np.searchsorted(np.cumsum(below[order]), tolerance, side="right"))
+        n_dropped = max(n_dropped, 0 if limit is None else len(u) - limit)
         return np.sort(order[n_dropped:])
 
     def probability_below_best(self, u: Array) -> Array:

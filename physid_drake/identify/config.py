@@ -14,29 +14,40 @@ class ThetaConfig:
             ``inertia_ratio``, ``static_ratio``, ``restitution``.
         bounds: ``[lower, upper]`` per name, in SI units, instead of the defaults.
         nominal: start values per name, instead of the defaults.
+        cell_spread: standard deviation of a friction cell's ln friction about that of the whole underside.
+        cell_length: distance over which friction cells forget each other, as a share of the underside's longer side.
     """
 
     parameters: list[str] = dc.field(default_factory=lambda: list(PLAIN))
     bounds: dict[str, list[float]] = dc.field(default_factory=dict)
     nominal: dict[str, float] = dc.field(default_factory=dict)
+    cell_spread: float = 0.4
+    cell_length: float = 0.5
 
 
 @dc.dataclass
 class SearchConfig:
-    """Greedy entropy search.
+    """The search over theta.
 
     Attributes:
+        method: a name in ``search.SEARCHES``.
         candidates: number of thetas in the candidate set.
         budget: thetas tried.
         batch: thetas per update of the belief.
         entropy_tolerance_nats: the search stops when the entropy of P_min moves less than this.
         patience: over so many updates.
+        refine_every: trials after which the candidates gather where the best theta may be; 0 keeps one fixed set.
         jobs: processes; 0 takes the machine's cores.
+        online: learn from one push after another, with a small search for each, instead of from all at once. Every
+            push is learned from, none is held out.
     """
 
+    method: str = "greedy_entropy"
     candidates: int = 1000
     budget: int = 40
     batch: int = 1
     entropy_tolerance_nats: float = 0.1
     patience: int = 5
+    refine_every: int = 5
     jobs: int = 0
+    online: bool = False

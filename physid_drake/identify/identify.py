@@ -15,6 +15,7 @@ from physid_drake.belief import Belief
 from physid_drake.cell import CellConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
+from physid_drake.identify.cells import CellsTold, cells_told, tied_cells
 from physid_drake.identify.config import SearchConfig, ThetaConfig
 from physid_drake.identify.misfit import whitened_residual
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
@@ -23,7 +24,7 @@ from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems
 from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.recording import Recording
-from physid_drake.search import GreedyEntropySearch, SearchResult, search_minimum
+from physid_drake.search import SearchResult, search_minimum, search_named
 from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
@@ -87,6 +88,9 @@ class Identification:
         training, held_out: names of the pushes.
         before, after: accuracy on held-out pushes with the prior's theta and with the estimate.
         fitted: accuracy on the training pushes.
+        cells: what the pushes tell about friction cells; None without a grid of them.
+        foreseen: accuracy on each push before it was learned from; None where all were learned at once. ``fitted`` is
+            then each push's right after.
     """
 
     thetas: ThetaMap
@@ -101,6 +105,8 @@ class Identification:
     before: Accuracy | None
     after: Accuracy | None
     fitted: Accuracy
+    cells: CellsTold | None = None
+    foreseen: Accuracy | None = None
 
 
 Progress = Callable[[str, int, int], None]
@@ -148,11 +154,12 @@ class Identifier:
         self.recording = recording
         self.noise = noise_of(recording)
         self.problems = problems_of(recording, self.noise, solid.height)
-        self.thetas = theta_map(
+        free = theta_map(
             recording.object, solid.outline, (cell.friction_cells[0], cell.friction_cells[1]), theta,
             cell.default_mass_kg,
         )  # fmt: skip
-        self._config = search
+        self.thetas = tied_cells(free, solid.outline, theta)
+        self._config, self._chooser = search, search_named(search.method)
         self.pool = RolloutPool(spec_of(recording, cell), self.thetas, jobs=search.jobs)
         self._streams = np.random.SeedSequence(seed).spawn(2)
         train, held = split_pushes(len(self.problems), held_out_share, np.random.default_rng(self._streams[0]))
@@ -181,7 +188,7 @@ class Identifier:
         return self._identification(found, polisher.run(start))
 
     def search(self) -> SearchResult:
-        """Greedy entropy search over a candidate set."""
+        """The configured search, over candidates drawn from the prior."""
         rng = np.random.default_rng(self._streams[1])
         space, config = self.thetas.space, self._config
         candidates = space.sample(rng, config.candidates, from_prior=True)
@@ -193,12 +200,12 @@ class Identifier:
                 part = self._state.with_suffix(".part")
                 belief.to_npz(part)
                 part.replace(self._state)
-            self._progress("greedy entropy search", belief.n_trials, config.budget)
+            self._progress(f"search ({config.method.replace('_', ' ')})", belief.n_trials, config.budget)
 
         return search_minimum(
-            self._objective, space, candidates, GreedyEntropySearch(), budget=config.budget, rng=rng,
+            self._objective, space, candidates, self._chooser, budget=config.budget, rng=rng,
             batch=config.batch, entropy_tolerance=config.entropy_tolerance_nats, patience=config.patience,
-            on_trial=keep, resume_from=resume,
+            refine_every=config.refine_every, on_trial=keep, resume_from=resume,
         )  # fmt: skip
 
     def _saved_belief(self, candidates: Array) -> Belief | None:
@@ -206,8 +213,9 @@ class Identifier:
         if self._state is None or not self._state.exists():
             return None
         belief = Belief.from_npz(self._state)
-        same = belief.candidates.shape == candidates.shape and np.array_equal(belief.candidates, candidates)
-        return belief if same else None
+        # Candidates follow the belief, but the first trial is one of those that the search began with.
+        begun = belief.n_trials == 0 or bool(np.any(np.all(belief.thetas[0] == candidates, axis=1)))
+        return belief if begun and belief.candidates.shape == candidates.shape else None
 
     def _objective(self, thetas: Array) -> Array:
         """Log of the rms misfit in standard deviations (k,): its minimum is the misfit's, and it spans decades."""
@@ -237,8 +245,7 @@ class Identifier:
     def accuracy(self, problems: Sequence[PushProblem], theta: Array) -> Accuracy:
         """How well theta (d,) predicts some pushes."""
         predictions = self.pool.run([self._task(problem, theta) for problem in problems])
-        pairs = [(p, r) for p, r in zip(problems, predictions, strict=True) if r is not None]
-        return _accuracy(pairs, self.noise, len(problems) - len(pairs))
+        return accuracy_of(list(zip(problems, predictions, strict=True)), self.noise)
 
     def _identification(self, found: SearchResult, polished: Polished) -> Identification:
         theta = polished.theta
@@ -258,6 +265,7 @@ class Identifier:
             before=self.accuracy(held, self.thetas.space.nominal) if held else None,
             after=self.accuracy(held, theta) if held else None,
             fitted=self.accuracy(self.training, theta),
+            cells=cells_told(self.thetas, polished),
         )
 
 
@@ -274,7 +282,7 @@ def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
     information = polished.jacobian.T @ polished.jacobian
     covariance = np.linalg.inv(information)
     prior_rows = polished.jacobian[-space.dimension :]
-    prior_spread = np.sqrt(1.0 / np.diag(prior_rows.T @ prior_rows))
+    prior_spread = np.sqrt(np.diag(np.linalg.inv(prior_rows.T @ prior_rows)))
     curvature = np.sqrt(np.diag(covariance))
     z, spread = float(stats.norm.ppf(0.95)), curvature
     pushes, free = len(polished.residuals), len(polished.residuals) - space.dimension
@@ -323,7 +331,10 @@ def _pulls(polished: Polished) -> Array:
     return np.array(pulls)
 
 
-def _accuracy(pairs: list[tuple[PushProblem, Prediction]], noise: Noise, diverged: int) -> Accuracy:
+def accuracy_of(made: Sequence[tuple[PushProblem, Prediction | None]], noise: Noise) -> Accuracy:
+    """The accuracy of predictions, those that diverged (None) left out and counted."""
+    pairs = [(p, r) for p, r in made if r is not None]
+    diverged = len(made) - len(pairs)
     if not pairs:
         nothing = float("inf")
         return Accuracy(
@@ -343,6 +354,21 @@ def _accuracy(pairs: list[tuple[PushProblem, Prediction]], noise: Noise, diverge
         sigmas=_rms(whitened),
         diverged=diverged,
     )
+
+
+def pooled(accuracies: Sequence[Accuracy]) -> Accuracy:
+    """The root mean square of several accuracies, each counting alike; those of nothing are left out."""
+    fine = [a for a in accuracies if math.isfinite(a.sigmas)]
+    forces = [a.force for a in fine if a.force is not None]
+
+    def rms(name: str) -> float:
+        return _rms(np.array([getattr(a, name) for a in fine])) if fine else float("inf")
+
+    return Accuracy(
+        position=rms("position"), rotation=rms("rotation"), end_position=rms("end_position"),
+        end_rotation=rms("end_rotation"), force=_rms(np.array(forces)) if forces else None, sigmas=rms("sigmas"),
+        diverged=sum(a.diverged for a in accuracies),
+    )  # fmt: skip
 
 
 def _rms(values: Array) -> float:

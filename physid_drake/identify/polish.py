@@ -13,6 +13,7 @@ from physid_drake.identify.misfit import Whitener, model_error_columns, whitened
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
 from physid_drake.identify.problem import Noise, PushProblem
 from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
+from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
 
@@ -114,7 +115,7 @@ class Polisher:
 
     def _whitener(self, problem: PushProblem, stack: list[Array]) -> Whitener:
         columns = (np.array(stack[1:]) - stack[0]).T / NUISANCE_STEP
-        touched = _first_motion(problem)
+        touched = first_motion(problem)
         return Whitener.of(np.column_stack([columns, model_error_columns(problem, self._noise, touched)]))
 
     def _fit(self, theta: Array, whiteners: list[Whitener]) -> Array:
@@ -165,18 +166,7 @@ class Polisher:
         """
         scale = 1.0 / np.sqrt(self._inflation)
         marginal = [scale * w.apply(r) for w, r in zip(whiteners, residuals, strict=True)]
-        return np.concatenate([*marginal, self._prior_rows(theta)])
-
-    def _prior_rows(self, theta: Array) -> Array:
-        """Distance from the prior (d,) in its standard deviations.
-
-        A uniform prior counts as 1/sqrt(12) of the cube about the nominal value: nothing against pushes that tell
-        the parameter, and it keeps a parameter that they do not tell where it was.
-        """
-        space = self._space
-        flat = np.sqrt(12.0) * (np.asarray(space.to_unit(theta)) - space.to_unit(space.nominal))
-        own = np.asarray(space.prior_whitened(theta))
-        return np.where([p.prior_std is None for p in space.parameters], flat, own)
+        return np.concatenate([*marginal, prior_rows(self._space, theta)])
 
     def _learn_scales(self, theta: Array, whiteners: list[Whitener]) -> list[Whitener]:
         """Learn the noise's inflation and the scatter of friction from what is left; the whiteners that follow."""
@@ -187,27 +177,10 @@ class Polisher:
         if len(self._problems) < SCATTER_PUSHES:
             return whiteners
         old = self._scatter
-        self._scatter = self._new_scatter(whiteners, [r / np.sqrt(self._inflation) for r in residuals])
         places = [nuisance.index("friction") for nuisance in self._nuisances()]
-        return [_rescaled(w, k, self._scatter / old) for w, k in zip(whiteners, places, strict=True)]
-
-    def _new_scatter(self, whiteners: list[Whitener], residuals: list[Array]) -> float:
-        """Scatter of friction from push to push, by expectation-maximisation on the linearised pushes.
-
-        Few pushes alone would drive it to nothing, so ``SCATTER_WEIGHT`` pushes' worth of the first guess stand by
-        (the mode under an inverse-gamma prior).
-        """
-        places = [nuisance.index("friction") for nuisance in self._nuisances()]
-        factor = 1.0
-        for _ in range(SCATTER_STEPS):
-            second = []
-            for k, whitener, residual in zip(places, whiteners, residuals, strict=True):
-                scaled = _rescaled(whitener, k, factor)
-                second.append(scaled.unknowns(residual)[k] ** 2 + scaled.variances()[k])
-            guess = SCATTER_WEIGHT * (self._first_scatter / (factor * self._scatter)) ** 2
-            factor *= float(np.sqrt((sum(second) + guess) / (len(second) + SCATTER_WEIGHT)))
-            factor = float(np.clip(factor, SMALLEST_SCATTER / self._scatter, LARGEST_SCATTER / self._scatter))
-        return self._scatter * factor
+        scaled = [r / np.sqrt(self._inflation) for r in residuals]
+        self._scatter = new_scatter(whiteners, places, scaled, old=old, first=self._first_scatter)
+        return [rescaled(w, k, self._scatter / old) for w, k in zip(whiteners, places, strict=True)]
 
     def _result(self, theta: Array, whiteners: list[Whitener], rollouts: int) -> Polished:
         residuals = self._residuals(theta)
@@ -229,14 +202,52 @@ class Polisher:
         )
 
 
-def _rescaled(whitener: Whitener, k: int, factor: float) -> Whitener:
+def prior_rows(space: ParameterSpace, theta: Array) -> Array:
+    """Distance from the prior (d,) in its standard deviations.
+
+    A uniform prior counts as 1/sqrt(12) of the cube about the nominal value: nothing against pushes that tell
+    the parameter, and it keeps a parameter that they do not tell where it was.
+    """
+    flat = np.sqrt(12.0) * (np.asarray(space.to_unit(theta)) - space.to_unit(space.nominal))
+    own = np.asarray(space.prior_whitened(theta))
+    return np.where([p.prior_std is None for p in space.parameters], flat, own)
+
+
+def new_scatter(
+    whiteners: Sequence[Whitener], places: Sequence[int], residuals: Sequence[Array], *, old: float, first: float
+) -> float:
+    """Scatter of friction from push to push, by expectation-maximisation on the linearised pushes.
+
+    Few pushes alone would drive it to nothing, so ``SCATTER_WEIGHT`` pushes' worth of the first guess stand by
+    (the mode under an inverse-gamma prior).
+
+    Args:
+        whiteners: of the pushes, scaled with the old scatter.
+        places: of friction among each push's own unknowns.
+        residuals: (m,) of each push.
+        old: scatter [-].
+        first: guess before any push [-].
+    """
+    factor = 1.0
+    for _ in range(SCATTER_STEPS):
+        second = []
+        for k, whitener, residual in zip(places, whiteners, residuals, strict=True):
+            scaled = rescaled(whitener, k, factor)
+            second.append(scaled.unknowns(residual)[k] ** 2 + scaled.variances()[k])
+        guess = SCATTER_WEIGHT * (first / (factor * old)) ** 2
+        factor *= float(np.sqrt((sum(second) + guess) / (len(second) + SCATTER_WEIGHT)))
+        factor = float(np.clip(factor, SMALLEST_SCATTER / old, LARGEST_SCATTER / old))
+    return old * factor
+
+
+def rescaled(whitener: Whitener, k: int, factor: float) -> Whitener:
     """The whitener after the prior of its unknown k was widened by a factor."""
     jacobian = whitener.jacobian.copy()
     jacobian[:, k] *= factor
     return Whitener.of(jacobian)
 
 
-def _first_motion(problem: PushProblem) -> float:
+def first_motion(problem: PushProblem) -> float:
     """Roughly when the object starts to move: the model error begins there [s]."""
     if len(problem.times) < 3:
         return problem.begin

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses as dc
 from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -14,6 +16,7 @@ from physid_drake.recording import Push
 PUSH_PERIOD = 1.0  # s of diagram time between two pushes
 
 Identify = Callable[[tuple[Push, ...]], Identification]
+Known = TypeVar("Known")
 
 
 class RecordingPlayer(LeafSystem):
@@ -37,10 +40,63 @@ class RecordingPlayer(LeafSystem):
         output.set_value(self._pushes[min(index, len(self._pushes) - 1)])
 
 
-class IdentificationSystem(LeafSystem):
-    """Collects pushes as they arrive, and runs the search over repeated rollouts once it has enough.
+class Learner(Protocol[Known]):
+    """Learns theta from pushes; what it knows is a value that the system's state holds, so it keeps none itself."""
 
-    Its state holds the pushes so far and the latest identification.
+    def start(self) -> Known:
+        """What is known before any push."""
+        ...
+
+    def learn(self, belief: Known, push: Push) -> Known:
+        """What is known after one more push."""
+        ...
+
+    def identification(self, belief: Known) -> Identification | None:
+        """The identification that this makes; None if it is too early."""
+        ...
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Collected:
+    """The pushes so far, and the identification of all of them once there are enough."""
+
+    pushes: tuple[Push, ...] = ()
+    latest: Identification | None = None
+
+
+class BatchLearner:
+    """Collects pushes, and identifies from all of them at once when it has enough."""
+
+    def __init__(self, identify: Identify, *, after: int) -> None:
+        """Prepare.
+
+        Args:
+            identify: what to run on the pushes collected.
+            after: number of pushes that it waits for.
+        """
+        self._identify, self._after = identify, after
+
+    def start(self) -> Collected:
+        """No push."""
+        return Collected()
+
+    def learn(self, belief: Collected, push: Push) -> Collected:
+        """One push more; those beyond the number waited for are not looked at."""
+        if len(belief.pushes) >= self._after:
+            return belief
+        pushes = (*belief.pushes, push)
+        return Collected(pushes=pushes, latest=self._identify(pushes) if len(pushes) == self._after else None)
+
+    def identification(self, belief: Collected) -> Identification | None:
+        """The identification from all pushes; None before."""
+        return belief.latest
+
+
+class IdentificationSystem(LeafSystem):
+    """Learns from each push that arrives: all at once when there are enough, or push by push.
+
+    Its state holds what the learner knows, and the name of the push that it last learned from: a push is new if its
+    name is.
 
     .. pydrake_system::
         name: identification
@@ -51,37 +107,40 @@ class IdentificationSystem(LeafSystem):
         - identification.estimated
     """
 
-    def __init__(self, identify: Identify, *, after: int, dimension: int, nominal: np.ndarray) -> None:
+    def __init__(self, learner: Learner[Any], *, dimension: int, nominal: np.ndarray) -> None:
         """Prepare.
 
         Args:
-            identify: what to run on the pushes collected so far.
-            after: number of pushes that it waits for.
+            learner: ``BatchLearner`` or ``OnlineIdentifier``.
             dimension: of theta.
             nominal: (dimension,) theta before the first identification.
         """
         LeafSystem.__init__(self)
         self.set_name("identification")
-        self._identify, self._after, self._nominal = identify, after, nominal
+        self._learner, self._nominal = learner, nominal
         self.DeclareAbstractInputPort("push.measured", Value[object]())
-        start: tuple[tuple[Push, ...], Identification | None] = ((), None)
+        start: tuple[Any, str | None] = (learner.start(), None)
         self._memory = self.DeclareAbstractState(Value[object](start))
-        self.DeclareVectorOutputPort("theta.estimated", dimension, self._theta)
-        self.DeclareAbstractOutputPort("identification.estimated", Value[object], self._copy)
+        # Of the state alone: a loop through robot and policy has no algebraic loop in it.
+        state = {self.all_state_ticket()}
+        self.DeclareVectorOutputPort("theta.estimated", dimension, self._theta, state)
+        self.DeclareAbstractOutputPort("identification.estimated", Value[object], self._copy, state)
         self.DeclarePeriodicUnrestrictedUpdateEvent(PUSH_PERIOD, 0.0, self._receive)
+
+    def belief(self, context: Context) -> Any:
+        """What the learner knows, held in the state."""
+        return context.get_abstract_state(self._memory).get_value()[0]
 
     def identification(self, context: Context) -> Identification | None:
         """The latest identification held in the state; None before the first."""
-        latest: Identification | None = context.get_abstract_state(self._memory).get_value()[1]
-        return latest
+        return self._learner.identification(self.belief(context))
 
     def _receive(self, context: Context, state: State) -> EventStatus:
-        pushes, latest = context.get_abstract_state(self._memory).get_value()
-        if len(pushes) < self._after:
-            pushes = (*pushes, self.GetInputPort("push.measured").Eval(context))
-            if len(pushes) == self._after:
-                latest = self._identify(pushes)
-            state.get_mutable_abstract_state(self._memory).set_value((pushes, latest))
+        belief, last = context.get_abstract_state(self._memory).get_value()
+        push: Push | None = self.GetInputPort("push.measured").Eval(context)
+        if push is not None and push.name != last:
+            learned = (self._learner.learn(belief, push), push.name)
+            state.get_mutable_abstract_state(self._memory).set_value(learned)
         return EventStatus.Succeeded()
 
     def _theta(self, context: Context, output: BasicVector) -> None:

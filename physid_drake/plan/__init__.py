@@ -12,6 +12,8 @@ from physid_drake.plan.story import SweepRow as SweepRow
 from physid_drake.plan.story import outcome_under as outcome_under
 from physid_drake.plan.story import plan as plan
 from physid_drake.plan.task import policy_for as policy_for
+from physid_drake.plan.teaching import Lesson as Lesson
+from physid_drake.plan.teaching import most_informative_push as most_informative_push
 from physid_drake.plan.trajectory import Ending as Ending
 from physid_drake.plan.trajectory import Situation as Situation
 from physid_drake.plan.trajectory import Trajectory as Trajectory

@@ -17,15 +17,11 @@ from physid_drake.plan.costs import Cost, cost_of, loss_of
 from physid_drake.plan.draws import draw_models, uncertain_names
 from physid_drake.plan.trajectory import Ending, Situation, Trajectory, hand_radius_of, trajectory_of
 from physid_drake.policies import Policy
-from physid_drake.search import GreedyEntropySearch, RandomSearch, Search, SearchResult, search_minimum
+from physid_drake.search import SearchResult, search_minimum, search_named
 
 Array = NDArray[np.float64]
 Tick = Callable[[str, int, int], None]
 
-SEARCHES: dict[str, type[GreedyEntropySearch] | type[RandomSearch]] = {
-    "greedy_entropy": GreedyEntropySearch,
-    "random": RandomSearch,
-}
 CANDIDATES = 256
 REFINE_EVERY = 6  # trials: candidates gather where the best setting may be
 TOLERANCE = 0.01  # m
@@ -156,7 +152,7 @@ def plan(
         situation: where the object starts.
         rng: of candidates, search and draws; the same state gives the same plan.
         budget: settings tried.
-        search: a name in ``SEARCHES``.
+        search: a name in ``search.SEARCHES``.
         draws: of theta, for the spread; 0 for none. A model without intervals has no spread.
         risk: make the mean over the draws small.
         sweep: settings of the sweep; 0 for none.
@@ -182,7 +178,7 @@ def plan(
     objective = story.mean_costs if risk else story.likely_costs
     found = search_minimum(
         objective, policy.space, policy.space.sample(streams[1], CANDIDATES, from_prior=False),
-        _search(search), budget=budget, rng=streams[2], refine_every=REFINE_EVERY, entropy_tolerance=0.0,
+        search_named(search), budget=budget, rng=streams[2], refine_every=REFINE_EVERY, entropy_tolerance=0.0,
         on_trial=lambda belief: story.tell_search(belief, budget),
     )  # fmt: skip
     if found.stop_reason == "interrupted":
@@ -220,13 +216,7 @@ def _check(budget: int, draws: int, sweep: int, tolerance: float, search: str) -
             raise ConfigError(f"plan: {name} must be at least {least}, but is {value}.")
     if not (math.isfinite(tolerance) and tolerance > 0.0):
         raise ConfigError(f"plan: the tolerance must be above 0 m, but is {tolerance:g} m.")
-    _search(search)
-
-
-def _search(name: str) -> Search:
-    if name not in SEARCHES:
-        raise ConfigError(f"plan: the search '{name}' is unknown; known are {', '.join(SEARCHES)}.")
-    return SEARCHES[name]()
+    search_named(search)
 
 
 class _Story:

@@ -17,11 +17,13 @@ from physid_drake.identify.system import PUSH_PERIOD
 from physid_drake.model import Model
 from physid_drake.plan.config import PlanConfig
 from physid_drake.plan.costs import DistanceToGoal
+from physid_drake.plan.robot import Robot
 from physid_drake.plan.story import Plan, Tick, plan
 from physid_drake.plan.task import check_task, default_goal, policy_for
 from physid_drake.plan.trajectory import Situation
-from physid_drake.policies import policy_named
+from physid_drake.policies import PlannedPush, policy_named
 from physid_drake.policies.policy import Reach
+from physid_drake.recording import Push
 
 Array = NDArray[np.float64]
 MakePlan = Callable[[Identification], Plan]
@@ -53,8 +55,9 @@ class PolicySystem(LeafSystem):
         self.DeclareAbstractInputPort("identification.estimated", Value[object]())
         start: tuple[Array, Plan | None] = (np.zeros(0), None)
         self._memory = self.DeclareAbstractState(Value[object](start))
-        self.DeclareAbstractOutputPort("push.desired", Value[object], self._copy)
-        self.DeclareVectorOutputPort("settings.desired", dimension, self._settings)
+        own = {self.all_state_ticket()}  # so that a loop through a robot has no algebraic loop in it
+        self.DeclareAbstractOutputPort("push.desired", Value[object], self._copy, own)
+        self.DeclareVectorOutputPort("settings.desired", dimension, self._settings, own)
         self.DeclarePeriodicUnrestrictedUpdateEvent(PUSH_PERIOD, 0.0, self._receive)
 
     def plan(self, context: Context) -> Plan | None:
@@ -77,6 +80,52 @@ class PolicySystem(LeafSystem):
     def _settings(self, context: Context, output: BasicVector) -> None:
         latest = self.plan(context)
         output.SetFromVector([math.nan] * self._dimension if latest is None else latest.settings)
+
+
+class RobotSystem(LeafSystem):
+    """Makes each new plan's first push, on an object that is put back to its start before; shows the recording of it.
+
+    Its state holds the number of pushes, the latest one, and the settings that it was planned with. The robot is made
+    anew for every push, from its number: what it does depends on nothing that a Context does not carry.
+
+    .. pydrake_system::
+        name: robot
+        input_ports:
+        - push.desired
+        output_ports:
+        - push.measured
+    """
+
+    def __init__(self, make_robot: Callable[[int], Robot], *, first: PlannedPush) -> None:
+        """Prepare.
+
+        Args:
+            make_robot: a robot before the object at its start, by the push's number.
+            first: the push to make before there is a plan.
+        """
+        LeafSystem.__init__(self)
+        self.set_name("robot")
+        self._make_robot, self._first = make_robot, first
+        self.DeclareAbstractInputPort("push.desired", Value[object]())
+        start: tuple[int, Push | None, Array] = (0, None, np.zeros(0))
+        self._memory = self.DeclareAbstractState(Value[object](start))
+        self.DeclareAbstractOutputPort("push.measured", Value[object], self._copy, {self.all_state_ticket()})
+        self.DeclarePeriodicUnrestrictedUpdateEvent(PUSH_PERIOD, 0.0, self._act)
+
+    def _act(self, context: Context, state: State) -> EventStatus:
+        count, _, done = context.get_abstract_state(self._memory).get_value()
+        plan: Plan | None = self.GetInputPort("push.desired").Eval(context)
+        if plan is None:
+            push, settings = (self._first, done) if count == 0 else (None, done)
+        else:
+            push, settings = plan.policy.pushes(plan.settings)[0], np.array(plan.settings)
+        if push is not None and (count == 0 or not np.array_equal(settings, done)):
+            made = dc.replace(self._make_robot(count).execute(push), name=f"pushes/{count + 1:03d}.csv")
+            state.get_mutable_abstract_state(self._memory).set_value((count + 1, made, settings))
+        return EventStatus.Succeeded()
+
+    def _copy(self, context: Context, output: AbstractValue) -> None:
+        output.set_value(context.get_abstract_state(self._memory).get_value()[1])
 
 
 @dc.dataclass(frozen=True, kw_only=True)

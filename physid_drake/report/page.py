@@ -6,8 +6,9 @@ from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 
-from physid_drake.identify import Identification
+from physid_drake.identify import CellsTold, Identification
 from physid_drake.plan import Plan
+from physid_drake.report.cells import cells_figure, cells_verdict, combination_text
 from physid_drake.report.plan import plan_rows
 from physid_drake.report.plan_page import caption_of, curve_svg
 from physid_drake.report.tables import accuracy_cells, verdict
@@ -32,6 +33,11 @@ _PANEL = """
     <td>{{ "%.4g" % e.ci90[0] }} to {{ "%.4g" % e.ci90[1] }}</td>
     <td>{{ "yes" if e.identifiable else "no (prior)" }}</td></tr>{% endfor %}
   </table>
+  {% if cells %}<h2>what these pushes tell about the cells</h2>
+  {{ cells.map }}
+  <table><tr><th>combination of ln frictions</th><th>singular value</th><th>left</th><th>told</th></tr>
+  {% for row in cells.rows %}<tr>{% for c in row %}<td>{{ c }}</td>{% endfor %}</tr>{% endfor %}</table>
+  <p>{{ cells.verdict }}</p>{% endif %}
   <h2>error of prediction (root mean square)</h2>
   <table><tr><th></th><th>mm</th><th>deg</th><th>end mm</th><th>end deg</th><th>N</th><th>std</th></tr>
   {% for label, cells in accuracy %}<tr><td>{{ label }}</td>{% for c in cells %}<td>{{ c }}</td>{% endfor %}</tr>{% endfor %}
@@ -74,6 +80,7 @@ def result_page(
     rows = [
         ("held out, before", result.before),
         ("held out, after", result.after),
+        ("each push, before it was learned from", result.foreseen),
         ("fitted, after", result.fitted),
     ]
     environment = Environment(undefined=StrictUndefined, autoescape=True)
@@ -85,9 +92,18 @@ def result_page(
         marks=marks,
         note=note,
         plan=None if plan is None else _shown_plan(plan),
+        cells=None if result.cells is None else _shown_cells(result.cells),
     )
     body_end = html.rindex("</body>")
     return html[:body_end] + panel + html[body_end:]
+
+
+def _shown_cells(cells: CellsTold) -> dict[str, Any]:
+    rows = [
+        (combination_text(cells, c.weights), f"{c.strength:.3g}", f"{100 * c.left:.0f} %", "yes" if c.told else "no")
+        for c in cells.combinations
+    ]
+    return {"map": cells_figure(cells), "rows": rows, "verdict": cells_verdict(cells)}
 
 
 def _shown_plan(plan: Plan) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from physid_drake.identify import Accuracy, Identification
+from physid_drake.identify import Accuracy, CellsTold, Identification
 from physid_drake.recording import Recording
 
 FORMAT = "physid-result/1"
@@ -38,12 +38,14 @@ def result_json(result: Identification, recording: Recording, seed: int, version
             }
             for e in result.estimates
         },
+        **({} if result.cells is None else {"cells": _cells(result.cells)}),
         "held_out": {
             "pushes": list(result.held_out),
             "before": _numbers(result.before),
             "after": _numbers(result.after),
         },
         "training": {"pushes": list(result.training), "after": _numbers(result.fitted)},
+        **({} if result.foreseen is None else {"foreseen": _numbers(result.foreseen)}),
         "reduced_chi2": result.reduced_chi2,
         "friction_scatter": result.polished.friction_scatter,
         "push_unknowns": dict(zip(result.training, result.polished.unknowns, strict=True)),
@@ -61,6 +63,22 @@ def result_json(result: Identification, recording: Recording, seed: int, version
         "versions": versions,
     }
     return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+
+def _cells(cells: CellsTold) -> dict[str, Any]:
+    return {
+        "grid": list(cells.grid),
+        "names": list(cells.names),
+        "friction": cells.friction.tolist(),
+        "prior_std_left": cells.left.tolist(),
+        "combinations_told": cells.told,
+        "combinations": [
+            {"weights": c.weights.tolist(), "singular_value": c.strength, "prior_std_left": c.left, "told": c.told}
+            for c in cells.combinations
+        ],
+        "neighbours_told_apart": [list(pair) for pair in cells.apart],
+        "neighbours_not_told_apart": [list(pair) for pair in cells.not_apart],
+    }
 
 
 def _numbers(accuracy: Accuracy | None) -> dict[str, float | int | None] | None:

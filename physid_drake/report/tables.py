@@ -39,8 +39,10 @@ def accuracy_table(result: Identification) -> Table:
     ):
         table.add_column(header, justify="left" if header in ("pushes", "theta") else "right")
     held, fitted = f"{len(result.held_out)} held out", f"{len(result.training)} fitted"
+    after = "after" if result.foreseen is None else "after each"
     for pushes, theta, accuracy in ((held, "before", result.before), (held, "after", result.after),
-                                    (fitted, "after", result.fitted)):  # fmt: skip
+                                    (fitted, "before each", result.foreseen),
+                                    (fitted, after, result.fitted)):  # fmt: skip
         if accuracy is not None:
             table.add_row(pushes, theta, *accuracy_cells(accuracy))
     return table

@@ -190,3 +190,19 @@ def test_another_configuration_does_not_go_on_from_there(recording, tmp_path, mo
         assert quick(out, recording=recording, **other) == 0
     assert count.calls == 6
     assert np.isfinite(result_of(out)["reduced_chi2"])
+
+
+def test_the_main_job_learns_push_by_push_on_request(tmp_path):
+    recording = write_small(tmp_path / "recording", 2)
+    assert quick(tmp_path / "out", recording=recording, search={"online": True}) == 0
+    content = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert len(content["training"]["pushes"]) == 2
+    assert content["held_out"]["pushes"] == []
+    assert content["foreseen"]["sigmas_rms"] > content["training"]["after"]["sigmas_rms"]
+
+
+def test_an_unknown_search_is_refused_before_anything_is_written(tmp_path, capsys):
+    recording = write_small(tmp_path / "recording", 2)
+    assert quick(tmp_path / "out", recording=recording, search={"method": "annealing"}) == 1
+    assert "search.method" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

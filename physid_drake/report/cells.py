@@ -1,0 +1,75 @@
+"""What pushes tell about friction that differs from cell to cell: a table, sentences, a figure."""
+
+from __future__ import annotations
+
+import numpy as np
+from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from rich.table import Table
+
+from physid_drake.identify import CellsTold
+from physid_drake.report.svg import INK, drawn, svg_of
+
+Array = NDArray[np.float64]
+
+
+def cells_table(cells: CellsTold) -> Table:
+    """What the pushes tell about combinations of the cells' frictions, told best first."""
+    table = Table(title="what these pushes tell about the cells", title_justify="left", caption=cells_verdict(cells),
+                  caption_justify="left")  # fmt: skip
+    for header in ("combination of ln frictions", "singular value", "prior's std left", "told"):
+        table.add_column(header, justify="left" if header.startswith("comb") else "right")
+    for c in cells.combinations:
+        table.add_row(combination_text(cells, c.weights), f"{c.strength:.3g}", f"{100 * c.left:.0f} %",
+                      "yes" if c.told else "no")  # fmt: skip
+    return table
+
+
+def combination_text(cells: CellsTold, weights: Array) -> str:
+    """The weights that matter, by the cells' places, largest first."""
+    order = np.argsort(-np.abs(weights), kind="stable")
+    shown = [k for k in order if abs(weights[k]) >= 0.1 * np.abs(weights).max()][:6]
+    terms = [f"{weights[k]:+.2f} ({place_of(cells.names[k])})" for k in shown]
+    return " ".join([*terms, "..."] if len(shown) < np.count_nonzero(np.abs(weights) > 1e-3) else terms)
+
+
+def place_of(name: str) -> str:
+    """The place of a cell in the grid: ``i,j`` along x and y of the object."""
+    return ",".join(name.split("_")[-2:])
+
+
+def cells_verdict(cells: CellsTold) -> str:
+    """In a sentence or two, which cells these pushes tell apart."""
+    count = len(cells.combinations)
+    text = f"{cells.told} of {count} combinations of the cells' frictions are told by these pushes"
+    text += "; the others keep their prior." if cells.told < count else "."
+    if not cells.not_apart:
+        return f"{text} All neighbours are told apart." if cells.apart else text
+    pairs = ", ".join(f"{place_of(a)} and {place_of(b)}" for a, b in cells.not_apart)
+    return f"{text} Not told apart: {pairs}."
+
+
+def cells_figure(cells: CellsTold) -> Markup:
+    """Friction of each cell, and what is left of its prior's spread, from above in the object's axes."""
+    with drawn():
+        figure = Figure(figsize=(5.2, 2.2), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        _draw_map(left, cells, cells.friction, "friction", "{:.3f}", None)
+        _draw_map(right, cells, 100.0 * cells.left, "% of the prior's spread left", "{:.0f}", (0.0, 100.0))
+        return svg_of(figure, "cells", "Friction of the cells, and what is left of their prior")
+
+
+def _draw_map(axes: Axes, cells: CellsTold, values: Array, title: str, form: str,
+              limits: tuple[float, float] | None) -> None:  # fmt: skip
+    places = [[int(v) for v in place_of(name).split(",")] for name in cells.names]
+    image = np.full(cells.grid, np.nan)
+    for (i, j), value in zip(places, values, strict=True):
+        image[i, j] = value
+        axes.text(i, j, form.format(value), ha="center", va="center", color=INK)
+    low, high = limits or (float(values.min()), float(values.max()))
+    edges = [np.arange(n + 1) - 0.5 for n in cells.grid]
+    axes.pcolormesh(*edges, image.T, cmap="Blues", vmin=low, vmax=low + 1.6 * (high - low + 1e-9), edgecolor="white")
+    axes.set(title=title, aspect="equal", xlabel="x of the object", ylabel="y")
+    axes.set(xticks=range(cells.grid[0]), yticks=range(cells.grid[1]))
