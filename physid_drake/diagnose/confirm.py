@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 Tick = Callable[[str, int, int], None]
 
 WORTH_A_FIT = 0.35  # of the best score test's gain
-WORTH_A_TRY = 0.1  # where no better one explains the pushes
+RIVAL = 0.5  # where one explains the pushes already
+WORTH_A_TRY = 0.1  # where none takes a good part of the mismatch away
 ENOUGH = 180  # rollouts per push in one step after which no further effect is tried
 SURE = 2.0  # standard errors
 LEAST = 4.0  # nats of held-out gain
@@ -117,6 +118,8 @@ def confirm(
     found: list[Candidate] = []
     for k, one in enumerate((*worth, *more)):
         if k >= len(worth) and (any(worthwhile(before, c) for c in found) or fitter.case.pool.count > spent):
+            break
+        if _explained(found) and one.gain < RIVAL * ordered[0].gain:
             break
         tick(f"fit with {one.kind.name}", k, len(worth))
         found.append(_candidate(fitter, one, _fit(fitter, before, one), plain))
