@@ -1,0 +1,45 @@
+"""The experiments by name, each in its full and its quick size."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Final
+
+from physid_drake.errors import ConfigError
+from physid_drake.experiments.motion_prediction import MotionPrediction
+from physid_drake.experiments.values import Experiment
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Wish:
+    """What a person asks for: ``seed``, ``quick`` sizes, and the folder of published pushes where one is read."""
+
+    seed: int
+    quick: bool
+    pushes: Path | None
+
+
+def _motion_prediction(wish: Wish) -> Experiment:
+    if wish.quick:
+        return MotionPrediction(seed=wish.seed, repetitions=2, budget=12, tick_s=4e-3)
+    return MotionPrediction(seed=wish.seed)
+
+
+EXPERIMENTS: Final[Mapping[str, Callable[[Wish], Experiment]]] = {
+    "motion_prediction": _motion_prediction,
+}
+
+
+def experiment_named(name: str, wish: Wish) -> Experiment:
+    """The experiment of a name.
+
+    Raises:
+        ConfigError: if there is none, or what it reads is missing.
+    """
+    if name not in EXPERIMENTS:
+        raise ConfigError(f"experiment '{name}' is unknown; known are {', '.join(EXPERIMENTS)}.")
+    if wish.pushes is not None and name != "mit_pushes":
+        raise ConfigError(f"--data is for mit_pushes; {name} makes its own pushes.")
+    return EXPERIMENTS[name](wish)
