@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from physid_drake.errors import ConfigError
+from physid_drake.experiments.mit_pushes import OTHERS, WHERE, MitPushes
 from physid_drake.experiments.motion_prediction import MotionPrediction
 from physid_drake.experiments.values import Experiment
 
@@ -27,8 +28,20 @@ def _motion_prediction(wish: Wish) -> Experiment:
     return MotionPrediction(seed=wish.seed)
 
 
+def _mit_pushes(wish: Wish) -> Experiment:
+    if wish.pushes is None:
+        raise ConfigError(f"mit_pushes: give the folder of the published pushes with --data; {WHERE}.")
+    if wish.quick:
+        return MitPushes(
+            seed=wish.seed, folder=wish.pushes, pushes=30, folds=3, training=10, budget=10, other_pushes=10,
+            other_folds=2, other_budget=6, others=OTHERS[:2],
+        )  # fmt: skip
+    return MitPushes(seed=wish.seed, folder=wish.pushes)
+
+
 EXPERIMENTS: Final[Mapping[str, Callable[[Wish], Experiment]]] = {
     "motion_prediction": _motion_prediction,
+    "mit_pushes": _mit_pushes,
 }
 
 

@@ -16,10 +16,11 @@ from physid_drake.identify import Identifier
 from physid_drake.identify.config import SearchConfig, ThetaConfig
 from physid_drake.identify.misfit import whitened_residual
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
-from physid_drake.identify.problem import PushProblem
+from physid_drake.identify.problem import CellSpec, PushProblem
 from physid_drake.identify.rollouts import Prediction, Task
 from physid_drake.recording import Recording
 from physid_drake.search import GreedyEntropySearch, RandomSearch, Search, search_minimum
+from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
 
@@ -62,15 +63,24 @@ class EndErrors:
 class Learner:
     """The pushes of a recording, and how well a theta explains some of them."""
 
-    def __init__(self, recording: Recording, *, tick_s: float, theta: ThetaConfig | None = None) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        *,
+        tick_s: float = 2e-3,
+        theta: ThetaConfig | None = None,
+        config: CellConfig | None = None,
+    ) -> None:
         """Prepare.
 
         Args:
             recording: the pushes.
             tick_s: of the cell [s].
             theta: what is unknown; mass and both frictions if None.
+            config: of the cell, instead of the default with that tick.
         """
-        self.config = CellConfig(solver=SolverConfig(time_step_s=tick_s, slide_time_step_s=max(tick_s, 2e-3)))
+        solver = SolverConfig(time_step_s=tick_s, slide_time_step_s=max(tick_s, 2e-3))
+        self.config = config or CellConfig(solver=solver)
         identifier = Identifier(
             recording, cell=self.config, theta=theta or ThetaConfig(), search=SearchConfig(jobs=1),
             held_out_share=0.0, seed=0,
@@ -78,9 +88,14 @@ class Learner:
         self.problems: tuple[PushProblem, ...] = identifier.problems
         self.thetas, self._noise, self._pool = identifier.thetas, identifier.noise, identifier.pool
 
+    @property
+    def spec(self) -> CellSpec:
+        """What a rollout needs to build the cell."""
+        return self._pool.spec
+
     def predictions(self, problems: Sequence[PushProblem], theta: Array) -> list[Prediction | None]:
         """Rollouts of some pushes with theta (d,); None where one diverged."""
-        return self._pool.run([_task(problem, theta) for problem in problems])
+        return self._pool.run([plain_task(problem, theta) for problem in problems])
 
     def residuals(self, problems: Sequence[PushProblem], theta: Array) -> Array:
         """Residuals (m,) of some pushes in standard deviations; large ones where a rollout diverged."""
@@ -112,68 +127,89 @@ class Learner:
         *,
         budget: int,
         rng: np.random.Generator,
-        candidates: int = CANDIDATES,
         on_trial: Callable[[int], None] | None = None,
     ) -> Trials:
-        """Search theta with so many trials.
-
-        Args:
-            method: one of ``METHODS``.
-            problems: the training pushes.
-            budget: trials.
-            rng: draws candidates, and the search's own numbers.
-            candidates: of a search.
-            on_trial: told the number of trials made.
-        """
-        told = on_trial or (lambda count: None)
-        if method == LEAST_SQUARES:
-            return self._least_squares(problems, budget, told)
-        space = self.thetas.space
-        found = search_minimum(
-            lambda thetas: np.array([self.misfit(self.residuals(problems, theta)) for theta in thetas]),
-            space, space.sample(rng, candidates, from_prior=True), SEARCHES[method](), budget=budget, rng=rng,
-            # Random search does not look at its trials: one batch spares it the belief.
-            n_initial=0 if method == "random search" else None, batch=budget if method == "random search" else 1,
-            entropy_tolerance=0.0, on_trial=lambda belief: told(belief.n_trials),
+        """Search theta with so many trials; arguments as in ``search_trials``, and the training pushes."""
+        return search_trials(
+            method, lambda theta: self.residuals(problems, theta), self.misfit, self.thetas.space, budget=budget,
+            rng=rng, on_trial=on_trial,
         )  # fmt: skip
-        if found.stop_reason == "interrupted":
-            raise KeyboardInterrupt
-        return Trials(thetas=np.array(found.belief.thetas), misfits=np.array(found.belief.errors))
 
-    def _least_squares(self, problems: Sequence[PushProblem], budget: int, told: Callable[[int], None]) -> Trials:
-        """Gauss-Newton in the unit cube from the nominal theta; its differences count as trials."""
-        space, at = self.thetas.space, dict[bytes, Array]()
-        thetas, misfits = list[Array](), list[float]()
 
-        def residuals(u: Array) -> Array:
-            if len(thetas) >= budget:
-                raise _SpentError
-            theta = np.asarray(space.from_unit(u))
-            found = self.residuals(problems, theta)
-            thetas.append(theta)
-            misfits.append(self.misfit(found))
-            told(len(thetas))
-            at[u.tobytes()] = found
-            return found
+def search_trials(
+    method: str,
+    residuals: Callable[[Array], Array],
+    misfit: Callable[[Array], float],
+    space: ParameterSpace,
+    *,
+    budget: int,
+    rng: np.random.Generator,
+    on_trial: Callable[[int], None] | None = None,
+) -> Trials:
+    """Search theta with so many trials.
 
-        def slopes(u: Array) -> Array:
-            here = at[u.tobytes()]
-            steps = np.where(u + _STEP < 1.0, _STEP, -_STEP)
-            columns = [
-                (residuals(u + step * row) - here) / step for step, row in zip(steps, np.eye(len(u)), strict=True)
-            ]
-            return np.column_stack(columns)
+    Args:
+        method: one of ``METHODS``.
+        residuals: of theta (d,), an array (m,).
+        misfit: what a search makes small, of residuals (m,).
+        space: of theta.
+        budget: trials.
+        rng: draws candidates, and the search's own numbers.
+        on_trial: told the number of trials made.
+    """
+    told = on_trial or (lambda count: None)
+    if method == LEAST_SQUARES:
+        return _least_squares(residuals, misfit, space, budget, told)
+    blind = SEARCHES[method] is RandomSearch
+    found = search_minimum(
+        lambda thetas: np.array([misfit(residuals(theta)) for theta in thetas]),
+        space, space.sample(rng, CANDIDATES, from_prior=True), SEARCHES[method](), budget=budget, rng=rng,
+        # Random search does not look at its trials: one batch spares it the belief.
+        n_initial=0 if blind else None, batch=budget if blind else 1,
+        entropy_tolerance=0.0, on_trial=lambda belief: told(belief.n_trials),
+    )  # fmt: skip
+    if found.stop_reason == "interrupted":
+        raise KeyboardInterrupt
+    return Trials(thetas=np.array(found.belief.thetas), misfits=np.array(found.belief.errors))
 
-        start = np.clip(np.asarray(space.to_unit(space.nominal)), 1e-3, 1.0 - 1e-3)
-        with contextlib.suppress(_SpentError):
-            least_squares(residuals, start, jac=slopes, bounds=(0.0, 1.0), x_scale=0.1, xtol=1e-6, ftol=1e-8)
-        return Trials(thetas=np.array(thetas), misfits=np.array(misfits))
+
+def _least_squares(
+    residuals: Callable[[Array], Array],
+    misfit: Callable[[Array], float],
+    space: ParameterSpace,
+    budget: int,
+    told: Callable[[int], None],
+) -> Trials:
+    """Gauss-Newton in the unit cube from the nominal theta; its differences count as trials."""
+    thetas, misfits, at = list[Array](), list[float](), dict[bytes, Array]()
+
+    def tried(u: Array) -> Array:
+        if len(thetas) >= budget:
+            raise _SpentError
+        theta = np.asarray(space.from_unit(u))
+        at[u.tobytes()] = found = residuals(theta)
+        thetas.append(theta)
+        misfits.append(misfit(found))
+        told(len(thetas))
+        return found
+
+    def slopes(u: Array) -> Array:
+        here = at[u.tobytes()]
+        steps = np.where(u + _STEP < 1.0, _STEP, -_STEP)
+        columns = [(tried(u + step * row) - here) / step for step, row in zip(steps, np.eye(len(u)), strict=True)]
+        return np.column_stack(columns)
+
+    start = np.clip(np.asarray(space.to_unit(space.nominal)), 1e-3, 1.0 - 1e-3)
+    with contextlib.suppress(_SpentError):
+        least_squares(tried, start, jac=slopes, bounds=(0.0, 1.0), x_scale=0.1, xtol=1e-6, ftol=1e-8)
+    return Trials(thetas=np.array(thetas), misfits=np.array(misfits))
 
 
 class _SpentError(Exception):
     """The budget of a least-squares fit is spent."""
 
 
-def _task(problem: PushProblem, theta: Array) -> Task:
+def plain_task(problem: PushProblem, theta: Array) -> Task:
+    """A rollout of a push with theta (d,), its own unknowns at their most likely values."""
     nuisance = nuisance_of(problem, FIRST_SCATTER)
     return Task(problem=problem, theta=theta, nuisance=nuisance, values=np.zeros(len(nuisance.names)))
