@@ -10,6 +10,9 @@ from typing import Final
 from physid_drake.errors import ConfigError
 from physid_drake.experiments.mit_pushes import OTHERS, WHERE, MitPushes
 from physid_drake.experiments.motion_prediction import MotionPrediction
+from physid_drake.experiments.next_push import NextPush
+from physid_drake.experiments.push_direction import PushDirections
+from physid_drake.experiments.push_speed import PushSpeeds
 from physid_drake.experiments.values import Experiment
 
 
@@ -39,9 +42,32 @@ def _mit_pushes(wish: Wish) -> Experiment:
     return MitPushes(seed=wish.seed, folder=wish.pushes)
 
 
+def _push_direction(wish: Wish) -> Experiment:
+    if wish.quick:
+        return PushDirections(seed=wish.seed, repetitions=3, budget=10, training=3, directions=15, tick_s=4e-3)
+    return PushDirections(seed=wish.seed)
+
+
+def _push_speed(wish: Wish) -> Experiment:
+    if wish.quick:
+        return PushSpeeds(
+            seed=wish.seed, repetitions=2, slow_pushes=(1, 3), budget=12, polish_budget=8, plan_budget=10, tick_s=4e-3
+        )
+    return PushSpeeds(seed=wish.seed)
+
+
+def _next_push(wish: Wish) -> Experiment:
+    if wish.quick:
+        return NextPush(seed=wish.seed, repetitions=2, pushes=3, candidates=5, testing=3, budget=7, tick_s=4e-3)
+    return NextPush(seed=wish.seed)
+
+
 EXPERIMENTS: Final[Mapping[str, Callable[[Wish], Experiment]]] = {
     "motion_prediction": _motion_prediction,
     "mit_pushes": _mit_pushes,
+    "push_direction": _push_direction,
+    "push_speed": _push_speed,
+    "next_push": _next_push,
 }
 
 

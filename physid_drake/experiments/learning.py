@@ -120,6 +120,18 @@ class Learner:
         x, y, yaw = np.array(ends).T
         return EndErrors(positions=np.hypot(x, y), rotations=np.abs(yaw))
 
+    def polish(self, problems: Sequence[PushProblem], trials: Trials, *, budget: int) -> Trials:
+        """The same trials, and so many more of least squares from the best of them."""
+        start = np.asarray(self.thetas.space.to_unit(trials.best_after(len(trials.misfits))))
+        more = _least_squares(
+            lambda theta: self.residuals(problems, theta), self.misfit, self.thetas.space, budget, lambda count: None,
+            start,
+        )  # fmt: skip
+        return Trials(
+            thetas=np.concatenate([trials.thetas, more.thetas]),
+            misfits=np.concatenate([trials.misfits, more.misfits]),
+        )
+
     def learn(
         self,
         method: str,
@@ -179,8 +191,9 @@ def _least_squares(
     space: ParameterSpace,
     budget: int,
     told: Callable[[int], None],
+    start: Array | None = None,
 ) -> Trials:
-    """Gauss-Newton in the unit cube from the nominal theta; its differences count as trials."""
+    """Gauss-Newton from a point of the unit cube, the nominal one if None; its differences count as trials."""
     thetas, misfits, at = list[Array](), list[float](), dict[bytes, Array]()
 
     def tried(u: Array) -> Array:
@@ -199,9 +212,9 @@ def _least_squares(
         columns = [(tried(u + step * row) - here) / step for step, row in zip(steps, np.eye(len(u)), strict=True)]
         return np.column_stack(columns)
 
-    start = np.clip(np.asarray(space.to_unit(space.nominal)), 1e-3, 1.0 - 1e-3)
+    begin = np.clip(np.asarray(space.to_unit(space.nominal)) if start is None else start, 1e-3, 1.0 - 1e-3)
     with contextlib.suppress(_SpentError):
-        least_squares(tried, start, jac=slopes, bounds=(0.0, 1.0), x_scale=0.1, xtol=1e-6, ftol=1e-8)
+        least_squares(tried, begin, jac=slopes, bounds=(0.0, 1.0), x_scale=0.1, xtol=1e-6, ftol=1e-8)
     return Trials(thetas=np.array(thetas), misfits=np.array(misfits))
 
 

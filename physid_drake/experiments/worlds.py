@@ -27,6 +27,7 @@ Pose = tuple[float, float, float]
 Corners = tuple[tuple[float, float], tuple[float, float]]
 
 SENSORS: Final = Sensors(object_position_std=3e-4, object_rotation_std=3e-3, hand_position_std=5e-5)
+NO_NOISE: Final = Sensors()
 FRICTION_SCATTER: Final = 0.02
 """Relative, from push to push."""
 ERASER: Final = Box(size=(0.127, 0.051, 0.030))

@@ -1,0 +1,225 @@
+"""Pushes chosen for what they teach against random pushes: errors of theta and of prediction by number of pushes.
+
+The paper leaves the choice of pushes for later (section V).
+"""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from physid_drake.experiments.learning import LEAST_SQUARES, Learner
+from physid_drake.experiments.values import (
+    Array,
+    Cell,
+    Panel,
+    Record,
+    Result,
+    Table,
+    Tick,
+    mean_and_deviation,
+    series_of,
+)
+from physid_drake.experiments.worlds import (
+    ERASER,
+    FRICTION_SCATTER,
+    SENSORS,
+    HiddenRobot,
+    Pose,
+    draw_push,
+    draw_start,
+    draw_world,
+    record_pushes,
+)
+from physid_drake.identify import ThetaConfig
+from physid_drake.model import Model
+from physid_drake.plan import Situation
+from physid_drake.plan.trajectory import trajectory_of
+from physid_drake.policies import PlannedPush
+from physid_drake.recording import Push, Recording
+
+SPEEDS: Final = (0.05, 0.4)  # m/s
+FRICTIONS: Final = (0.12, 0.4)
+UNKNOWN: Final = ("support_friction", "hand_friction")
+RANDOM, INFORMED = "random pushes", "most informative of the candidates"
+PRIOR_INFORMATION: Final = 12.0
+"""Of each unknown, in the unit cube, where it is uniform."""
+
+_STEP = 0.02  # of the unit cube, for differences
+_RATE = 100.0  # Hz, at which a push would be seen
+
+Candidate = tuple[Pose, PlannedPush]
+Chooser = Callable[[Learner, HiddenRobot, Array, Array, Sequence[Candidate]], int]
+"""Learner, robot, theta (d,), information (d, d) in the unit cube, candidates -> index of the one to make."""
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class NextPush:
+    """Sizes of the experiment.
+
+    Attributes:
+        seed: of everything random.
+        repetitions: each with a world of its own.
+        pushes: made one after the other; theta is learned again after each.
+        candidates: random pushes from which the next is chosen.
+        testing: random pushes that are predicted.
+        budget: trials of each fit.
+        tick_s: of the cell [s].
+    """
+
+    seed: int
+    repetitions: int = 10
+    pushes: int = 5
+    candidates: int = 10
+    testing: int = 6
+    budget: int = 10
+    tick_s: float = 2e-3
+
+    def repeat(self, index: int, tick: Tick) -> Record:
+        """One world: both ways of choosing meet the same candidates."""
+        draws = np.random.default_rng([self.seed, index])
+        world = draw_world(draws, ERASER, FRICTIONS)
+        tester = HiddenRobot(world, rng=draws)
+        tests = record_pushes(tester, draws, self.testing, speeds=SPEEDS)
+        offers = [[_candidate(draws) for _ in range(self.candidates)] for _ in range(self.pushes)]
+        seed = int(draws.integers(2**63))
+        record: Record = {"truth": {name: getattr(world, name) for name in UNKNOWN}}
+        for name, choose in CHOOSERS.items():
+            robot = HiddenRobot(world, rng=np.random.default_rng(seed))
+            record[name] = self._learned(robot, choose, offers, tester.recording(tests), name, tick)
+        return record
+
+    def _learned(
+        self,
+        robot: HiddenRobot,
+        choose: Chooser,
+        offers: Sequence[Sequence[Candidate]],
+        tests: Recording,
+        name: str,
+        tick: Tick,
+    ) -> Record:
+        """Push, learn, choose, push."""
+        config = ThetaConfig(parameters=list(UNKNOWN), nominal={"mass": robot.world.mass})
+        tester = Learner(tests, tick_s=self.tick_s, theta=config)
+        learner, made = tester, list[Push]()
+        theta = np.asarray(tester.thetas.space.nominal)
+        information = PRIOR_INFORMATION * np.eye(len(UNKNOWN))
+        found: dict[str, list[float]] = {"support_friction": [], "hand_friction": [], "mm": [], "deg": []}
+        for number, offer in enumerate(offers):
+            tick(f"{name}: push {number + 1}", number, len(offers))
+            pose, push = offer[choose(learner, robot, theta, information, offer)]
+            robot.put(pose)
+            made.append(robot.execute(push))
+            learner = Learner(robot.recording(tuple(made)), tick_s=self.tick_s, theta=config)
+            trials = learner.learn(LEAST_SQUARES, learner.problems, budget=self.budget, rng=np.random.default_rng(0))
+            theta = trials.best_after(self.budget)
+            information = information + push_information(learner, robot, theta, (pose, push))
+            for parameter, value in learner.thetas.space.as_dict(theta).items():
+                found[parameter].append(100.0 * abs(value / getattr(robot.world, parameter) - 1.0))
+            errors = tester.end_errors(tester.problems, theta)
+            found["mm"].append(1e3 * float(errors.positions.mean()))
+            found["deg"].append(math.degrees(float(errors.rotations.mean())))
+        return dict(found)
+
+    def result(self, records: Sequence[Record]) -> Result:
+        """Errors by number of pushes."""
+        counts = [float(k) for k in range(1, self.pushes + 1)]
+        kinds = {"support_friction": "support friction [%]", "hand_friction": "hand friction [%]",
+                 "mm": "error of the end [mm]", "deg": "error [deg]"}  # fmt: skip
+        rows: list[tuple[Cell, ...]] = []
+        for name in CHOOSERS:
+            for k in range(self.pushes):
+                spreads = [mean_and_deviation([r[name][kind][k] for r in records]) for kind in kinds]
+                rows.append((name, k + 1, *(value for spread in spreads for value in spread)))
+        return Result(
+            setting=(
+                f"{len(records)} hidden worlds (MuJoCo) with an eraser, as in motion_prediction; the mass is known."
+                f" Each push is chosen among {self.candidates} random ones, the same for both; theta is fitted by"
+                " least squares from its nominal value after every push, and"
+                f" {self.testing} other pushes are predicted."
+            ),
+            tables=(
+                Table(
+                    name="pushes", title="errors by pushes made (mean and deviation over worlds)",
+                    columns=("chosen", "pushes", "support friction %", "+- support %", "hand friction %", "+- hand %",
+                             "mm", "+- mm", "deg", "+- deg"),
+                    rows=tuple(rows),
+                ),
+            ),
+            panels=tuple(
+                Panel(title=title, x_label="pushes", y_label=kinds[kind],
+                      series=tuple(series_of(name, counts, [r[name][kind] for r in records]) for name in CHOOSERS))
+                for kind, title in (("support_friction", "theta"), ("hand_friction", "theta"), ("mm", "test pushes"))
+            ),
+        )  # fmt: skip
+
+
+def most_informative(
+    learner: Learner, robot: HiddenRobot, theta: Array, information: Array, offer: Sequence[Candidate]
+) -> int:
+    """The candidate that lifts the information's determinant most.
+
+    Source: K. Chaloner and I. Verdinelli, "Bayesian Experimental Design: A Review", Statistical Science 10, 1995
+    (D-optimality of the linearised model).
+    """
+    gains = [
+        float(np.linalg.slogdet(information + push_information(learner, robot, theta, candidate))[1])
+        for candidate in offer
+    ]
+    return int(np.argmax(gains))
+
+
+def the_first(
+    learner: Learner, robot: HiddenRobot, theta: Array, information: Array, offer: Sequence[Candidate]
+) -> int:
+    """A random push: candidates come in random order."""
+    del learner, robot, theta, information, offer
+    return 0
+
+
+CHOOSERS: Final[Mapping[str, Chooser]] = {RANDOM: the_first, INFORMED: most_informative}
+
+
+def push_information(learner: Learner, robot: HiddenRobot, theta: Array, candidate: Candidate) -> Array:
+    """What a push would say of theta: the Fisher information (d, d) in the unit cube.
+
+    The noise is that of the tracker; friction's scatter from push to push is marginalised, which bounds what one push
+    can say of the support friction.
+    """
+    space = learner.thetas.space
+    u = np.asarray(space.to_unit(theta))
+    steps = np.where(u + _STEP < 1.0, _STEP, -_STEP)
+    here, *others = _seen(
+        [robot.model(learner.config, learner.thetas.body(np.asarray(space.from_unit(point))))
+         for point in (u, *(u + np.diag(steps)))], candidate,
+    )  # fmt: skip
+    jacobian = np.column_stack([(other - here) / step for other, step in zip(others, steps, strict=True)])
+    k = space.index("support_friction")
+    parameter = space.parameters[k]
+    # A share of friction is so much of the unit cube, which is even in its logarithm.
+    scatter = jacobian[:, k] * FRICTION_SCATTER / math.log(parameter.upper / parameter.lower)
+    projected = jacobian.T @ scatter
+    lost = np.outer(projected, projected) / (1.0 + float(scatter @ scatter))
+    return np.asarray(jacobian.T @ jacobian - lost)
+
+
+def _seen(models: Sequence[Model], candidate: Candidate) -> list[Array]:
+    """Whitened poses (3 n,) at the times at which a push would be seen, for each model."""
+    pose, push = candidate
+    ways = [trajectory_of(model, (push,), Situation(start=pose)) for model in models]
+    times = np.arange(0.0, max(float(way.paths[0].times[-1]) + 0.5 for way in ways), 1.0 / _RATE)
+    assert SENSORS.object_position_std is not None and SENSORS.object_rotation_std is not None
+    sigmas = np.array([SENSORS.object_position_std, SENSORS.object_position_std, SENSORS.object_rotation_std])
+    return [
+        (np.column_stack([np.interp(times, way.times, column) for column in way.poses.T]) / sigmas).ravel()
+        for way in ways
+    ]
+
+
+def _candidate(rng: np.random.Generator) -> Candidate:
+    pose = draw_start(rng)
+    return pose, draw_push(rng, ERASER, pose[2], speeds=SPEEDS)
