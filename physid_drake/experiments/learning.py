@@ -16,7 +16,7 @@ from physid_drake.identify import Identifier
 from physid_drake.identify.config import SearchConfig, ThetaConfig
 from physid_drake.identify.misfit import whitened_residual
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
-from physid_drake.identify.problem import CellSpec, PushProblem
+from physid_drake.identify.problem import PushProblem
 from physid_drake.identify.rollouts import Prediction, Task
 from physid_drake.recording import Recording
 from physid_drake.search import GreedyEntropySearch, RandomSearch, Search, search_minimum
@@ -24,11 +24,8 @@ from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
 
-SEARCHES: Final[Mapping[str, Callable[[], Search]]] = {
-    "greedy entropy search": GreedyEntropySearch,
-    "random search": RandomSearch,
-}
-LEAST_SQUARES: Final = "least squares"
+GREEDY, RANDOM, LEAST_SQUARES = "greedy entropy search", "random search", "least squares"
+SEARCHES: Final[Mapping[str, Callable[[], Search]]] = {GREEDY: GreedyEntropySearch, RANDOM: RandomSearch}
 METHODS: Final = (*SEARCHES, LEAST_SQUARES)
 CANDIDATES: Final = 1000
 _STEP = 0.01  # of the unit cube, for differences
@@ -61,7 +58,15 @@ class EndErrors:
 
 
 class Learner:
-    """The pushes of a recording, and how well a theta explains some of them."""
+    """The pushes of a recording, and how well a theta explains some of them.
+
+    Attributes:
+        config: of the cell.
+        problems: the pushes.
+        thetas: what is unknown, and the body that a theta describes.
+        noise: of the recording.
+        pool: makes the rollouts, in this process.
+    """
 
     def __init__(
         self,
@@ -86,21 +91,16 @@ class Learner:
             held_out_share=0.0, seed=0,
         )  # fmt: skip
         self.problems: tuple[PushProblem, ...] = identifier.problems
-        self.thetas, self._noise, self._pool = identifier.thetas, identifier.noise, identifier.pool
-
-    @property
-    def spec(self) -> CellSpec:
-        """What a rollout needs to build the cell."""
-        return self._pool.spec
+        self.thetas, self.noise, self.pool = identifier.thetas, identifier.noise, identifier.pool
 
     def predictions(self, problems: Sequence[PushProblem], theta: Array) -> list[Prediction | None]:
         """Rollouts of some pushes with theta (d,); None where one diverged."""
-        return self._pool.run([plain_task(problem, theta) for problem in problems])
+        return self.pool.run([plain_task(problem, theta) for problem in problems])
 
     def residuals(self, problems: Sequence[PushProblem], theta: Array) -> Array:
         """Residuals (m,) of some pushes in standard deviations; large ones where a rollout diverged."""
         parts = [
-            np.full(3 * len(p.times), _FAILED) if r is None else whitened_residual(p, self._noise, r)
+            np.full(3 * len(p.times), _FAILED) if r is None else whitened_residual(p, self.noise, r)
             for p, r in zip(problems, self.predictions(problems, theta), strict=True)
         ]
         return np.concatenate(parts)

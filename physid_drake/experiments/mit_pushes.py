@@ -27,7 +27,15 @@ from physid_drake.cell.support import FrictionGrid, support_of
 from physid_drake.effects.body import UnevenSupport
 from physid_drake.effects.hand import HandOffset
 from physid_drake.errors import ConfigError
-from physid_drake.experiments.learning import METHODS, Learner, Trials, plain_task, search_trials
+from physid_drake.experiments.learning import (
+    GREEDY,
+    LEAST_SQUARES,
+    RANDOM,
+    Learner,
+    Trials,
+    plain_task,
+    search_trials,
+)
 from physid_drake.experiments.values import Panel, Record, Result, Table, Tick, mean_and_deviation, series_of
 from physid_drake.identify import ThetaConfig
 from physid_drake.identify.problem import PushProblem
@@ -50,7 +58,6 @@ WHERE: Final = (
 )
 MODELS: Final = {"quadratic": "published, ellipsoidal limit surface", "poly4": "published, 4th-order limit surface"}
 FRICTION, ALL = "hand friction", "friction, pressure, offset"
-GREEDY, RANDOM, LEAST_SQUARES = METHODS
 TRIED: Final = ((FRICTION, GREEDY), (ALL, GREEDY), (ALL, RANDOM), (ALL, LEAST_SQUARES))
 OTHERS_TRIED: Final = ((FRICTION, GREEDY), (ALL, LEAST_SQUARES))
 FRICTION_BUDGET: Final = 6
@@ -259,7 +266,7 @@ class PublishedPushes:
         theta = ThetaConfig(parameters=["hand_friction"], nominal={"support_friction": SUPPORT_FRICTION})
         config = CellConfig(solver=SolverConfig(time_step_s=TICK, slide_time_step_s=TICK))
         learner = Learner(recording, theta=theta, config=config)
-        self._spec, self._thetas = learner.spec, learner.thetas
+        self._spec, self._thetas = learner.pool.spec, learner.thetas
         self.problems = tuple(played(problem, PLAYED_SPEED) for problem in learner.problems)
         self.published = _published(source, recording)
         support = support_of(solid_of(recording.object.shape).underside, FrictionGrid(), 100)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from physid_drake.experiments.learning import METHODS, EndErrors, Learner, Trials
+from physid_drake.experiments.learning import GREEDY, METHODS, EndErrors, Learner, Trials
 from physid_drake.experiments.values import Panel, Record, Result, Series, Table, Tick, mean_and_deviation, series_of
 from physid_drake.experiments.worlds import ERASER, HiddenRobot, draw_world, record_pushes
 from physid_drake.identify.problem import PushProblem
@@ -94,7 +94,7 @@ class MotionPrediction:
         others, result = learner.problems[self.training :], {}
         for count, stream in zip(self.subsets, rng.spawn(len(self.subsets)), strict=True):
             tick(f"greedy entropy search on {count} of {self.training} training pushes", 0, 0)
-            trials = learner.learn(METHODS[0], learner.problems[:count], budget=self.budget, rng=stream)
+            trials = learner.learn(GREEDY, learner.problems[:count], budget=self.budget, rng=stream)
             result[str(count)] = _ends(learner.end_errors(others, trials.best_after(self.budget)))
         return result
 
@@ -116,7 +116,7 @@ class MotionPrediction:
         )  # fmt: skip
         pushes = Panel(
             title="test pushes: place", x_label="training pushes", y_label="error of the end [mm]",
-            series=(series_of(METHODS[0], subsets, [[r["subsets"][str(c)]["mm"] for c in self.subsets]
+            series=(series_of(GREEDY, subsets, [[r["subsets"][str(c)]["mm"] for c in self.subsets]
                                                     for r in records]),),
         )  # fmt: skip
         return Result(

@@ -45,16 +45,17 @@ from physid_drake.recording import Push, Recording
 SPEEDS: Final = (0.05, 0.4)  # m/s
 FRICTIONS: Final = (0.12, 0.4)
 UNKNOWN: Final = ("support_friction", "hand_friction")
-RANDOM, INFORMED = "random pushes", "most informative of the candidates"
+RANDOM, INFORMED = "random pushes", "informative pushes"
 PRIOR_INFORMATION: Final = 12.0
 """Of each unknown, in the unit cube, where it is uniform."""
 
 _STEP = 0.02  # of the unit cube, for differences
 _RATE = 100.0  # Hz, at which a push would be seen
 
-Candidate = tuple[Pose, PlannedPush]
-Chooser = Callable[[Learner, HiddenRobot, Array, Array, Sequence[Candidate]], int]
-"""Learner, robot, theta (d,), information (d, d) in the unit cube, candidates -> index of the one to make."""
+Offer = tuple[Pose, Sequence[PlannedPush]]
+"""Where the object stands, and the pushes from which the next is chosen."""
+Chooser = Callable[[Learner, HiddenRobot, Array, Array, Offer], int]
+"""Learner, robot, theta (d,), information (d, d) in the unit cube, offer -> index of the push to make."""
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -85,7 +86,7 @@ class NextPush:
         world = draw_world(draws, ERASER, FRICTIONS)
         tester = HiddenRobot(world, rng=draws)
         tests = record_pushes(tester, draws, self.testing, speeds=SPEEDS)
-        offers = [[_candidate(draws) for _ in range(self.candidates)] for _ in range(self.pushes)]
+        offers = [_offer(draws, self.candidates) for _ in range(self.pushes)]
         seed = int(draws.integers(2**63))
         record: Record = {"truth": {name: getattr(world, name) for name in UNKNOWN}}
         for name, choose in CHOOSERS.items():
@@ -97,7 +98,7 @@ class NextPush:
         self,
         robot: HiddenRobot,
         choose: Chooser,
-        offers: Sequence[Sequence[Candidate]],
+        offers: Sequence[Offer],
         tests: Recording,
         name: str,
         tick: Tick,
@@ -111,13 +112,14 @@ class NextPush:
         found: dict[str, list[float]] = {"support_friction": [], "hand_friction": [], "mm": [], "deg": []}
         for number, offer in enumerate(offers):
             tick(f"{name}: push {number + 1}", number, len(offers))
-            pose, push = offer[choose(learner, robot, theta, information, offer)]
+            pose, pushes = offer
+            push = pushes[choose(learner, robot, theta, information, offer)]
             robot.put(pose)
             made.append(robot.execute(push))
             learner = Learner(robot.recording(tuple(made)), tick_s=self.tick_s, theta=config)
             trials = learner.learn(LEAST_SQUARES, learner.problems, budget=self.budget, rng=np.random.default_rng(0))
             theta = trials.best_after(self.budget)
-            information = information + push_information(learner, robot, theta, (pose, push))
+            information = information + push_information(learner, robot, theta, pose, push)
             for parameter, value in learner.thetas.space.as_dict(theta).items():
                 found[parameter].append(100.0 * abs(value / getattr(robot.world, parameter) - 1.0))
             errors = tester.end_errors(tester.problems, theta)
@@ -158,24 +160,20 @@ class NextPush:
         )  # fmt: skip
 
 
-def most_informative(
-    learner: Learner, robot: HiddenRobot, theta: Array, information: Array, offer: Sequence[Candidate]
-) -> int:
-    """The candidate that lifts the information's determinant most.
+def most_informative(learner: Learner, robot: HiddenRobot, theta: Array, information: Array, offer: Offer) -> int:
+    """The push that lifts the information's determinant most.
 
     Source: K. Chaloner and I. Verdinelli, "Bayesian Experimental Design: A Review", Statistical Science 10, 1995
     (D-optimality of the linearised model).
     """
     gains = [
-        float(np.linalg.slogdet(information + push_information(learner, robot, theta, candidate))[1])
-        for candidate in offer
+        float(np.linalg.slogdet(information + push_information(learner, robot, theta, offer[0], push))[1])
+        for push in offer[1]
     ]
     return int(np.argmax(gains))
 
 
-def the_first(
-    learner: Learner, robot: HiddenRobot, theta: Array, information: Array, offer: Sequence[Candidate]
-) -> int:
+def the_first(learner: Learner, robot: HiddenRobot, theta: Array, information: Array, offer: Offer) -> int:
     """A random push: candidates come in random order."""
     del learner, robot, theta, information, offer
     return 0
@@ -184,7 +182,7 @@ def the_first(
 CHOOSERS: Final[Mapping[str, Chooser]] = {RANDOM: the_first, INFORMED: most_informative}
 
 
-def push_information(learner: Learner, robot: HiddenRobot, theta: Array, candidate: Candidate) -> Array:
+def push_information(learner: Learner, robot: HiddenRobot, theta: Array, pose: Pose, push: PlannedPush) -> Array:
     """What a push would say of theta: the Fisher information (d, d) in the unit cube.
 
     The noise is that of the tracker; friction's scatter from push to push is marginalised, which bounds what one push
@@ -195,7 +193,7 @@ def push_information(learner: Learner, robot: HiddenRobot, theta: Array, candida
     steps = np.where(u + _STEP < 1.0, _STEP, -_STEP)
     here, *others = _seen(
         [robot.model(learner.config, learner.thetas.body(np.asarray(space.from_unit(point))))
-         for point in (u, *(u + np.diag(steps)))], candidate,
+         for point in (u, *(u + np.diag(steps)))], pose, push,
     )  # fmt: skip
     jacobian = np.column_stack([(other - here) / step for other, step in zip(others, steps, strict=True)])
     k = space.index("support_friction")
@@ -207,9 +205,8 @@ def push_information(learner: Learner, robot: HiddenRobot, theta: Array, candida
     return np.asarray(jacobian.T @ jacobian - lost)
 
 
-def _seen(models: Sequence[Model], candidate: Candidate) -> list[Array]:
+def _seen(models: Sequence[Model], pose: Pose, push: PlannedPush) -> list[Array]:
     """Whitened poses (3 n,) at the times at which a push would be seen, for each model."""
-    pose, push = candidate
     ways = [trajectory_of(model, (push,), Situation(start=pose)) for model in models]
     times = np.arange(0.0, max(float(way.paths[0].times[-1]) + 0.5 for way in ways), 1.0 / _RATE)
     assert SENSORS.object_position_std is not None and SENSORS.object_rotation_std is not None
@@ -220,6 +217,6 @@ def _seen(models: Sequence[Model], candidate: Candidate) -> list[Array]:
     ]
 
 
-def _candidate(rng: np.random.Generator) -> Candidate:
+def _offer(rng: np.random.Generator, count: int) -> Offer:
     pose = draw_start(rng)
-    return pose, draw_push(rng, ERASER, pose[2], speeds=SPEEDS)
+    return pose, [draw_push(rng, ERASER, pose[2], speeds=SPEEDS) for _ in range(count)]

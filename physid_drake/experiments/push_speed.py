@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
-from physid_drake.experiments.learning import METHODS, Learner
+from physid_drake.experiments.learning import GREEDY, Learner
 from physid_drake.experiments.values import (
     Array,
     Panel,
@@ -53,10 +53,10 @@ SLOW: Final = (0.1, 0.3)  # m/s, of the training pushes
 FAST: Final = (0.2, 2.0)  # m/s, of the policy
 TRAVEL: Final = 0.1  # m of the hand from the touch to the brake
 LOST: Final = 1.0  # m: what PoWER and its peer are told of an object that fell
-GREEDY, POWER, CMA = METHODS[0], "PoWER", "CMA-ES"
+POWER, CMA = "PoWER", "CMA-ES"
 POLISHED = f"{GREEDY}, polished"
 
-_SPEED_KNOTS, _FACTOR_KNOTS = 14, (0.92, 1.0, 1.08)
+_SPEED_KNOTS, _FACTOR_KNOTS = 8, (0.92, 1.0, 1.08)
 _CHECKS = ((0.77, 0.97), (1.51, 1.03))  # m/s and friction factor
 
 

@@ -1,0 +1,136 @@
+"""Hidden worlds and what is learned in them: MuJoCo makes the pushes, the cell explains them."""
+
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco")
+
+from physid_drake.errors import ConfigError
+from physid_drake.experiments.learning import Learner
+from physid_drake.experiments.motion_prediction import MotionPrediction
+from physid_drake.experiments.next_push import push_information
+from physid_drake.experiments.push_direction import _share_within
+from physid_drake.experiments.push_speed import FAST, GOAL, TABLE, FastPushes, _distance
+from physid_drake.experiments.repetitions import claim, run_all
+from physid_drake.experiments.worlds import (
+    BOTTLE,
+    ERASER,
+    FRICTION_SCATTER,
+    NO_NOISE,
+    HiddenRobot,
+    draw_push,
+    draw_world,
+    record_pushes,
+)
+from physid_drake.identify import ThetaConfig
+from physid_drake.policies import PlannedPush
+from physid_drake.run_experiment import write
+
+SPEEDS = (0.1, 0.3)
+
+
+def world_of(shape=ERASER, seed=0, frictions=(0.25, 0.25)):
+    return draw_world(np.random.default_rng(seed), shape, frictions)
+
+
+def truth_of(world, learner):
+    return np.array([getattr(world, name) for name in learner.thetas.space.names])
+
+
+def test_the_true_theta_predicts_what_the_hidden_robot_records():
+    world, rng = world_of(), np.random.default_rng(1)
+    robot = HiddenRobot(world, rng=rng, friction_scatter=0.0)
+    learner = Learner(robot.recording(record_pushes(robot, rng, 3, speeds=SPEEDS)), tick_s=2e-3)
+    errors = learner.end_errors(learner.problems, truth_of(world, learner))
+    assert errors.positions.max() < 2e-3
+    assert np.degrees(errors.rotations.max()) < 2.0
+
+
+def test_the_object_stays_where_a_push_leaves_it():
+    robot = HiddenRobot(world_of(), rng=np.random.default_rng(0), sensors=NO_NOISE, friction_scatter=0.0)
+    push = PlannedPush(direction=0.5 * math.pi, speed=0.2, travel=0.05)
+    robot.execute(push)
+    x, y, _ = robot.pose
+    # The hand's travel, and the slide that its speed leaves.
+    assert y == pytest.approx(0.05 + 0.2**2 / (2.0 * 0.25 * 9.81), rel=0.03)
+    assert abs(x) < 1e-4
+    robot.execute(push)
+    assert robot.pose[1] == pytest.approx(2.0 * y, rel=0.03)
+
+
+def test_an_object_that_left_the_table_must_be_put_back():
+    robot = HiddenRobot(
+        world_of(), rng=np.random.default_rng(0), table=((-0.1, -0.1), (0.1, 0.1)), sensors=NO_NOISE
+    )  # fmt: skip
+    push = PlannedPush(direction=0.0, speed=0.3, travel=0.12)
+    robot.execute(push)
+    assert robot.lost
+    with pytest.raises(ConfigError, match="put it back"):
+        robot.execute(push)
+    robot.put((0.0, 0.0, 0.0))
+    assert not robot.lost
+
+
+def test_random_pushes_meet_the_object():
+    rng = np.random.default_rng(2)
+    robot = HiddenRobot(world_of(), rng=rng)
+    for _ in range(3):
+        robot.put((0.0, 0.0, float(rng.uniform(-3.0, 3.0))))
+        robot.execute(draw_push(rng, ERASER, robot.pose[2], speeds=SPEEDS))
+        assert 0.01 < math.hypot(*robot.pose[:2]) < 0.2
+
+
+def test_information_of_a_push_is_bounded_by_the_scatter_of_friction():
+    world, rng = world_of(), np.random.default_rng(3)
+    robot = HiddenRobot(world, rng=rng)
+    recording = robot.recording(record_pushes(robot, rng, 1, speeds=SPEEDS))
+    learner = Learner(recording, tick_s=4e-3, theta=ThetaConfig(parameters=["support_friction", "hand_friction"]))
+    push = PlannedPush(direction=0.5 * math.pi, speed=0.3, travel=0.05, contact_offset=0.02)
+    information = push_information(learner, robot, truth_of(world, learner), (0.0, 0.0, 0.0), push)
+    assert np.linalg.eigvalsh(information).min() > -1e-6 * np.trace(information)
+    parameter = learner.thetas.space.parameters[0]
+    width = math.log(parameter.upper / parameter.lower)
+    assert 0.5 < information[0, 0] / (width / FRICTION_SCATTER) ** 2 < 1.0
+
+
+def test_the_bottle_slides_as_far_as_its_speed_and_friction_say():
+    bottle = FastPushes(world_of(BOTTLE, frictions=(0.12, 0.12)))
+    speed = 0.9
+    slide = speed**2 / (2.0 * 0.12 * 9.81)
+    ends = [bottle.end(speed, np.random.default_rng(seed)) for seed in range(40)]
+    assert np.mean(ends) == pytest.approx(-0.5 + 0.1 + slide, abs=0.01)
+    assert np.std(ends) == pytest.approx(FRICTION_SCATTER * slide, rel=0.4)
+    assert bottle.worst_error_mm() < 2.0
+    assert bottle.end(FAST[0], np.random.default_rng(0)) < bottle.end(FAST[1], np.random.default_rng(0))
+
+
+def test_what_falls_off_the_far_edge_counts_as_lost():
+    assert _distance(GOAL[0] + 0.05) == pytest.approx(50.0)
+    assert _distance(TABLE[1][0] + 1e-3) == 1000.0
+
+
+def test_the_share_of_trials_within_a_distance_grows_to_one():
+    series = _share_within("x", [5.0, 12.0, 39.0])
+    assert series.mean[0] == 0.0 and series.mean[-1] == 1.0
+    assert list(series.mean) == sorted(series.mean)
+
+
+def test_motion_prediction_runs_from_end_to_end_and_is_resumed(tmp_path):
+    experiment = MotionPrediction(
+        seed=0, repetitions=2, pushes=4, training=2, testing=1, subsets=(1, 2), budget=4, tick_s=4e-3
+    )  # fmt: skip
+    folder = claim("motion_prediction", experiment, tmp_path)
+    records = run_all(experiment, folder, jobs=1, tick=lambda stage, done, total: None)
+    result = experiment.result(records)
+    write(folder, result, "motion_prediction", "the command")
+    names = {"command.txt", "figure.svg", "result.json", "result.md", "budget.csv", "training_pushes.csv"}
+    assert names <= {file.name for file in tmp_path.iterdir()}
+    for record in records:
+        for method in record["methods"].values():
+            assert all(np.diff(method["sigmas"]) <= 1e-12)
+        assert record["true_theta"]["mm"] < 5.0
+    kept = (tmp_path / "repetitions" / "001.json").read_text()
+    again = run_all(experiment, claim("motion_prediction", experiment, tmp_path), jobs=1, tick=lambda s, d, t: None)
+    assert again == records and (tmp_path / "repetitions" / "001.json").read_text() == kept
