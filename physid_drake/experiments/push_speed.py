@@ -214,11 +214,12 @@ class PushSpeeds:
 class FastPushes:
     """Where a bottle ends, by the speed of the hand and the friction factor of the push."""
 
-    def __init__(self, world: Plan) -> None:
+    def __init__(self, world: Plan, speeds: int = _SPEED_KNOTS) -> None:
+        """Simulate pushes at so many speeds, each with three friction factors, and lay a spline through them."""
         self._world = world
-        self._speeds = np.linspace(*FAST, _SPEED_KNOTS)
-        ends = [[self._simulated(v, factor) for factor in _FACTOR_KNOTS] for v in self._speeds.tolist()]
-        self._spline = RectBivariateSpline(self._speeds, _FACTOR_KNOTS, np.array(ends), kx=3, ky=2)
+        knots = np.linspace(*FAST, speeds)
+        ends = [[self._simulated(v, factor) for factor in _FACTOR_KNOTS] for v in knots.tolist()]
+        self._spline = RectBivariateSpline(knots, _FACTOR_KNOTS, np.array(ends), kx=3, ky=2)
 
     def end(self, speed: float, rng: np.random.Generator) -> float:
         """Where along x a push with a drawn friction ends [m], beyond the table's edge if it falls."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import json
 import math
 from typing import Any
@@ -75,14 +76,19 @@ def result_json(result: Result, name: str, command: str, versions: dict[str, str
 
 def result_figure(result: Result) -> Figure:
     """The panels side by side; bands and bars are one standard deviation over repetitions."""
-    figure = Figure(figsize=(3.3 * len(result.panels), 2.7), layout="constrained")
+    figure = Figure(figsize=(3.3 * len(result.panels), 3.0), layout="constrained")
     for panel, axes in zip(result.panels, figure.subplots(1, len(result.panels), squeeze=False)[0], strict=True):
         _draw(panel, axes)
+    # One legend for all panels: names are long, and most panels share them.
+    labelled = [axes.get_legend_handles_labels() for axes in figure.axes]
+    named = {label: handle for handles, labels in labelled for handle, label in zip(handles, labels, strict=True)}
+    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=len(result.panels),
+                  frameon=False, fontsize=7.0)  # fmt: skip
     return figure
 
 
 def _draw(panel: Panel, axes: Axes) -> None:
-    for colour, series in zip(COLOURS, panel.series, strict=False):
+    for colour, series in zip(itertools.cycle(COLOURS), panel.series, strict=False):
         mean, spread = list(series.mean), [0.0 if math.isnan(d) else d for d in series.deviation]
         if len(series.x) > 12:
             low, high = (
@@ -101,7 +107,6 @@ def _draw(panel: Panel, axes: Axes) -> None:
     axes.set_xlabel(panel.x_label)
     axes.set_ylabel(panel.y_label)
     axes.grid(visible=True)
-    axes.legend(frameon=False, fontsize=7.0)
 
 
 def _negative(panel: Panel) -> bool:

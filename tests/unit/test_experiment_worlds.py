@@ -9,10 +9,11 @@ pytest.importorskip("mujoco")
 
 from physid_drake.errors import ConfigError
 from physid_drake.experiments.learning import Learner
+from physid_drake.experiments.mit_pushes import PLAYED_SPEED, TICK, played
 from physid_drake.experiments.motion_prediction import MotionPrediction
 from physid_drake.experiments.next_push import push_information
 from physid_drake.experiments.push_direction import _share_within
-from physid_drake.experiments.push_speed import FAST, GOAL, TABLE, FastPushes, _distance
+from physid_drake.experiments.push_speed import FAST, GOAL, LOST, FastPushes, _distance
 from physid_drake.experiments.repetitions import claim, run_all
 from physid_drake.experiments.worlds import (
     BOTTLE,
@@ -26,6 +27,7 @@ from physid_drake.experiments.worlds import (
 )
 from physid_drake.identify import ThetaConfig
 from physid_drake.policies import PlannedPush
+from physid_drake.recording import Box, Hand, ObjectModel, PoseStream, Push, Recording, Sensors, Table
 from physid_drake.run_experiment import write
 
 SPEEDS = (0.1, 0.3)
@@ -95,8 +97,42 @@ def test_information_of_a_push_is_bounded_by_the_scatter_of_friction():
     assert 0.5 < information[0, 0] / (width / FRICTION_SCATTER) ** 2 < 1.0
 
 
+def slow_pushes(shape, speed=0.010):
+    """Pushes of which only the ends are known, with a straight path of the rod on either side of the middle."""
+    pushes = []
+    for number, side in enumerate((-0.015, 0.008, 0.025)):
+        times = np.linspace(0.0, 0.05 / speed, 100)
+        path = np.column_stack([-0.055 + speed * times, np.full(100, side), np.full(100, 0.0065)])
+        still = np.tile([1.0, 0.0, 0.0, 0.0], (100, 1))
+        ends = np.tile([0.0, 0.0, 0.0065], (2, 1))
+        pushes.append(
+            Push(
+                name=f"{number}", force=None, hand=PoseStream(times=times, positions=path, quaternions=still),
+                object=PoseStream(times=times[[0, -1]], positions=ends, quaternions=still[:2]),
+            )
+        )  # fmt: skip
+    return Recording(
+        name="slow", description="", object=ObjectModel(shape=shape, mass=0.8), table=Table(size=(1.0, 1.0)),
+        hand=Hand(tip="cylinder", radius=0.00475, length=0.01), sensors=Sensors(), pushes=tuple(pushes),
+    )  # fmt: skip
+
+
+def test_a_slow_push_ends_where_it_does_played_faster():
+    recording = slow_pushes(Box(size=(0.09, 0.09, 0.013)))
+    config = ThetaConfig(parameters=["hand_friction"], nominal={"support_friction": 0.15})
+    exact, coarse = (Learner(recording, tick_s=tick, theta=config) for tick in (2e-3, TICK))
+    theta = np.array([0.25])
+    slow = np.array([r.poses[-1] for r in exact.predictions(exact.problems, theta)])
+    fast = [played(problem, PLAYED_SPEED) for problem in coarse.problems]
+    ends = np.array([r.poses[-1] for r in coarse.predictions(fast, theta)])
+    # What they moved, and by how little the two differ.
+    assert np.hypot(*slow[:, :2].T).min() > 0.01 and np.abs(slow[:, 2]).min() > 0.1
+    assert np.hypot(*(ends - slow)[:, :2].T).max() < 1e-3
+    assert np.degrees(np.abs(ends - slow)[:, 2]).max() < 1.0
+
+
 def test_the_bottle_slides_as_far_as_its_speed_and_friction_say():
-    bottle = FastPushes(world_of(BOTTLE, frictions=(0.12, 0.12)))
+    bottle = FastPushes(world_of(BOTTLE, frictions=(0.12, 0.12)), speeds=5)
     speed = 0.9
     slide = speed**2 / (2.0 * 0.12 * 9.81)
     ends = [bottle.end(speed, np.random.default_rng(seed)) for seed in range(40)]
@@ -108,7 +144,7 @@ def test_the_bottle_slides_as_far_as_its_speed_and_friction_say():
 
 def test_what_falls_off_the_far_edge_counts_as_lost():
     assert _distance(GOAL[0] + 0.05) == pytest.approx(50.0)
-    assert _distance(TABLE[1][0] + 1e-3) == 1000.0
+    assert _distance(0.6 + 1e-3) == 1e3 * LOST
 
 
 def test_the_share_of_trials_within_a_distance_grows_to_one():
