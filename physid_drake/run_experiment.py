@@ -49,7 +49,7 @@ def command_of(arguments: argparse.Namespace) -> str:
     words = ["python", "-m", "physid_drake", "experiment", arguments.name]
     words += ["--quick"] if arguments.quick else []
     words += ["--seed", str(arguments.seed)]
-    words += ["--data", arguments.data.name] if arguments.data is not None else []
+    words += ["--data", arguments.data.name or "FOLDER"] if arguments.data is not None else []
     return shlex.join(words)
 
 

@@ -95,6 +95,8 @@ class PushDirections:
             pose = robot.see()
             way = (goal - np.array(pose[:2])) / left
             robot.execute(self._best(model, pose, way, rng))
+            if robot.lost:
+                break
         return float(np.linalg.norm(goal - np.array(robot.pose[:2])))
 
     def _best(self, model: Model, pose: Pose, way: Array, rng: np.random.Generator) -> PlannedPush:
