@@ -27,8 +27,8 @@ def sizes(errors):
 def test_published_predictions_stand_beside_their_own_pushes(table):
     moved = np.array([p.poses[-1] - p.start.pose for p in table.problems])
     for model in MODELS:
-        # A prediction of another row would be off by about as much as the object moves.
-        assert np.median(sizes(table.published[model])) < 0.25 * np.median(sizes(moved))
+        # A prediction of another row would be off by at least as much as the object moves.
+        assert sizes(table.published[model]).mean() < 0.4 * sizes(moved).mean()
         assert np.abs(table.published[model][:, 2]).max() < np.pi
 
 
