@@ -51,8 +51,8 @@ def _push_direction(wish: Wish) -> Experiment:
 def _push_speed(wish: Wish) -> Experiment:
     if wish.quick:
         return PushSpeeds(
-            seed=wish.seed, repetitions=2, slow_pushes=(1, 3), budget=12, polish_budget=8, plan_budget=10, tick_s=4e-3
-        )
+            seed=wish.seed, repetitions=2, slow_pushes=(1, 3), budget=12, polish_budget=8, plan_budget=24
+        )  # fmt: skip
     return PushSpeeds(seed=wish.seed)
 
 

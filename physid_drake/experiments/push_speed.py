@@ -80,7 +80,7 @@ class PushSpeeds:
     slow_pushes: tuple[int, ...] = (1, 2, 4)
     budget: int = 24
     polish_budget: int = 12
-    plan_budget: int = 16
+    plan_budget: int = 32
     rollouts: int = 5
     updates: int = 10
     tick_s: float = 2e-3

@@ -189,6 +189,8 @@ def draw_push(
 ) -> PlannedPush:
     """A random push onto a face: heading within 25 degrees of its normal, contact within half of its length.
 
+    A disc is met within a fifth of its radius from the middle.
+
     Args:
         rng: draws it.
         shape: of the object.
@@ -198,7 +200,8 @@ def draw_push(
         direction: of the motion in W [rad], only for a disc; None draws it.
     """
     if isinstance(shape, Cylinder):
-        half, normal = shape.radius, float(rng.uniform(-math.pi, math.pi)) if direction is None else direction
+        # Further from its middle a disc rolls off the tip, and a hair decides where it goes.
+        half, normal = 0.4 * shape.radius, float(rng.uniform(-math.pi, math.pi)) if direction is None else direction
     else:
         face = int(rng.integers(4))
         half, normal = 0.5 * shape.size[1 - face % 2], yaw + 0.5 * math.pi * face
