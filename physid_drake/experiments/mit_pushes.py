@@ -249,7 +249,7 @@ class MitPushes:
                 rows.append((name, words, *_mean_errors([push for f in folds for push in f["published"][published]])))
         return Table(
             name="other_tables",
-            title=f"other tables: {self.other_pushes} pushes, {self.other_folds} folds, at most {self.other_budget} trials",
+            title=f"others: {self.other_pushes} pushes, {self.other_folds} folds, at most {self.other_budget} trials",
             columns=("table", "model", "mm", "deg"), rows=tuple(rows),
         )  # fmt: skip
 
