@@ -1,4 +1,4 @@
-"""The command line: ``inspect``, ``convert``, ``diagnose``, ``plan``, ``prove``."""
+"""The command line: ``inspect``, ``convert``, ``diagnose``, ``plan``, ``prove``, ``experiment``."""
 
 from __future__ import annotations
 
@@ -209,12 +209,33 @@ def _run_plan(arguments: argparse.Namespace) -> int:
     return run(arguments)
 
 
+def _register_experiment(subparsers: Subparsers) -> None:
+    parser = subparsers.add_parser("experiment", help="repeat an experiment of the paper in hidden worlds")
+    parser.add_argument(
+        "name", metavar="NAME", help="motion_prediction, mit_pushes, push_direction, push_speed or next_push"
+    )
+    parser.add_argument("--quick", action="store_true", help="small sizes: two or three minutes")
+    parser.add_argument("--data", type=Path, metavar="FOLDER", help="of mit_pushes: the published end points")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="repetitions at a time (default 1)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (default 0)")
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where results go (default: experiments/NAME)")
+    parser.set_defaults(run=_run_experiment)
+
+
+def _run_experiment(arguments: argparse.Namespace) -> int:
+    # Drake takes a second to import, which the other commands need not wait for.
+    from physid_drake.run_experiment import run  # noqa: PLC0415
+
+    return run(arguments)
+
+
 COMMANDS: list[Callable[[Subparsers], None]] = [
     _register_inspect,
     _register_convert,
     _register_diagnose,
     _register_plan,
     _register_prove,
+    _register_experiment,
 ]
 """One function for each command; it adds its parser, which sets ``run``: arguments -> exit status."""
 

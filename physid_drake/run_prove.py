@@ -218,11 +218,12 @@ def opened(out: Path, names: Sequence[str], seal: str, *, seed: int, kind: str |
     check_seal(out, names, seal)
     outcomes = tuple(read_outcomes(out / SEALED, out / "diagnoses", names))
     return Proof(
-        seed=seed, kind=kind, seal=seal, outcomes=outcomes, figures=figures_of(outcomes), versions=_versions()
+        seed=seed, kind=kind, seal=seal, outcomes=outcomes, figures=figures_of(outcomes), versions=versions()
     )  # fmt: skip
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Of Python and of what the numbers depend on."""
     found = {"python": platform.python_version()}
     for name in ("physid_drake", "drake", "mujoco", "numpy", "scipy"):
         try:

@@ -1,0 +1,233 @@
+"""Learning theta from pushes with a counted number of trials, by any of the methods that are compared."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses as dc
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from physid_drake.cell import CellConfig, SolverConfig
+from physid_drake.identify import Identifier
+from physid_drake.identify.config import SearchConfig, ThetaConfig
+from physid_drake.identify.misfit import whitened_residual
+from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
+from physid_drake.identify.problem import PushProblem
+from physid_drake.identify.rollouts import Prediction, Task
+from physid_drake.recording import Recording
+from physid_drake.search import EntropySearch, GreedyEntropySearch, RandomSearch, Search, search_minimum
+from physid_drake.space import ParameterSpace
+
+Array = NDArray[np.float64]
+
+GREEDY, ENTROPY, RANDOM = "greedy entropy search", "entropy search", "random search"
+LEAST_SQUARES = "least squares"
+SEARCHES: Final[Mapping[str, Callable[[], Search]]] = {
+    GREEDY: GreedyEntropySearch,
+    RANDOM: RandomSearch,
+    ENTROPY: EntropySearch,
+}
+METHODS: Final = (GREEDY, RANDOM, LEAST_SQUARES, ENTROPY)
+CANDIDATES: Final = 1000
+_STEP = 0.01  # of the unit cube, for differences
+_FAILED = 1e3  # standard deviations
+
+
+@dc.dataclass(frozen=True, kw_only=True, eq=False)
+class Trials:
+    """What a method tried, in its order; a trial is one rollout of every training push.
+
+    Attributes:
+        thetas: (m, d), each entry in its unit.
+        misfits: (m,) log of the rms residual in standard deviations; inf where a rollout diverged.
+    """
+
+    thetas: Array
+    misfits: Array
+
+    def best_after(self, count: int) -> Array:
+        """The theta (d,) of least misfit among the first ``count``."""
+        return np.asarray(self.thetas[int(np.argmin(self.misfits[:count]))])
+
+
+@dc.dataclass(frozen=True, kw_only=True, eq=False)
+class EndErrors:
+    """How far pushes end from where they were seen to end: (n,) distances [m] and turns [rad], inf if diverged."""
+
+    positions: Array
+    rotations: Array
+
+
+class Learner:
+    """The pushes of a recording, and how well a theta explains some of them.
+
+    Attributes:
+        config: of the cell.
+        problems: the pushes.
+        thetas: what is unknown, and the body that a theta describes.
+        noise: of the recording.
+        pool: makes the rollouts, in this process.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        *,
+        tick_s: float = 2e-3,
+        theta: ThetaConfig | None = None,
+        config: CellConfig | None = None,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            recording: the pushes.
+            tick_s: of the cell [s].
+            theta: what is unknown; mass and both frictions if None.
+            config: of the cell, instead of the default with that tick.
+        """
+        solver = SolverConfig(time_step_s=tick_s, slide_time_step_s=max(tick_s, 2e-3))
+        self.config = config or CellConfig(solver=solver)
+        identifier = Identifier(
+            recording, cell=self.config, theta=theta or ThetaConfig(), search=SearchConfig(jobs=1),
+            held_out_share=0.0, seed=0,
+        )  # fmt: skip
+        self.problems: tuple[PushProblem, ...] = identifier.problems
+        self.thetas, self.noise, self.pool = identifier.thetas, identifier.noise, identifier.pool
+
+    def predictions(self, problems: Sequence[PushProblem], theta: Array) -> list[Prediction | None]:
+        """Rollouts of some pushes with theta (d,); None where one diverged."""
+        return self.pool.run([plain_task(problem, theta) for problem in problems])
+
+    def residuals(self, problems: Sequence[PushProblem], theta: Array) -> Array:
+        """Residuals (m,) of some pushes in standard deviations; large ones where a rollout diverged."""
+        parts = [
+            np.full(3 * len(p.times), _FAILED) if r is None else whitened_residual(p, self.noise, r)
+            for p, r in zip(problems, self.predictions(problems, theta), strict=True)
+        ]
+        return np.concatenate(parts)
+
+    def misfit(self, residuals: Array) -> float:
+        """Log of the rms of residuals (m,); inf where a rollout diverged."""
+        if residuals.max() >= _FAILED:
+            return float("inf")
+        return float(0.5 * np.log(np.mean(residuals**2)))
+
+    def end_errors(self, problems: Sequence[PushProblem], theta: Array) -> EndErrors:
+        """Errors of the last pose."""
+        ends = [
+            np.full(3, np.inf) if r is None else r.poses[-1] - p.poses[-1]
+            for p, r in zip(problems, self.predictions(problems, theta), strict=True)
+        ]
+        x, y, yaw = np.array(ends).T
+        return EndErrors(positions=np.hypot(x, y), rotations=np.abs(yaw))
+
+    def polish(self, problems: Sequence[PushProblem], trials: Trials, *, budget: int) -> Trials:
+        """The same trials, and so many more of least squares from the best of them."""
+        start = np.asarray(self.thetas.space.to_unit(trials.best_after(len(trials.misfits))))
+        more = _least_squares(
+            lambda theta: self.residuals(problems, theta), self.misfit, self.thetas.space, budget, lambda count: None,
+            start,
+        )  # fmt: skip
+        return Trials(
+            thetas=np.concatenate([trials.thetas, more.thetas]),
+            misfits=np.concatenate([trials.misfits, more.misfits]),
+        )
+
+    def learn(
+        self,
+        method: str,
+        problems: Sequence[PushProblem],
+        *,
+        budget: int,
+        rng: np.random.Generator,
+        on_trial: Callable[[int], None] | None = None,
+    ) -> Trials:
+        """Search theta with so many trials; arguments as in ``search_trials``, and the training pushes."""
+        return search_trials(
+            method, lambda theta: self.residuals(problems, theta), self.misfit, self.thetas.space, budget=budget,
+            rng=rng, on_trial=on_trial,
+        )  # fmt: skip
+
+
+def search_trials(
+    method: str,
+    residuals: Callable[[Array], Array],
+    misfit: Callable[[Array], float],
+    space: ParameterSpace,
+    *,
+    budget: int,
+    rng: np.random.Generator,
+    on_trial: Callable[[int], None] | None = None,
+) -> Trials:
+    """Search theta with so many trials.
+
+    Args:
+        method: one of ``METHODS``.
+        residuals: of theta (d,), an array (m,).
+        misfit: what a search makes small, of residuals (m,).
+        space: of theta.
+        budget: trials.
+        rng: draws candidates, and the search's own numbers.
+        on_trial: told the number of trials made.
+    """
+    told = on_trial or (lambda count: None)
+    if method == LEAST_SQUARES:
+        return _least_squares(residuals, misfit, space, budget, told)
+    blind = SEARCHES[method] is RandomSearch
+    found = search_minimum(
+        lambda thetas: np.array([misfit(residuals(theta)) for theta in thetas]),
+        space, space.sample(rng, CANDIDATES, from_prior=True), SEARCHES[method](), budget=budget, rng=rng,
+        # Random search does not look at its trials: one batch spares it the belief.
+        n_initial=0 if blind else None, batch=budget if blind else 1,
+        entropy_tolerance=0.0, on_trial=lambda belief: told(belief.n_trials),
+    )  # fmt: skip
+    if found.stop_reason == "interrupted":
+        raise KeyboardInterrupt
+    return Trials(thetas=np.array(found.belief.thetas), misfits=np.array(found.belief.errors))
+
+
+def _least_squares(
+    residuals: Callable[[Array], Array],
+    misfit: Callable[[Array], float],
+    space: ParameterSpace,
+    budget: int,
+    told: Callable[[int], None],
+    start: Array | None = None,
+) -> Trials:
+    """Gauss-Newton from a point of the unit cube, the nominal one if None; its differences count as trials."""
+    thetas, misfits, at = list[Array](), list[float](), dict[bytes, Array]()
+
+    def tried(u: Array) -> Array:
+        if len(thetas) >= budget:
+            raise _SpentError
+        theta = np.asarray(space.from_unit(u))
+        at[u.tobytes()] = found = residuals(theta)
+        thetas.append(theta)
+        misfits.append(misfit(found))
+        told(len(thetas))
+        return found
+
+    def slopes(u: Array) -> Array:
+        here = at[u.tobytes()]
+        steps = np.where(u + _STEP < 1.0, _STEP, -_STEP)
+        columns = [(tried(u + step * row) - here) / step for step, row in zip(steps, np.eye(len(u)), strict=True)]
+        return np.column_stack(columns)
+
+    begin = np.clip(np.asarray(space.to_unit(space.nominal)) if start is None else start, 1e-3, 1.0 - 1e-3)
+    with contextlib.suppress(_SpentError):
+        least_squares(tried, begin, jac=slopes, bounds=(0.0, 1.0), x_scale=0.1, xtol=1e-6, ftol=1e-8)
+    return Trials(thetas=np.array(thetas), misfits=np.array(misfits))
+
+
+class _SpentError(Exception):
+    """The budget of a least-squares fit is spent."""
+
+
+def plain_task(problem: PushProblem, theta: Array) -> Task:
+    """A rollout of a push with theta (d,), its own unknowns at their most likely values."""
+    nuisance = nuisance_of(problem, FIRST_SCATTER)
+    return Task(problem=problem, theta=theta, nuisance=nuisance, values=np.zeros(len(nuisance.names)))

@@ -1,0 +1,111 @@
+"""Repetitions that are kept: what is done is read back, so that an interrupted experiment goes on."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import json
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from physid_drake.errors import ConfigError, OutputError
+from physid_drake.experiments.values import Experiment, Record, Tick
+from physid_drake.run_folder import RunFolder
+
+SETTINGS = "settings.json"
+KEPT = "repetitions"
+
+
+def claim(name: str, experiment: Experiment, out: Path) -> RunFolder:
+    """The folder of an experiment, refused where it holds another or the same with other sizes.
+
+    Raises:
+        ConfigError: if it does.
+        OutputError: if it cannot be written.
+    """
+    text = json.dumps({"experiment": name, **settings_of(experiment)}, indent=2) + "\n"
+    file = out / SETTINGS
+    try:
+        earlier = file.read_text(encoding="utf-8") if file.exists() else text
+        (out / KEPT).mkdir(parents=True, exist_ok=True)
+    except (OSError, UnicodeDecodeError) as error:
+        raise OutputError(f"'{out}': cannot be used: {error}.") from error
+    if earlier != text:
+        raise ConfigError(f"'{out}' holds another experiment, or this one with other settings; choose another --out.")
+    return RunFolder.open(out, text, name=SETTINGS)
+
+
+def settings_of(experiment: Experiment) -> dict[str, Any]:
+    """The sizes of an experiment as JSON has them; where its pushes lie is not among them."""
+    assert dc.is_dataclass(experiment) and not isinstance(experiment, type)
+    values = dc.asdict(experiment)
+    return {k: list(v) if isinstance(v, tuple) else v for k, v in values.items() if not isinstance(v, Path)}
+
+
+def run_all(experiment: Experiment, folder: RunFolder, *, jobs: int, tick: Tick) -> list[Record]:
+    """All records in their order; those that are kept are not made again.
+
+    Args:
+        experiment: what is repeated.
+        folder: from ``claim``.
+        jobs: processes; the records do not depend on it.
+        tick: told what is going on.
+
+    Raises:
+        KeyboardInterrupt: when interrupted; what is done is kept.
+    """
+    missing = [k for k in range(experiment.repetitions) if _kept(folder, k) is None]
+    done = experiment.repetitions - len(missing)
+    for index, record in _made(experiment, missing, jobs, tick):
+        folder.write(_name(index), json.dumps(record, indent=1) + "\n")
+        done += 1
+        tick(f"repetition {done} of {experiment.repetitions}", done, experiment.repetitions)
+    records = [_kept(folder, k) for k in range(experiment.repetitions)]
+    return [record for record in records if record is not None]
+
+
+def _name(index: int) -> str:
+    return f"{KEPT}/{index:03d}.json"
+
+
+def _kept(folder: RunFolder, index: int) -> Record | None:
+    file = folder.path / _name(index)
+    if not file.exists():
+        return None
+    try:
+        record: Record = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise OutputError(f"'{file}': cannot be read: {error}; delete it to make it again.") from error
+    return record
+
+
+def _made(experiment: Experiment, indices: Sequence[int], jobs: int, tick: Tick) -> Iterator[tuple[int, Record]]:
+    if jobs <= 1 or len(indices) <= 1:
+        for index in indices:
+            yield index, _through_json(experiment.repeat(index, _told(tick, index, experiment.repetitions)))
+        return
+    tick("first repetitions", 0, experiment.repetitions)
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        futures = {pool.submit(_repeat, experiment, index): index for index in indices}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _repeat(experiment: Experiment, index: int) -> Record:
+    return _through_json(experiment.repeat(index, lambda stage, done, total: None))
+
+
+def _through_json(record: Record) -> Record:
+    """As it will be read back, so that a resumed experiment has the same numbers."""
+    result: Record = json.loads(json.dumps(record))
+    return result
+
+
+def _told(tick: Tick, index: int, count: int) -> Tick:
+    return lambda stage, done, total: tick(f"repetition {index + 1} of {count}: {stage}", done, total)
