@@ -18,6 +18,7 @@ from physid_drake.experiments.repetitions import claim, run_all
 from physid_drake.experiments.worlds import (
     BOTTLE,
     ERASER,
+    FRICTION_SCATTER,
     NO_NOISE,
     HiddenRobot,
     draw_push,
