@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from physid_drake import load_model
 from physid_drake.cell import CellConfig
 from physid_drake.diagnose import case_of, diagnose
 from physid_drake.diagnose.memory import Memory
-from physid_drake.diagnose.story import _plain_from
 from physid_drake.errors import RecordingError
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.recording import Sensors
@@ -119,30 +117,6 @@ def test_a_noise_that_nothing_tells_is_what_the_plain_cell_leaves():
     # Two poses a push tell a noise of 0.3 mm to a few tens of percent.
     assert 0.15e-3 < evidence.case.noise.position < 1.2e-3
     assert any("what the plain cell leaves" in warning for warning in diagnosis.warnings)
-
-
-def test_a_plain_fit_in_a_wrong_basin_is_left_if_an_effect_leads_out_of_it():
-    class FromThere:
-        """Plain fits from anywhere end at one score."""
-
-        def __init__(self, score):
-            self.end = SimpleNamespace(score=score)
-
-        def start(self, u):
-            return u
-
-        def fit(self, state, **how):
-            return self.end
-
-    stuck = SimpleNamespace(score=-500.0)
-    led_out = SimpleNamespace(fitted=SimpleNamespace(score=-60.0, reduced_chi2=1.0, state=SimpleNamespace(u=None)))
-    quiet = lambda *said: None  # noqa: E731
-    assert _plain_from(FromThere(-62.0), stuck, led_out, quiet).score == -62.0
-    assert _plain_from(FromThere(-495.0), stuck, led_out, quiet) is None
-    no_better = SimpleNamespace(fitted=SimpleNamespace(score=-497.0, reduced_chi2=1.0))
-    assert _plain_from(FromThere(-62.0), stuck, no_better, quiet) is None
-    lost = SimpleNamespace(fitted=SimpleNamespace(score=-60.0, reduced_chi2=50.0))
-    assert _plain_from(FromThere(-62.0), stuck, lost, quiet) is None
 
 
 def test_an_object_that_never_moves_is_refused():

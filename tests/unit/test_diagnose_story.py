@@ -1,0 +1,100 @@
+"""Growing a model: effects that later ones make superfluous, and plain fits in a wrong basin."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from physid_drake.diagnose import story
+from physid_drake.diagnose.confirm import Candidate
+from physid_drake.diagnose.evidence import unexplained
+from physid_drake.diagnose.fit import State
+
+PUSHES = 8
+
+
+def fitted(names, score_per_push):
+    effects = tuple(SimpleNamespace(kind=SimpleNamespace(name=name)) for name in names)
+    state = State(u=np.zeros(2), effects=effects, own=(), scatter=1.0)
+    return SimpleNamespace(state=state, scores=np.full(PUSHES, score_per_push) + 0.1 * np.arange(PUSHES))
+
+
+def step(name):
+    score = SimpleNamespace(kind=SimpleNamespace(name=name))
+    return (Candidate(score=score, fitted=None, gains=np.full(PUSHES, 5.0), degenerate=False),)
+
+
+class Refits:
+    """Fits whose score depends on which effects are left."""
+
+    def __init__(self, scores):
+        self.scores = scores
+
+    def fit(self, state, **how):
+        names = tuple(e.kind.name for e in state.effects)
+        return fitted(names, self.scores[names])
+
+
+@pytest.fixture
+def grown(monkeypatch):
+    monkeypatch.setattr(story, "push_scores", lambda one: one.scores)
+    monkeypatch.setattr(
+        story._Looked,
+        "at",
+        classmethod(lambda cls, one, signatures, rng: cls(fitted=one, signatures=tuple(signatures), screening=None)),
+    )
+    base = story._Looked(fitted=fitted((), -50.0), signatures=(), screening=None)
+    last = story._Looked(fitted=fitted(("magnet", "table_tilt"), -1.0), signatures=(), screening=None)
+    return story._Grown(base=base, last=last, steps=(step("magnet"), step("table_tilt")), rejected=())
+
+
+def names_of(grown):
+    return [candidates[0].name for candidates in grown.steps]
+
+
+def quiet(*said):
+    del said
+
+
+def test_an_effect_that_a_later_one_makes_superfluous_is_taken_out(grown):
+    pruned = story._pruned(Refits({("table_tilt",): -1.2}), grown, None, quiet)
+    assert names_of(pruned) == ["table_tilt"]
+    assert [e.kind.name for e in pruned.last.fitted.state.effects] == ["table_tilt"]
+
+
+def test_two_effects_that_both_matter_stay(grown):
+    pruned = story._pruned(Refits({("table_tilt",): -9.0}), grown, None, quiet)
+    assert names_of(pruned) == ["magnet", "table_tilt"]
+    assert pruned.last is grown.last
+
+
+def test_a_plain_fit_in_a_wrong_basin_is_left_if_an_effect_leads_out_of_it():
+    class FromThere:
+        """Plain fits from anywhere end at one score."""
+
+        def __init__(self, score):
+            self.end = SimpleNamespace(score=score)
+
+        def start(self, u):
+            return u
+
+        def fit(self, state, **how):
+            return self.end
+
+    stuck = SimpleNamespace(score=-500.0)
+    led_out = SimpleNamespace(fitted=SimpleNamespace(score=-60.0, reduced_chi2=1.0, state=SimpleNamespace(u=None)))
+    assert story._plain_from(FromThere(-62.0), stuck, led_out, quiet).score == -62.0
+    assert story._plain_from(FromThere(-495.0), stuck, led_out, quiet) is None
+    no_better = SimpleNamespace(fitted=SimpleNamespace(score=-497.0, reduced_chi2=1.0))
+    assert story._plain_from(FromThere(-62.0), stuck, no_better, quiet) is None
+    lost = SimpleNamespace(fitted=SimpleNamespace(score=-60.0, reduced_chi2=50.0))
+    assert story._plain_from(FromThere(-62.0), stuck, lost, quiet) is None
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "left"),
+    [(5.0, 1.4, False), (5.0, 1.7, True), (150.0, 2.5, False), (150.0, 3.5, True), (900.0, 3.5, True)],
+)
+def test_a_large_effect_may_leave_what_two_honest_laws_of_it_differ_by(before, after, left):
+    plain, final = SimpleNamespace(reduced_chi2=before), SimpleNamespace(reduced_chi2=after)
+    assert unexplained(plain, final) is left
