@@ -125,7 +125,7 @@ class ModelCell:
         geometry = geometry_with(model.effects, Geometry(shape=model.shape))
         return Cell(
             geometry.shape, hand_radius=model.hand_radius, config=model.config, table=np.array(model.table),
-            pressure=geometry.pressure, attach=attach,
+            pressure=geometry.pressure, gravity=geometry.gravity, attach=attach,
         )  # fmt: skip
 
     def rollout(

@@ -12,7 +12,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from physid_drake.cell.config import CellConfig
-from physid_drake.cell.diagram import Scene, add_scene
+from physid_drake.cell.diagram import GRAVITY, Scene, add_scene
 from physid_drake.cell.forces import ForceLaw, FrictionLaw
 from physid_drake.cell.hand_path import HandPath
 from physid_drake.cell.motion import Motion, Start
@@ -51,6 +51,7 @@ class Cell:
         table: Array | None = None,
         with_edge: bool = False,
         pressure: PressureGrid | None = None,
+        gravity: float = GRAVITY,
         attach: Callable[[DiagramBuilder, Scene], object] | None = None,
     ) -> None:
         """Build the diagram.
@@ -63,20 +64,23 @@ class Cell:
                 comes to its edge is simulated again in a cell with that edge, from which it can fall.
             with_edge: model the edge from the start: point contact on a box, slower than the endless table.
             pressure: under the object, where it is not even.
+            gravity: m/s^2; more than the earth's where a body stands for a part of what it carries.
             attach: adds further systems to the diagram; a cell that has some is for a Simulator, not for rollouts.
 
         Raises:
             CellError: if the shape cannot be built.
         """
         self.config = config or CellConfig()
-        self._build = (shape, hand_radius, table, pressure)
+        self._build = (shape, hand_radius, table, pressure, gravity)
         self._table = None if table is None or with_edge else np.asarray(table, dtype=np.float64)
         self._at_edge: Cell | None = None
         edge = np.asarray(table, dtype=np.float64) if table is not None and with_edge else None
         self.solid: Solid = solid_of(shape)
         self.mean_depth = self.config.contact.rest_depth_m * _stiffer(self.solid)
         builder = DiagramBuilder()
-        self.scene: Scene = add_scene(builder, self.config, self.solid, hand_radius, edge=edge, pressure=pressure)
+        self.scene: Scene = add_scene(
+            builder, self.config, self.solid, hand_radius, edge=edge, pressure=pressure, gravity=gravity
+        )
         cells = self.config.friction_cells[0] * self.config.friction_cells[1]
         self._cells = cells
         self.setters: tuple[ParameterSetter, ...] = (
@@ -177,13 +181,14 @@ class Cell:
 
     def _cell_with_edge(self) -> Cell:
         if self._at_edge is None:
-            shape, hand_radius, table, pressure = self._build
+            shape, hand_radius, table, pressure, gravity = self._build
             # Few Gauss points would let an object tip over the innermost one that has left the table.
             contact = dc.replace(self.config.contact, model="point", support_points=EDGE_POINTS)
             config = dc.replace(self.config, contact=contact)
             self._at_edge = Cell(
-                shape, hand_radius=hand_radius, config=config, table=table, with_edge=True, pressure=pressure
-            )
+                shape, hand_radius=hand_radius, config=config, table=table, with_edge=True, pressure=pressure,
+                gravity=gravity,
+            )  # fmt: skip
         return self._at_edge
 
     def rest_pose(self, body: Body) -> Array:

@@ -67,6 +67,7 @@ class Scene:
         support: the quadrature.
         solid: the object's shape.
         joints: the hand's prismatic joints x, y, z; empty without a hand.
+        gravity: m/s^2.
     """
 
     plant: MultibodyPlant
@@ -80,6 +81,7 @@ class Scene:
     support: Support
     solid: Solid
     joints: tuple[PrismaticJoint, ...]
+    gravity: float
 
 
 def contact_properties(*, friction: float, static_friction: float | None = None, stiffness: float | None = None,
@@ -102,6 +104,7 @@ def add_scene(
     *,
     edge: Array | None,
     pressure: PressureGrid | None = None,
+    gravity: float = GRAVITY,
 ) -> Scene:
     """Add plant and scene graph of a cell to a diagram builder.
 
@@ -113,6 +116,7 @@ def add_scene(
         edge: (2, 2) lower and upper corner of the table top [m] for a table that an object can fall from;
             None for an endless one, which is faster.
         pressure: under the object, where it is not even.
+        gravity: m/s^2.
     """
     discrete = config.solver.scheme != "cenic"
     hydroelastic = config.contact.model == "hydroelastic" and edge is None and solid.rolling_radius is None
@@ -126,6 +130,7 @@ def add_scene(
         builder,
     )
     plant.set_name("plant")
+    plant.mutable_gravity_field().set_gravity_vector(np.array([0.0, 0.0, -gravity]))
     grid = FrictionGrid(nx=config.friction_cells[0], ny=config.friction_cells[1])
     support = support_of(solid.underside, grid, config.contact.support_points, height=solid.height, pressure=pressure)
     if solid.rolling_radius is not None:
@@ -145,7 +150,7 @@ def add_scene(
     _filter_collisions(scene_graph, table, [gid for gid, _ in feet], faces, hand)
     return Scene(
         plant=plant, scene_graph=scene_graph, object=body, table_geometry=table, feet=feet, foot_cells=foot_cells,
-        hand_geometry=hand, face_geometries=faces, support=support, solid=solid, joints=joints,
+        hand_geometry=hand, face_geometries=faces, support=support, solid=solid, joints=joints, gravity=gravity,
     )  # fmt: skip
 
 

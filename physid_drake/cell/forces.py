@@ -16,11 +16,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.cell.diagram import GRAVITY
+from physid_drake.cell.diagram import Scene
 from physid_drake.cell.motion import planar_pose
 from physid_drake.cell.setters import Body
-from physid_drake.cell.solid import Solid
-from physid_drake.cell.support import Support
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -56,6 +54,8 @@ class ObjectState:
         yaw: heading of B [rad].
         yaw_rate: [rad/s].
         mass: kg.
+        weight: on the table [N].
+        half_height: of the centre of mass above the table [m].
         inertia: about the vertical through the centre of mass [kg m^2].
         underside: the support points.
         lean: depth of Bo's foot in the table [m], and how it grows along x and y of B [-].
@@ -68,6 +68,8 @@ class ObjectState:
     yaw: float
     yaw_rate: float
     mass: float
+    weight: float
+    half_height: float
     inertia: float
     underside: Underside
     lean: tuple[float, float, float]
@@ -121,7 +123,7 @@ class ObjectState:
         points = self.underside.points
         shares = self.underside.weights * np.maximum(foot + along_x * points.real + along_y * points.imag, 0.0)
         total = float(shares.sum())
-        loads: Array = shares * (self.mass * GRAVITY / total) if total > 0.0 else shares
+        loads: Array = shares * (self.weight / total) if total > 0.0 else shares
         return loads
 
     @cached_property
@@ -138,6 +140,7 @@ class StateReader:
     Attributes:
         underside: the support points.
         mass: kg.
+        weight: on the table [N].
         inertia: about the vertical through the centre of mass [kg m^2].
         p_BBcm: x + iy [m].
         half_height: of the object [m].
@@ -145,6 +148,7 @@ class StateReader:
 
     underside: Underside
     mass: float
+    weight: float
     inertia: float
     p_BBcm: complex
     half_height: float
@@ -166,6 +170,8 @@ class StateReader:
             yaw=yaw,
             yaw_rate=float(V_WB[2]),
             mass=self.mass,
+            weight=self.weight,
+            half_height=self.half_height,
             inertia=self.inertia,
             underside=self.underside,
             lean=self.lean(X_WB),
@@ -177,8 +183,9 @@ class StateReader:
         return self.half_height - z, 2.0 * (w * j - i * k), -2.0 * (w * i + j * k)
 
 
-def reader_of(body: Body, support: Support, solid: Solid) -> StateReader:
-    """The reader for a body on its support points."""
+def reader_of(body: Body, scene: Scene) -> StateReader:
+    """The reader for a body on a scene's support points."""
+    support, solid = scene.support, scene.solid
     return StateReader(
         underside=Underside(
             points=as_complex(support.points),
@@ -186,6 +193,7 @@ def reader_of(body: Body, support: Support, solid: Solid) -> StateReader:
             friction=body.support_friction[support.cells],
         ),
         mass=body.mass,
+        weight=body.mass * scene.gravity,
         inertia=body.mass * body.inertia_ratio * solid.gyration[2],
         p_BBcm=complex(float(body.p_BBcm[0]), float(body.p_BBcm[1])),
         half_height=0.5 * solid.height,
@@ -212,13 +220,19 @@ def as_complex(vectors: Array) -> Complex:
 
 @dataclass(frozen=True, kw_only=True)
 class Wrench:
-    """Planar force [N] at the centre of mass in W, torque [N m] about the vertical through it."""
+    """Planar force at the centre of mass in W, and torques about it.
+
+    Attributes:
+        fx, fy: N.
+        torque: about the vertical [N m].
+        tip_x, tip_y: about x and y of W [N m]: they do not move an upright object, but shift the pressure under it.
+    """
 
     fx: float
     fy: float
     torque: float
-    at_table: bool = False
-    """Whether the force acts at the table, and so also tips the object, or at the centre of mass's height."""
+    tip_x: float = 0.0
+    tip_y: float = 0.0
 
 
 class ForceLaw(Protocol):
@@ -266,5 +280,6 @@ def refund_wrench(state: ObjectState, forces: Array) -> Wrench:
         fx=whole.real,
         fy=whole.imag,
         torque=moment - (lever.real * whole.imag - lever.imag * whole.real),
-        at_table=True,
+        tip_x=state.half_height * whole.imag,
+        tip_y=-state.half_height * whole.real,
     )

@@ -19,7 +19,6 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from physid_drake.cell.config import CellConfig
 from physid_drake.cell.diagram import (
-    GRAVITY,
     SLAB_THICKNESS,
     TABLE_FRICTION,
     Scene,
@@ -143,7 +142,7 @@ class SupportSetter(ParameterSetter):
     def write(self, root: Context, value: Array) -> None:
         """Write friction per foot, and the stiffness that gives the chosen rest depth."""
         ratio, mass, friction = value[0], value[1], value[2:]
-        stiffness = mass * GRAVITY / self._mean_depth
+        stiffness = mass * self.scene.gravity / self._mean_depth
         if self._hydroelastic:
             self._write_modulus(root, stiffness)
         for (geometry, points), cell in zip(self.scene.feet, self.scene.foot_cells, strict=True):

@@ -97,7 +97,7 @@ class Stepper:
         count = max(1, math.ceil((end - begin) / dt - 1e-6))
         self._body, self._begin, self._height = body, begin, height
         self._inertia = body.mass * body.inertia_ratio * self._scene.solid.gyration[2]
-        self._reader = reader_of(body, self._scene.support, self._scene.solid)
+        self._reader = reader_of(body, self._scene)
         self._hand = (
             None
             if path is None
@@ -322,22 +322,22 @@ class Stepper:
         state = self._object_state(time)
         for wrench in self._wrenches(state):
             self._kick(state.yaw, span * wrench.fx, span * wrench.fy, span * wrench.torque)
-            if wrench.at_table:
-                self._rock(state.yaw, span * wrench.fx, span * wrench.fy)
+            if wrench.tip_x or wrench.tip_y:
+                self._rock(state, span * wrench.tip_x, span * wrench.tip_y)
 
     def _wrenches(self, state: ObjectState) -> list[Wrench]:
         return total_wrenches(state, self._laws, self._frictions)
 
-    def _rock(self, yaw: float, jx: float, jy: float) -> None:
-        """The pitch and roll that a horizontal impulse at the table gives, half the height below Bcm."""
-        arm = -0.5 * self._scene.solid.height
+    def _rock(self, state: ObjectState, hx: float, hy: float) -> None:
+        """Give the object an angular impulse [N m s] about x and y of W; Bcm keeps its velocity."""
         scale = self._body.mass * self._body.inertia_ratio
         ix, iy = scale * self._scene.solid.gyration[0], scale * self._scene.solid.gyration[1]
-        c, s = math.cos(yaw), math.sin(yaw)
-        hx, hy = -arm * jy, arm * jx
+        c, s = math.cos(state.yaw), math.sin(state.yaw)
         about_x, about_y = (c * hx + s * hy) / ix, (c * hy - s * hx) / iy
-        self._x[self._v] += c * about_x - s * about_y
-        self._x[self._v + 1] += s * about_x + c * about_y
+        wx, wy = c * about_x - s * about_y, s * about_x + c * about_y
+        self._x[self._v] += wx
+        self._x[self._v + 1] += wy
+        self._x[self._v + 5] += wy * state.p_BoBcm_W.real - wx * state.p_BoBcm_W.imag
 
     def _object_state(self, time: float) -> ObjectState:
         q, v = self._q, self._v
@@ -408,6 +408,7 @@ class Stepper:
         height = self._x[self._hand_q[2]] if move is not None else 0.0
         if self._laws or self._frictions:
             self._apply_laws(begin, span)
+        pushed = self._twist()
         self._send()
         self._simulator.AdvanceTo(end)
         self._x = self._scene.plant.GetPositionsAndVelocities(self._context)
@@ -422,7 +423,7 @@ class Stepper:
             self._x[self._hand_q[0]], self._x[self._hand_q[1]] = goal
             self._x[self._hand_q[2]] = height
         if self._tilt_gain > 0.0 and not touching:
-            after = self._without_tilt_friction(old, after, span)
+            after = self._without_tilt_friction(pushed, after)
         if self._solver.trapezoid_slide and not touching:
             self._shift(
                 0.5 * span * (old[0] - after[0]),
@@ -433,7 +434,7 @@ class Stepper:
             self._learn_drift(before, move, span)
         self._record(end, force)
 
-    def _without_tilt_friction(self, before: Planar, after: Planar, span: float) -> Planar:
+    def _without_tilt_friction(self, before: Planar, after: Planar) -> Planar:
         """Take back the friction that a tilted rigid face on a compliant table feels too much of.
 
         A face that leans by n and slides at v is predicted to lift by v n dt in a step, as if the table were

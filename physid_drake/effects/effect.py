@@ -214,6 +214,10 @@ class Effect:
         """The pressure under the object, or None for an even one."""
         return None
 
+    def heaviness(self) -> float:
+        """Weight of all that stands on the table over the weight of what moves as one with the object."""
+        return 1.0
+
     def body(self, body: Body, facts: PushFacts) -> Body:
         """Body and contact parameters."""
         del facts

@@ -113,16 +113,16 @@ class TableTilt(Effect):
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
         """Gravity's component."""
         del facts
-        return (_TiltLaw(GRAVITY * math.sin(self.x), GRAVITY * math.sin(self.y)),)
+        return (_TiltLaw(math.sin(self.x), math.sin(self.y)),)
 
 
 @dc.dataclass(frozen=True)
 class _TiltLaw:
-    ax: float
-    ay: float
+    x: float  # of the weight
+    y: float
 
     def wrench(self, state: ObjectState) -> Wrench:
-        return Wrench(fx=state.mass * self.ax, fy=state.mass * self.ay, torque=0.0)
+        return Wrench(fx=state.weight * self.x, fy=state.weight * self.y, torque=0.0)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -251,7 +251,13 @@ class _MagnetLaw:
 class Sloshing(Effect):
     """A part of the mass hangs on a spring and damper inside: liquid in a bottle.
 
-    The rigid rest carries the whole weight on the table; the moving part's pull acts at the centre of mass.
+    The whole weight stands on the table, and the moving part's moves with it: the pressure under the object shifts
+    by ``fraction`` times the swing. ``frequency`` and ``damping`` are those in an object that is held.
+
+    Assumed, and only roughly true of a bottle: one linear mode, the same along x and y (a round bottle's first, while
+    it swings little); its pull acts at half the object's height; it rests under the centre of mass when the push
+    begins; and it turns with the object, so that the moment of inertia is the whole's, where real liquid stays
+    behind. A lying cylinder keeps its liquid low as it rolls: there the moving weight tips nothing.
     """
 
     name: ClassVar[str] = "sloshing"
@@ -283,79 +289,103 @@ class Sloshing(Effect):
             for frequency in (1.5, 3.0, 5.0, 9.0)
         )
 
+    def heaviness(self) -> float:
+        """The rigid rest carries the whole weight: under more than the earth's gravity, since it is lighter."""
+        return 1.0 / (1.0 - self.fraction)
+
     def body(self, body: Body, facts: PushFacts) -> Body:
-        """The rigid rest: lighter, with the friction and the inertia of the whole."""
+        """The rigid rest: lighter, with the moment of inertia of the whole."""
         del facts
         rest = 1.0 - self.fraction
-        return dc.replace(
-            body, mass=rest * body.mass, support_friction=body.support_friction / rest,
-            inertia_ratio=body.inertia_ratio / rest,
-        )  # fmt: skip
+        return dc.replace(body, mass=rest * body.mass, inertia_ratio=body.inertia_ratio / rest)
 
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
         """A fresh oscillator for each rollout."""
-        return (_SloshLaw(self.fraction * facts.mass, 2.0 * math.pi * self.frequency, self.damping),)
+        mass = self.fraction * facts.mass
+        load = mass * GRAVITY if facts.rolling_radius is None else 0.0
+        return (_SloshLaw(mass, 2.0 * math.pi * self.frequency, self.damping, load),)
 
 
 class _SloshLaw:
     """Swinging mass: its place and velocity are the law's own state.
 
-    Over a tick the object is taken to keep its velocity, on which the oscillator's motion is exact; the object gets
-    the momentum that it loses.
+    Over a tick the object is taken to keep its velocity and spin, on which the oscillator's motion is exact; the
+    object gets the momentum and the angular momentum that the oscillator loses. The spring's anchor is the centre of
+    mass, and the damper opposes the motion that is seen from the turning object. Vectors are x + iy in W.
     """
 
-    def __init__(self, mass: float, frequency: float, damping: float) -> None:
-        self._mass, self._frequency, self._damping = mass, frequency, damping
+    def __init__(self, mass: float, frequency: float, damping: float, load: float) -> None:
+        """``mass`` kg, ``frequency`` rad/s, ``damping`` ratio, ``load`` on the base that moves with the mass [N]."""
+        self._mass, self._frequency, self._damping, self._load = mass, frequency, damping, load
         self._time = math.inf  # before any call
-        self._place = np.zeros(2)  # of the swinging mass in W [m]
-        self._velocity = np.zeros(2)
-        self._anchor = np.zeros(2)  # velocity of the object at the last call [m/s]
-        self._force = np.zeros(2)  # on the object [N]
         self._span = TICK
+        # Of the swinging mass: place [m], velocity [m/s]; of the object at the last call: place, velocity, spin.
+        self._place = self._velocity = self._from = self._anchor = 0j
+        self._spin = 0.0
+        self._force = 0j  # on the object [N]
+        self._wrench = Wrench(fx=0.0, fy=0.0, torque=0.0)
 
     def wrench(self, state: ObjectState) -> Wrench:
         if state.time < self._time:  # a rollout begins
-            self._place, self._velocity = state.p_WBcm.copy(), state.v_WBcm.copy()
+            self._place, self._velocity = complex(*state.p_WBcm), complex(*state.v_WBcm)
             self._time, self._span = state.time, TICK
             self._look_ahead(state)
         elif state.time > self._time:
             self._advance(state, state.time - self._time)
             self._time = state.time
             self._look_ahead(state)
-        fx, fy = self._force.tolist()
-        return Wrench(fx=fx, fy=fy, torque=0.0)
+        return self._wrench
 
     def strongest(self) -> float:
         """Largest force [N] that the swing will yet bring while the object rests."""
-        swing = np.sqrt((self._offset**2).sum() + (self._velocity**2).sum() / self._frequency**2)
-        return float(self._mass * self._frequency**2 * swing)
+        swing = math.hypot(abs(self._place - self._from), abs(self._velocity) / self._frequency)
+        return self._mass * self._frequency**2 * swing
 
     def _advance(self, state: ObjectState, span: float) -> None:
         """Move by the tick that has passed."""
-        rest = span > 2.0 * TICK  # the object stood still, and the rollout skipped it
-        anchor = np.zeros(2) if rest else self._anchor
-        start = state.p_WBcm if rest else self._from
-        offset, rate = self._flow(self._place - start, self._velocity - anchor, span)
-        self._velocity = anchor + rate if rest else self._velocity - span * self._force / self._mass
-        self._place = start + span * anchor + offset
-        self._span = TICK if rest else span
+        if span > 2.0 * TICK:  # the object stood still, and the rollout skipped it
+            start = complex(*state.p_WBcm)
+            offset, self._velocity = self._flow(self._place - start, self._velocity, 0.0, span)
+            self._place, self._span = start + offset, TICK
+            return
+        offset, _ = self._flow(self._place - self._from, self._velocity - self._anchor, self._spin, span)
+        self._place = self._from + span * self._anchor + offset
+        self._velocity -= span * self._force / self._mass
+        self._span = span
 
     def _look_ahead(self, state: ObjectState) -> None:
-        """The mean force of the next tick, as long as the last one."""
-        self._from, self._anchor = state.p_WBcm.copy(), state.v_WBcm.copy()
-        self._offset = self._place - state.p_WBcm
-        _, rate = self._flow(self._offset, self._velocity - self._anchor, self._span)
-        self._force = self._mass * (self._velocity - self._anchor - rate) / self._span
+        """The mean wrench of the next tick, as long as the last one."""
+        self._from, self._anchor, self._spin = complex(*state.p_WBcm), complex(*state.v_WBcm), state.yaw_rate
+        offset, rate = self._place - self._from, self._velocity - self._anchor
+        later, slower = self._flow(offset, rate, self._spin, self._span)
+        gain = self._mass / self._span
+        self._force = gain * (rate - slower)
+        moved = self._load * 0.5 * (offset + later)
+        self._wrench = Wrench(
+            fx=self._force.real,
+            fy=self._force.imag,
+            torque=gain * (_cross(offset, rate) - _cross(later, slower)),
+            tip_x=-moved.imag,
+            tip_y=moved.real,
+        )
 
-    def _flow(self, offset: Array, rate: Array, span: float) -> tuple[Array, Array]:
-        """Offset and rate (2,) of the free oscillator after a span [s]."""
+    def _flow(self, offset: complex, rate: complex, spin: float, span: float) -> tuple[complex, complex]:
+        """Offset and rate of the free oscillator after a span [s], its damper turning with ``spin`` [rad/s].
+
+        d'' + 2 z w (d' - i spin d) + w^2 d = 0.
+        """
         w, z = self._frequency, self._damping
-        root = cmath.sqrt(z * z - 1.0) or 1e-9
-        slow, fast = w * (-z + root), w * (-z - root)
+        root = w * cmath.sqrt(z * z - 1.0 + 2j * z * spin / w) or 1e-9
+        slow, fast = -z * w + root, -z * w - root
         a = (rate - fast * offset) / (slow - fast)
         b = offset - a
         first, second = a * cmath.exp(slow * span), b * cmath.exp(fast * span)
-        return np.real(first + second), np.real(slow * first + fast * second)
+        return first + second, slow * first + fast * second
+
+
+def _cross(a: complex, b: complex) -> float:
+    """The vertical part of a x b."""
+    return (a.conjugate() * b).imag
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -396,6 +426,6 @@ class _RollingLaw:
         # Across the axis (y of B) it rolls; along the axis it slides.
         across = np.array([math.cos(state.yaw), math.sin(state.yaw)])
         speed = float(across @ state.v_WBcm)
-        edge = max(ROLLING_EDGE, self.share * GRAVITY * TICK)
-        force = -self.share * state.mass * GRAVITY * speed / math.hypot(speed, edge)
+        edge = max(ROLLING_EDGE, self.share * state.weight / state.mass * TICK)
+        force = -self.share * state.weight * speed / math.hypot(speed, edge)
         return Wrench(fx=force * across[0], fy=force * across[1], torque=0.0)

@@ -22,10 +22,11 @@ Array = NDArray[np.float64]
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Geometry:
-    """What a cell is built from, and effects may change: the shape and the pressure under it."""
+    """What a cell is built from, and effects may change: the shape, the pressure under it, gravity [m/s^2]."""
 
     shape: Shape
     pressure: PressureGrid | None = None
+    gravity: float = GRAVITY
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -41,13 +42,14 @@ class Rollout:
 
 
 def geometry_with(effects: Sequence[Effect], geometry: Geometry) -> Geometry:
-    """The geometry with the effects' shape and pressure; null effects change nothing."""
+    """The geometry with what effects change of it; null effects change nothing."""
     for effect in effects:
         if not effect.is_null:
             pressure = effect.pressure()
             geometry = Geometry(
-                shape=effect.reshaped(geometry.shape), pressure=geometry.pressure if pressure is None else pressure
-            )
+                shape=effect.reshaped(geometry.shape), pressure=geometry.pressure if pressure is None else pressure,
+                gravity=effect.heaviness() * geometry.gravity,
+            )  # fmt: skip
     return geometry
 
 

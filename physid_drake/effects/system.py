@@ -6,6 +6,7 @@ the solver evaluated and linearised within its steps would cost many times as mu
 
 from __future__ import annotations
 
+import dataclasses as dc
 from collections.abc import Sequence
 
 from pydrake.common.cpp_param import List
@@ -50,8 +51,7 @@ class EffectForces(LeafSystem):
         self._reader, self._laws, self._frictions = reader, tuple(laws), tuple(frictions)
         self._body = scene.object.index()
         self.DeclareVectorInputPort("object.state_estimated", 13)
-        # Force and torque at the height of the centre of mass, and at the table.
-        self.DeclareDiscreteState(6)
+        self.DeclareDiscreteState(5)  # the sum of the laws' wrenches
         self.DeclarePeriodicDiscreteUpdateEvent(tick, 0.0, self._sample)
         self.DeclareAbstractOutputPort(
             "object.force_commanded",
@@ -63,23 +63,16 @@ class EffectForces(LeafSystem):
     def _sample(self, context: Context, discrete: DiscreteValues) -> None:
         x = self.get_input_port().Eval(context).tolist()
         state = self._reader.at(context.get_time(), x[:7], x[7:])
-        held = [0.0] * 6
-        for wrench in total_wrenches(state, self._laws, self._frictions):
-            at = 3 if wrench.at_table else 0
-            for k, value in enumerate((wrench.fx, wrench.fy, wrench.torque)):
-                held[at + k] += value
-        discrete.set_value(held)
+        wrenches = total_wrenches(state, self._laws, self._frictions)
+        discrete.set_value([sum(parts) for parts in zip(*map(dc.astuple, wrenches), strict=True)])
 
     def _forces(self, context: Context, output: Value[List[ExternallyAppliedSpatialForce]]) -> None:
-        held = context.get_discrete_state_vector().value().tolist()
-        output.set_value([self._force(held[:3], 0.0), self._force(held[3:], -self._reader.half_height)])
-
-    def _force(self, planar: Sequence[float], z: float) -> ExternallyAppliedSpatialForce:
+        fx, fy, torque, tip_x, tip_y = context.get_discrete_state_vector().value().tolist()
         force = ExternallyAppliedSpatialForce()
         force.body_index = self._body
-        force.p_BoBq_B = [self._reader.p_BBcm.real, self._reader.p_BBcm.imag, z]
-        force.F_Bq_W = SpatialForce(tau=[0.0, 0.0, planar[2]], f=[planar[0], planar[1], 0.0])
-        return force
+        force.p_BoBq_B = [self._reader.p_BBcm.real, self._reader.p_BBcm.imag, 0.0]
+        force.F_Bq_W = SpatialForce(tau=[tip_x, tip_y, torque], f=[fx, fy, 0.0])
+        output.set_value([force])
 
 
 def add_effect_forces(
@@ -101,9 +94,7 @@ def add_effect_forces(
         frictions: friction laws.
     """
     plant = scene.plant
-    system: EffectForces = builder.AddSystem(
-        EffectForces(scene, reader_of(body, scene.support, scene.solid), tick, laws, frictions)
-    )
+    system: EffectForces = builder.AddSystem(EffectForces(scene, reader_of(body, scene), tick, laws, frictions))
     builder.Connect(plant.get_state_output_port(scene.object.model_instance()), system.get_input_port())
     builder.Connect(system.get_output_port(), plant.get_applied_spatial_force_input_port())
     return system

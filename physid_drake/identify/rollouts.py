@@ -38,7 +38,7 @@ def cell_of(spec: CellSpec, geometry: Geometry | None = None) -> Cell:
     if key not in _cells:
         _cells[key] = Cell(
             made.shape, hand_radius=spec.hand_radius, config=spec.config, table=np.array(spec.table),
-            pressure=made.pressure,
+            pressure=made.pressure, gravity=made.gravity,
         )  # fmt: skip
         if len(_cells) > MOST_CELLS:
             _cells.popitem(last=False)

@@ -87,8 +87,9 @@ PUSHES = {
 @cache
 def built(geometry, hand=True):
     return Cell(
-        geometry.shape, hand_radius=0.01 if hand else None, config=config_of("point"), pressure=geometry.pressure
-    )
+        geometry.shape, hand_radius=0.01 if hand else None, config=config_of("point"), pressure=geometry.pressure,
+        gravity=geometry.gravity,
+    )  # fmt: skip
 
 
 def motions(*effects, rolls=False):
