@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.confirm import EXPLAINED, Candidate
+from physid_drake.diagnose.confirm import Candidate
 from physid_drake.diagnose.fit import Fitted, Fitter
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.screen import Screening, Signature
@@ -21,6 +21,7 @@ Tick = Callable[[str, int, int], None]
 
 # The cell's own error that guard, floor and tolerances leave: cost per degree of freedom where nothing is missing.
 SLACK = 1.15
+LEFT = 1.3  # cost per degree of freedom up to which a model with effects explains the pushes
 LAW_ERROR = 0.1  # of an effect's motion: two honest implementations of a spring or a liquid differ by that much
 MOST_LEFT = 3.0  # cost per degree of freedom that is never explained
 
@@ -71,5 +72,5 @@ def mismatch(fitted: Fitted, screening: Screening | None) -> float:
 
 def unexplained(plain: Fitted, final: Fitted) -> bool:
     """Whether a model leaves more than noise, the cell's error and what two honest laws of an effect differ by."""
-    allowed = min(EXPLAINED + LAW_ERROR**2 * max(0.0, plain.reduced_chi2 - 1.0), MOST_LEFT)
+    allowed = min(LEFT + LAW_ERROR**2 * max(0.0, plain.reduced_chi2 - 1.0), MOST_LEFT)
     return final.reduced_chi2 > allowed
