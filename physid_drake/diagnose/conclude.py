@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from physid_drake.diagnose.case import UNIT_SCATTER, Case
-from physid_drake.diagnose.confirm import Candidate, push_scores, rivals, standard_error
+from physid_drake.diagnose.confirm import EXPLAINED, Candidate, push_scores, rivals, standard_error
 from physid_drake.diagnose.estimates import parameters_of, rms, smallest, theta_of
-from physid_drake.diagnose.evidence import LEFT, Evidence, mismatch, unexplained
+from physid_drake.diagnose.evidence import Evidence, mismatch, unexplained
 from physid_drake.diagnose.fit import Fitted
 from physid_drake.diagnose.linear import left_out_scores
 from physid_drake.diagnose.localise import locate
@@ -205,7 +205,7 @@ def _why_not_fitted(name: str, evidence: Evidence) -> str:
 
 def _left(evidence: Evidence, after: Fitted) -> str:
     ratio = after.reduced_chi2
-    if ratio <= LEFT:
+    if ratio <= EXPLAINED:
         return "nothing beyond noise, scatter and the simulator's own error"
     best = evidence.remaining.scores[0].kind.name if evidence.remaining.scores else "none"
     return (

@@ -21,9 +21,12 @@ Tick = Callable[[str, int, int], None]
 
 # The cell's own error that guard, floor and tolerances leave: cost per degree of freedom where nothing is missing.
 SLACK = 1.15
-LEFT = 1.3  # cost per degree of freedom up to which a model with effects explains the pushes
-LAW_ERROR = 0.1  # of an effect's motion: two honest implementations of a spring or a liquid differ by that much
-MOST_LEFT = 3.0  # cost per degree of freedom that is never explained
+# Cost per degree of freedom beyond noise that a model with effects may leave.
+NOISE_LIKE = 0.2  # as the cell leaves where nothing is missing
+MOST_SHARE = 0.25  # of what the plain cell leaves: an effect that takes away less explains something else
+MOST_LEFT = 0.5  # where little was left before, and at most
+EVER_LEFT = 2.0  # where much was, since
+LAW_ERROR = 0.1  # of an effect's motion is what two honest implementations of a spring or a liquid differ by
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -72,5 +75,6 @@ def mismatch(fitted: Fitted, screening: Screening | None) -> float:
 
 def unexplained(plain: Fitted, final: Fitted) -> bool:
     """Whether a model leaves more than noise, the cell's error and what two honest laws of an effect differ by."""
-    allowed = min(LEFT + LAW_ERROR**2 * max(0.0, plain.reduced_chi2 - 1.0), MOST_LEFT)
-    return final.reduced_chi2 > allowed
+    before, left = plain.reduced_chi2 - 1.0, final.reduced_chi2 - 1.0
+    most = min(MOST_LEFT + LAW_ERROR**2 * max(0.0, before), EVER_LEFT)
+    return left > most or left > max(NOISE_LIKE, MOST_SHARE * before)

@@ -93,7 +93,15 @@ def test_a_plain_fit_in_a_wrong_basin_is_left_if_an_effect_leads_out_of_it():
 
 @pytest.mark.parametrize(
     ("before", "after", "left"),
-    [(5.0, 1.3, False), (5.0, 1.4, True), (150.0, 2.5, False), (150.0, 3.5, True), (900.0, 3.5, True)],
+    [
+        (5.0, 1.5, False),
+        (5.0, 1.7, True),
+        (1.6, 1.2, False),
+        (1.6, 1.4, True),
+        (150.0, 2.4, False),
+        (150.0, 3.5, True),
+        (900.0, 3.5, True),
+    ],
 )
 def test_a_large_effect_may_leave_what_two_honest_laws_of_it_differ_by(before, after, left):
     plain, final = SimpleNamespace(reduced_chi2=before), SimpleNamespace(reduced_chi2=after)
