@@ -277,9 +277,8 @@ class Stepper:
         dt = self._solver.time_step_s
         touch = self._touch(soft.place, soft.velocity)
         m = min(k + self._slide_ticks, count)
-        if touch.gap + min(touch.rate, 0.0) * dt * NEAR * self._slide_ticks <= 0.0 or not self._far(
-            k, count, touch.pose
-        ):
+        reach = dt * NEAR * self._slide_ticks
+        if touch.gap + min(touch.rate, 0.0) * reach <= 0.0 or not self._far(k, count, touch.pose):
             m = k + 1
         span = (m - k) * dt
         held = soft.held
