@@ -123,7 +123,7 @@ class Stepper:
     def _begin_at(self, start: Start, rest: Array, height: float) -> None:
         self._x = self._place(start, rest, height)
         if self._soft is not None and self._hand is not None:
-            first = self._hand_velocity(*self._hand[:2], self._solver.time_step_s)
+            first = self._hand_velocity(self._hand[0], self._hand[1], self._solver.time_step_s)
             self._soft.begin(self._section()[0], self._hand[0], first)
         self._root.SetTime(0.0)
         self._send()
