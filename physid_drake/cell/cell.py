@@ -24,6 +24,7 @@ from physid_drake.cell.setters import (
     SupportSetter,
     check_body,
 )
+from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.cell.stepper import Stepper
 from physid_drake.cell.support import SLENDER, PressureGrid, rest_depths
@@ -133,6 +134,7 @@ class Cell:
         hand_height: float | None = None,
         laws: Sequence[ForceLaw] = (),
         frictions: Sequence[FrictionLaw] = (),
+        mount: Mount | None = None,
     ) -> Motion:
         """Simulate one push.
 
@@ -145,6 +147,7 @@ class Cell:
             hand_height: of the tip's contact above the table [m]; half the object's height if None.
             laws: forces beyond weight, Coulomb friction and the hand.
             frictions: friction laws; the contact holds the largest friction of each, the law gives back the rest.
+            mount: what holds the hand's tip where it gives way; None for a rigid hand.
         """
         self.set_body(holding_body(body, frictions))
         motion = self._stepper.run(
@@ -157,6 +160,7 @@ class Cell:
             end=end,
             laws=laws,
             frictions=frictions,
+            mount=mount,
         )
         if self._table is None or not len(motion.times) or not self._overhangs(motion):
             return motion
@@ -169,6 +173,7 @@ class Cell:
             hand_height=hand_height,
             laws=laws,
             frictions=frictions,
+            mount=mount,
         )
 
     def _overhangs(self, motion: Motion) -> bool:

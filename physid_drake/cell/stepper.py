@@ -23,6 +23,7 @@ from physid_drake.cell.forces import (
 from physid_drake.cell.hand_path import HandPath
 from physid_drake.cell.motion import Log, Motion, Outcome, Start, planar_pose
 from physid_drake.cell.setters import Body
+from physid_drake.cell.soft_tip import Mount, Push, SoftTip
 from physid_drake.cell.touch import Planar, Tip, Touch, blow
 
 Array = NDArray[np.float64]
@@ -78,6 +79,7 @@ class Stepper:
         end: float,
         laws: Sequence[ForceLaw] = (),
         frictions: Sequence[FrictionLaw] = (),
+        mount: Mount | None = None,
     ) -> Motion:
         """Simulate from ``begin`` to ``end`` [s].
 
@@ -91,6 +93,7 @@ class Stepper:
             end: time of the end [s].
             laws: forces beyond weight, friction and hand.
             frictions: friction laws; the contact must hold their largest friction already.
+            mount: what holds the tip; None where it is rigid.
         """
         self._laws, self._frictions = laws, frictions
         dt = self._solver.time_step_s
@@ -103,6 +106,7 @@ class Stepper:
             if path is None
             else path.positions(np.asarray(begin + dt * np.arange(count + 1), dtype=np.float64)).tolist()
         )
+        self._soft = None if mount is None or path is None else SoftTip(mount, self._tip, body, self._inertia)
         self._drift, self._log = 0.0, Log()
         k = 0
         try:
@@ -118,6 +122,9 @@ class Stepper:
 
     def _begin_at(self, start: Start, rest: Array, height: float) -> None:
         self._x = self._place(start, rest, height)
+        if self._soft is not None and self._hand is not None:
+            first = self._hand_velocity(self._hand[0], self._hand[1], self._solver.time_step_s)
+            self._soft.begin(self._section()[0], self._hand[0], first)
         self._root.SetTime(0.0)
         self._send()
         self._simulator.Initialize()
@@ -149,7 +156,7 @@ class Stepper:
     def _place(self, start: Start, rest: Array, height: float) -> Array:
         x = np.zeros(self._scene.plant.num_multibody_states())
         px, py, yaw = start.pose
-        if self._hand is not None:
+        if self._hand is not None and self._soft is None:
             px, py = self._clear_of_hand(px, py, yaw)
             x[self._hand_q] = [*self._hand[0], height]
         elif self._hand_q:
@@ -194,15 +201,19 @@ class Stepper:
         vx, vy, wz = self._twist()
         if math.hypot(vx, vy) + abs(wz) * 0.05 > REST_SPEED or self._scene.solid.rolling_radius is not None:
             return False
-        if self._hand is not None and self._tip.gap(*self._section()[0], *self._hand[k])[0] <= 1e-6:
-            return False
+        if self._hand is not None:
+            tip = self._hand[k] if self._soft is None else self._soft.place
+            if self._tip.gap(*self._section()[0], *tip)[0] <= 1e-6:
+                return False
         return self._holds(k * self._solver.time_step_s)
 
     def _skip_rest(self, k: int, count: int) -> int:
         """Nothing happens until the hand comes: go to the last tick before it touches."""
         (pose, _), dt = self._section(), self._solver.time_step_s
         m = count
-        if self._hand is not None:
+        if self._soft is not None:
+            m = self._coast(pose, k, count)
+        elif self._hand is not None:
             m = (
                 next(
                     (i for i in range(k + 1, count + 1) if self._tip.gap(*pose, *self._hand[i])[0] <= 0.0),
@@ -221,8 +232,18 @@ class Stepper:
                 return count
         return self._tick(m, count)
 
+    def _coast(self, pose: Planar, k: int, count: int) -> int:
+        """Move a sprung tip beside an object at rest; returns the tick at which it may meet it."""
+        assert self._soft is not None
+        assert self._hand is not None
+        dt = self._solver.time_step_s
+        while k < count and not self._soft.arrives(pose, dt):
+            self._soft.coast(self._hand[k + 1], self._hand_velocity(self._hand[k], self._hand[k + 1], dt), dt)
+            k += 1
+        return k
+
     def _settle_hand(self, k: int) -> None:
-        if self._hand is not None:
+        if self._hand is not None and self._soft is None:
             self._x[self._hand_q[:2]] = self._hand[k]
             self._x[self._hand_v] = 0.0
 
@@ -233,6 +254,8 @@ class Stepper:
             m = min(k + self._slide_ticks, count)
             self._step(m * dt, k * dt, None, None)
             return m
+        if self._soft is not None:
+            return self._soft_tick(self._soft, k, count)
         m = k + 1
         velocity = self._hand_velocity(self._hand[k], self._hand[m], dt)
         touch = self._touch(self._hand[k], velocity)
@@ -246,6 +269,23 @@ class Stepper:
             velocity = self._hand_velocity(self._hand[k], self._hand[m], (m - k) * dt)
             touch = self._touch(self._hand[k], velocity)
         self._cross(k * dt, m * dt, self._hand[k], self._hand[m], velocity, touch)
+        return m
+
+    def _soft_tick(self, soft: SoftTip, k: int, count: int) -> int:
+        """As ``_tick``, with a sprung tip."""
+        assert self._hand is not None
+        dt = self._solver.time_step_s
+        touch = self._touch(soft.place, soft.velocity)
+        m = min(k + self._slide_ticks, count)
+        reach = dt * NEAR * self._slide_ticks
+        if touch.gap + min(touch.rate, 0.0) * reach <= 0.0 or not self._far(k, count, touch.pose):
+            m = k + 1
+        span = (m - k) * dt
+        held = soft.held
+        push = soft.step(touch, self._hand[m], self._hand_velocity(self._hand[k], self._hand[m], span), span)
+        if push is not None and not held:
+            self._log.impacts.append(self._begin + k * dt)
+        self._step(m * dt, k * dt, None, None, push)
         return m
 
     def _far(self, k: int, count: int, pose: Planar) -> bool:
@@ -323,21 +363,29 @@ class Stepper:
         for wrench in self._wrenches(state):
             self._kick(state.yaw, span * wrench.fx, span * wrench.fy, span * wrench.torque)
             if wrench.tip_x or wrench.tip_y:
-                self._rock(state, span * wrench.tip_x, span * wrench.tip_y)
+                self._rock(state.yaw, span * wrench.tip_x, span * wrench.tip_y)
 
     def _wrenches(self, state: ObjectState) -> list[Wrench]:
         return total_wrenches(state, self._laws, self._frictions)
 
-    def _rock(self, state: ObjectState, hx: float, hy: float) -> None:
+    def _take(self, push: Push) -> None:
+        """Give the object a sprung tip's impulse, at the tip's height."""
+        yaw = self._section()[0][2]
+        self._kick(yaw, push.jx, push.jy, push.spin)
+        arm = self._height - float(self._x[self._q + 6])
+        self._rock(yaw, -arm * push.jy, arm * push.jx)
+
+    def _rock(self, yaw: float, hx: float, hy: float) -> None:
         """Give the object an angular impulse [N m s] about x and y of W; Bcm keeps its velocity."""
         scale = self._body.mass * self._body.inertia_ratio
         ix, iy = scale * self._scene.solid.gyration[0], scale * self._scene.solid.gyration[1]
-        c, s = math.cos(state.yaw), math.sin(state.yaw)
+        c, s = math.cos(yaw), math.sin(yaw)
         about_x, about_y = (c * hx + s * hy) / ix, (c * hy - s * hx) / iy
         wx, wy = c * about_x - s * about_y, s * about_x + c * about_y
         self._x[self._v] += wx
         self._x[self._v + 1] += wy
-        self._x[self._v + 5] += wy * state.p_BoBcm_W.real - wx * state.p_BoBcm_W.imag
+        cx, cy = float(self._body.p_BBcm[0]), float(self._body.p_BBcm[1])
+        self._x[self._v + 5] += wy * (c * cx - s * cy) - wx * (s * cx + c * cy)
 
     def _object_state(self, time: float) -> ObjectState:
         q, v = self._q, self._v
@@ -381,6 +429,7 @@ class Stepper:
         begin: float,
         move: tuple[list[float], list[float], tuple[float, float]] | None,
         seen: Touch | None,
+        push: Push | None = None,
     ) -> None:
         """Let Drake advance from ``begin`` to ``end``.
 
@@ -389,19 +438,24 @@ class Stepper:
             begin: time [s].
             move: the tip's start, goal and velocity.
             seen: the touch at the start, where it is known already.
+            push: what a sprung tip gives.
         """
         span = end - begin
         old = self._twist()
         touching, before = False, None
         command = (0.0, 0.0)
+        force = (0.0, 0.0, 0.0)
+        if push is not None:
+            force = push.jx / span, push.jy / span, 0.0
+            self._take(push)
         if move is not None:
             hand, goal, velocity = move
             before = seen or self._touch(hand, velocity)
             touching = before.gap + span * min(before.rate, 0.0) <= 1e-6
             if not touching:
                 self._drift = 0.0
-            push = -self._drift / span
-            command = (velocity[0] + push * before.nx, velocity[1] + push * before.ny)
+            mend = -self._drift / span
+            command = (velocity[0] + mend * before.nx, velocity[1] + mend * before.ny)
             self._x[self._hand_q[0]], self._x[self._hand_q[1]] = hand
             self._x[self._hand_v[0]], self._x[self._hand_v[1]] = command
             self._x[self._hand_v[2]] = 0.0
@@ -416,13 +470,12 @@ class Stepper:
         # Written so that a NaN anywhere fails the comparison.
         if not abs(after[0]) + abs(after[1]) + 1e-3 * abs(after[2]) < FASTEST:
             raise FloatingPointError("the object left")
-        force = (0.0, 0.0, 0.0)
         if move is not None:
             if touching:
                 force = self._hand_force(command, span)
             self._x[self._hand_q[0]], self._x[self._hand_q[1]] = goal
             self._x[self._hand_q[2]] = height
-        if self._tilt_gain > 0.0 and not touching:
+        if self._tilt_gain > 0.0 and not touching and push is None:
             after = self._without_tilt_friction(pushed, after)
         if self._solver.trapezoid_slide and not touching:
             self._shift(

@@ -10,8 +10,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.cell import Body, HandPath, Motion
+from physid_drake.cell import Body, HandPath
 from physid_drake.cell.forces import ForceLaw, FrictionLaw
+from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.support import PressureGrid
 from physid_drake.recording import Shape
 
@@ -149,14 +150,12 @@ class Effect:
         element: what it belongs to: table, object, hand, sensor or world.
         statement: one sentence for a person.
         frame: in which the missing physics is constant.
-        passes: rollouts that one prediction takes.
     """
 
     name: ClassVar[str]
     element: ClassVar[str]
     statement: ClassVar[str]
     frame: ClassVar[str]
-    passes: ClassVar[int] = 1
     # Of which parameters the null values make the effect vanish.
     amplitudes: ClassVar[tuple[str, ...]]
 
@@ -233,10 +232,15 @@ class Effect:
         del facts
         return ()
 
-    def hand(self, path: HandPath, facts: PushFacts, before: Motion | None) -> HandPath:
-        """The tip's path; ``before`` is the rollout of the pass before, None in the first."""
-        del facts, before
+    def hand(self, path: HandPath, facts: PushFacts) -> HandPath:
+        """The path of the tip, or of its mount where it gives way."""
+        del facts
         return path
+
+    def mount(self, facts: PushFacts) -> Mount | None:
+        """What holds a tip that gives way, or None for a rigid one."""
+        del facts
+        return None
 
     def true_pose(self, pose: Pose) -> Pose:
         """Pose of B for a pose that the tracker reports."""

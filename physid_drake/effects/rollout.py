@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import Body, Cell, HandPath, Motion, Start
 from physid_drake.cell.diagram import GRAVITY
 from physid_drake.cell.forces import FrictionLaw
+from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.support import PressureGrid
 from physid_drake.effects.effect import Effect, PushFacts
 from physid_drake.effects.friction import Together
@@ -72,25 +73,21 @@ def roll(
     start = push.start
     for effect in reversed(present):
         start = dc.replace(start, pose=effect.true_pose(start.pose))
-    motion: Motion | None = None
-    frictions = frictions_of(present, facts)
-    for _ in range(max((effect.passes for effect in present), default=1)):
-        path = push.path
-        if path is not None:
-            for effect in present:
-                path = effect.hand(path, facts, motion)
-        motion = cell.rollout(
-            body,
-            start=start,
-            path=path,
-            begin=push.begin,
-            end=push.end,
-            hand_height=push.hand_height,
-            laws=[law for effect in present for law in effect.laws(facts)],
-            frictions=frictions,
-        )
-    assert motion is not None
-    return motion
+    path = push.path
+    if path is not None:
+        for effect in present:
+            path = effect.hand(path, facts)
+    return cell.rollout(
+        body,
+        start=start,
+        path=path,
+        begin=push.begin,
+        end=push.end,
+        hand_height=push.hand_height,
+        laws=[law for effect in present for law in effect.laws(facts)],
+        frictions=frictions_of(present, facts),
+        mount=mount_of(present, facts),
+    )
 
 
 def facts_of(cell: Cell, body: Body, region: Array, order: int) -> PushFacts:
@@ -112,6 +109,12 @@ def frictions_of(effects: Sequence[Effect], facts: PushFacts) -> list[FrictionLa
     """The effects' friction laws; several act as one."""
     frictions = [law for effect in effects for law in effect.frictions(facts)]
     return [Together(tuple(frictions))] if len(frictions) > 1 else frictions
+
+
+def mount_of(effects: Sequence[Effect], facts: PushFacts) -> Mount | None:
+    """What holds the tip; None where no effect makes it give way."""
+    mounts = [mount for effect in effects if (mount := effect.mount(facts)) is not None]
+    return mounts[-1] if mounts else None
 
 
 def tracked(motion: Motion, times: Array, effects: Sequence[Effect]) -> Array:

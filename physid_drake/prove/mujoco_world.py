@@ -124,7 +124,9 @@ class PushWorld:
         actual = nominal
         for effect in self._effects:
             actual = effect.tip(grid, actual) if path is not None else actual
-        begin = 0 if path is None or duration is not None else self._first_touch(pose, actual)
+        # A sprung tip swings from the first move of its mount.
+        whole = path is None or duration is not None or self.plan.sprung_tip is not None
+        begin = 0 if whole else self._first_touch(pose, actual)
         if path is not None:
             moving = np.flatnonzero(np.abs(np.diff(actual, axis=0)).max(axis=1) > 1e-7 * self._dt / TIME_STEP)
             stop = int(moving[-1]) + 1 if len(moving) else 0
@@ -186,6 +188,9 @@ class PushWorld:
         parts, touched, touch_steps = self._refine(1), 0, round(_TOUCH_TIME / self._dt)
         log, forces = np.empty((len(tips), 7)), np.zeros(((len(tips) - 1) // every + 1, 3))
         log[begin] = qpos[q : q + 7]
+        sprung = self.plan.sprung_tip is not None
+        if sprung:  # unloaded, and as fast as its mount
+            qpos[:2], qvel[:2] = turned[begin], speeds[begin]
         lawful, quiet = bool(self._friction_laws or self._wrenches), 0
         size = math.sqrt(moment.gyration_squared)
         for k in range(begin, len(speeds)):
@@ -197,7 +202,11 @@ class PushWorld:
             if wanted != len(parts):
                 parts = self._refine(wanted)
             for part in parts:
-                qpos[:2], qvel[:2] = turned[k] + part * model.opt.timestep * speeds[k], speeds[k]
+                place = turned[k] + part * model.opt.timestep * speeds[k]
+                if sprung:  # its joints are relative to the carriage: the tip itself stays as it is
+                    qpos[2:4] += qpos[:2] - place
+                    qvel[2:4] += qvel[:2] - speeds[k]
+                qpos[:2], qvel[:2] = place, speeds[k]
                 step(model, state)
             log[k + 1] = qpos[q : q + 7]
             if k % every == 0:

@@ -56,8 +56,8 @@ MEANING = {
     "coefficient": (0, 1e9), "per_push": (-1, 10),
 }  # fmt: skip
 
-# A bounce is caught up by the hand and grows with the square; a soft tip's re-contacts come and go with its
-# compliance: their signatures are there, but straight only over shorter ways.
+# A bounce is caught up by the hand and grows with the square; a soft tip rings with the root of its
+# compliance, and its re-contacts come and go: signatures are there, but straight only over shorter ways.
 CURVED = ("restitution", "hand_compliance")
 
 every_effect = pytest.mark.parametrize("kind", CATALOGUE, ids=lambda kind: kind.name)
@@ -164,7 +164,7 @@ def test_a_vanishing_effect_changes_vanishingly_little(kind):
             worst,
             float(np.sqrt((((seen(kind.at(point, around(rolls)), rolls=rolls) - plain(rolls)) / SIGMA) ** 2).mean())),
         )
-    # Measured: 0.03 sigma where rounding moves the start of a contact by a tick, 0.21 for the path of a soft tip.
+    # Measured: 0.03 sigma where rounding moves the start of a contact by a tick, more for a stiff tip's own contact.
     assert worst < (0.3 if kind.name == "hand_compliance" else 0.05)
 
 

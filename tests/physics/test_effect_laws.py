@@ -14,10 +14,14 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import least_squares
 from twin import body_of, config_of
 
-from physid_drake.cell import Cell, HandPath, Outcome, Start
+from physid_drake.cell import Body, Cell, HandPath, Outcome, Start
 from physid_drake.cell.forces import Wrench, reader_of
+from physid_drake.cell.outline import rectangle
+from physid_drake.cell.soft_tip import Mount, SoftTip
 from physid_drake.cell.support import PressureGrid
+from physid_drake.cell.touch import Tip as ContactTip
 from physid_drake.effects import effect_named
+from physid_drake.effects.hand import TIP_SHARE
 from physid_drake.effects.rollout import Geometry, Rollout, facts_of, geometry_with, roll, tracked
 from physid_drake.recording import Box, Cylinder
 
@@ -566,49 +570,114 @@ SLOW = {"speed": 0.02, "until": 1.0, "rise": 0.2, "brake": 0.2}
 @pytest.mark.parametrize("deflection", [1e-4, 2e-3])
 def test_a_soft_tip_is_behind_by_its_compliance_times_friction(deflection):
     compliance = deflection / (MU * MASS * G)
-    plain, _ = push_along_x(**SLOW)
-    soft, _ = push_along_x(make("hand_compliance", compliance=compliance), **SLOW)
-    behind = at(plain, 0.95)[0, 0] - at(soft, 0.95)[0, 0]
-    assert behind == pytest.approx(deflection, rel=1e-3)  # measured 9e-6
+    soft, path = push_along_x(make("hand_compliance", compliance=compliance), **SLOW)
+    face = at(soft, 0.95)[0, 0] - 0.5 * SIZE[0]
+    behind = path.positions(np.array([0.95]))[0, 0] + TIP - face
+    assert behind == pytest.approx(deflection, rel=1e-3)
 
 
-def sprung(path, compliance, constant, seconds, gap=0.005, step=2e-5):
-    """Reference: a mass with friction, met by a massless tip on a spring and damper; times, places."""
+def test_a_soft_tip_that_stops_leaves_the_object_where_spring_and_friction_balance():
+    compliance = 2e-3 / (MU * MASS * G)
+    motion, path = push_along_x(make("hand_compliance", compliance=compliance), **{**SLOW, "brake": 1.0})
+    lag = path.positions(np.array([9.0]))[0, 0] + TIP - (end(motion)[0] - 0.5 * SIZE[0])
+    # Measured 1.87 mm: the hand brakes in a finite time, and Drake's friction lets what is loaded creep at 0.1 mm/s.
+    assert 1.8e-3 < lag < 2e-3 * (1.0 + 1e-3)
+    assert motion.forces[-1, 0] == pytest.approx(lag / compliance, rel=0.01)
+
+
+def struck_by_tip(effect, velocity, side=0.0, pose=(0.0, 0.0, 0.0), seconds=0.4):
+    """The motion of a box without friction that flies against a tip whose mount stands."""
+    place = np.array([-0.5 * SIZE[0] - TIP - 1e-3, side])
+    path = HandPath(times=np.array([0.0, seconds]), velocities=np.zeros((2, 2)), start=place)
+    start = Start(pose=pose, velocity=velocity)
+    push = Rollout(start=start, path=path, begin=0.0, end=seconds, hand_height=None)
+    motion = roll(lambda g: built(g, True), BOX, body_of(MASS, 1e-6, hand_friction=0.3), push, (effect,))
+    assert motion.outcome is Outcome.COMPLETED
+    return motion
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.2, 0.5])
+def test_a_soft_tip_throws_the_object_back_as_a_spring_and_a_damper_do(damping):
+    compliance, speed = 2e-3, 0.2
+    motion = struck_by_tip(make("hand_compliance", compliance=compliance, damping=damping), (-speed, 0.0, 0.0))
+    whole = (1.0 + TIP_SHARE) * MASS
+    ratio = damping * math.sqrt(MASS / whole)
+    root = math.sqrt(1.0 - ratio**2)
+    phase = math.pi - math.atan2(2.0 * ratio * root, 1.0 - 2.0 * ratio**2)
+    # The tip is caught up plastically; the contact ends where spring and damper pull no more.
+    back = velocities(motion)[-1, 0]
+    assert back == pytest.approx(speed * MASS / whole * math.exp(-ratio / root * phase), abs=2e-3)
+    pressed = motion.times[motion.forces[:, 0] > 0.0]
+    lasts = phase / root * math.sqrt(whole * compliance)
+    assert pressed[-1] - pressed[0] == pytest.approx(lasts, abs=2.5e-3)  # of 58 to 92 ms, in ticks of 1 ms
+
+
+@pytest.mark.parametrize("side", [0.0, 0.015, -0.03])
+@pytest.mark.parametrize("yaw", [0.0, 0.3])
+def test_a_soft_tip_creates_no_energy(side, yaw):
+    velocity = (-0.3, 0.1, 2.0)
+    soft = make("hand_compliance", compliance=2e-3, damping=0.0)
+    motion = struck_by_tip(soft, velocity, side=side, pose=(0.005, 0.0, yaw))
+
+    def energy(v):
+        return 0.5 * MASS * (v[0] ** 2 + v[1] ** 2 + POLAR * v[2] ** 2)
+
+    assert (motion.forces[:, 0] > 0.0).any()
+    assert energy(velocities(motion)[-1]) < energy(velocity) * (1.0 + 1e-3)
+
+
+@pytest.mark.parametrize(("damping", "speed"), [(0.2, 0.3), (0.5, 0.1)])
+def test_a_soft_tip_pushes_as_two_masses_on_a_spring(damping, speed):
+    compliance = 1e-2 / (MU * MASS * G)
+    motion, path = push_along_x(make("hand_compliance", compliance=compliance, damping=damping), speed=speed)
+    times, places = sprung(path, compliance, damping, float(motion.times[-1]))
+    error = np.abs(at(motion, motion.times)[:, 0] - np.interp(motion.times, times, places)).max()
+    assert np.abs(places - (path.positions(times)[:, 0] - path.start[0] - 0.005)).max() > 5e-3
+    assert error < 2e-4  # measured 0.106 and 0.02 mm, of more than 5
+
+
+def sprung(path, compliance, damping, seconds, gap=0.005, step=1e-5):
+    """Reference in fine steps: a mass with friction, met plastically by a mass on a spring; times, places [m]."""
     times = step * np.arange(round(seconds / step) + 1)
     hand = path.positions(times)[:, 0] - path.start[0] - gap
-    places = np.zeros(len(times))
-    x = v = u = 0.0
+    spring, light = 1.0 / compliance, TIP_SHARE * MASS
+    damper = 2.0 * damping * math.sqrt(spring * MASS)
+    places, x, v, tip, u = np.zeros(len(times)), 0.0, 0.0, float(hand[0]), 0.0
     for k in range(1, len(times)):
-        free = u * math.exp(-step / constant)
-        force = 0.0
-        if hand[k] + free >= x + step * v:
-            # Implicit Euler of m v' = F - R, F = -(u + T u') / C, u = x - hand.
-            weight = MASS / step + (step + constant) / compliance
-            pull = ((x - hand[k]) + constant * (x - hand[k] - u) / step) / compliance
-            after = max(0.0, (MASS / step * v - MU * MASS * G - pull) / weight)
-            spring = x + step * after - hand[k]
-            force = -(spring + constant * (spring - u) / step) / compliance
-        if force > 0.0:
-            v, u = after, spring
+        pull = spring * (hand[k - 1] - tip) + damper * ((hand[k] - hand[k - 1]) / step - u)
+        free, slid = u + step * pull / light, max(0.0, v - step * MU * G)
+        if free >= slid and tip + step * free >= x + step * slid:
+            v = u = max(0.0, (MASS * v + light * u + step * (pull - MU * MASS * G)) / (MASS + light))
         else:
-            v, u = max(0.0, v - MU * G * step), free
-        x += step * v
+            u, v = free, slid
+        x, tip = x + step * v, tip + step * u
+        tip = min(tip, x)
         places[k] = x
     return times, places
 
 
-@pytest.mark.parametrize(("deflection", "speed", "most"), [
-    (1e-4, 0.1, 5e-5), (2e-3, 0.1, 5e-5), (1e-4, 0.3, 4e-4), (2e-3, 0.3, 4e-4), (1e-2, 0.3, 4e-4),
-])  # fmt: skip
-def test_a_soft_tip_moves_the_object_as_a_mass_on_a_spring(deflection, speed, most):
-    compliance = deflection / (MU * MASS * G)
-    motion, path = push_along_x(make("hand_compliance", compliance=compliance), speed=speed)
-    constant = max(math.sqrt(MASS * compliance), 8e-3)
-    times, places = sprung(path, compliance, constant, motion.times[-1])
-    error = np.abs(at(motion, motion.times)[:, 0] - np.interp(motion.times, times, places)).max()
-    # Measured: 0.009 and 0.024 mm, at 0.3 m/s 0.31, 0.21 and 0.28 mm, most of it after the release; a stiff tip would
-    # be off by 0.3 to 16 mm.
-    assert error < most
+def test_a_soft_tip_sticks_to_a_face_until_its_friction_slides():
+    # A face that hardly moves, pressed by 1 N, along which the mount goes: 100 N/m, so that 3 mm take it along.
+    heavy = Body(mass=1e6, p_BBcm=np.zeros(2), inertia_ratio=1.0, hand_friction=0.3, support_friction=np.array([0.3]))
+    tip = ContactTip(rectangle(0.2, 0.2), TIP)
+    soft = SoftTip(Mount(stiffness=100.0, damping=0.0, mass=1e-3), tip, heavy, 1e6)
+    pose, still, speed, tick = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.01, 1e-3
+    soft.begin(pose, [-0.1 - TIP + 0.01, 0.0], (0.0, 0.0))
+    forces, places = [], []
+    for k in range(600):
+        touch = tip.touch(pose, still, soft.place, soft.velocity)
+        goal = [-0.1 - TIP + 0.01, speed * tick * (k + 1)]
+        push = soft.step(touch, goal, (0.0, speed), tick)
+        assert push is not None
+        forces.append((push.jx / tick, push.jy / tick))
+        places.append(soft.place[1])
+    forces, places, times = np.array(forces), np.array(places), tick * (np.arange(600) + 0.5)
+    assert forces[:, 0] == pytest.approx(np.ones(600), rel=1e-6)
+    sticks = times < 0.29
+    np.testing.assert_allclose(forces[sticks, 1], 100.0 * speed * times[sticks], atol=1e-6)
+    assert np.abs(places[sticks]).max() < 1e-9
+    assert forces[times > 0.35, 1] == pytest.approx(np.full(250, 0.3), rel=1e-6)
+    assert places[-1] == pytest.approx(0.003, rel=0.02)
 
 
 def test_a_lagging_hand_is_behind_by_speed_times_its_time_constant():
@@ -621,7 +690,7 @@ def test_a_lagging_hand_is_behind_by_speed_times_its_time_constant():
 def test_a_lagging_hand_ends_where_it_was_sent():
     path = HandPath(times=np.array([0.0, 0.1, 0.3]), velocities=np.array([[0.2, 0], [0.2, 0.1], [0.1, 0.1]]),
                     start=np.zeros(2))  # fmt: skip
-    lagged = make("actuator_lag", time_constant=0.02).hand(path, None, None)
+    lagged = make("actuator_lag", time_constant=0.02).hand(path, None)
     ends = [p.positions(np.array([5.0]))[0] for p in (path, lagged)]
     # A path that begins in motion is followed from behind; after eight time constants exp(-8) of the lag is left.
     np.testing.assert_allclose(ends[1], ends[0], atol=1e-5)  # measured 1.0e-6 m

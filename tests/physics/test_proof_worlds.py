@@ -311,6 +311,20 @@ def test_hand_compliance_gives_way_by_force_times_compliance():
     assert lag == pytest.approx(compliance * MU * MASS * GRAVITY, rel=0.01)
 
 
+def test_a_sprung_tip_has_inertia():
+    # Accelerated evenly, without friction, the spring carries object and tip: a fifth more than the object.
+    plan, rise, compliance = replace(PLAN, support_friction=1e-3), 1.0, 0.004
+    path = HandPath(
+        times=np.array([0.0, 0.4, 0.45]), start=np.array([-0.0635 - 0.008 - 1e-4, 0.0]),
+        velocities=np.outer([0.0, 0.4 * rise, 0.0], [1.0, 0.0]),
+    )  # fmt: skip
+    run = {"path": path, "plan": plan, "duration": 0.4}
+    soft = push(fx.HandCompliance(compliance=compliance, damping=0.6), **run)
+    lag = push(**run).poses[-1, 0] - soft.poses[-1, 0]
+    want = compliance * MASS * (1.2 * rise + 1e-3 * GRAVITY)
+    assert lag == pytest.approx(want, rel=0.02)
+
+
 def test_actuator_lag_and_hand_offset_move_the_tip():
     times = np.arange(0, 0.5, 2e-4)
     ramp = np.column_stack([np.maximum(0, times - 0.1) * 0.4, 0 * times])
