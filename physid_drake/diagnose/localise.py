@@ -272,6 +272,19 @@ def _amount(wrenches: Sequence[MissingWrench]) -> str:
     return f": about {' and '.join(parts)} missing" if parts else ", too little in any one window to be seen there"
 
 
+def _direction(look: str) -> tuple[str, str]:
+    """The frame of a look, and its direction in words."""
+    frame, direction, _ = look.split("|")
+    match frame:
+        case "object_velocity":
+            return frame, f"{_SAID[direction]}, wherever the object heads"
+        case "push_order":
+            return frame, "along the motion, changing from push to push"
+        case "speed":
+            return "object_velocity", "along the motion, growing with speed"
+    return frame, f"along {direction} of the {'table' if frame == 'world' else 'object'}"
+
+
 _SAID = {"along_motion": "along the motion", "across_motion": "across the motion", "rotation": "as a torque"}
 
 
@@ -290,17 +303,7 @@ def _location(
     dofs = ("along_motion", "across_motion", "rotation")
     power = (values**2).mean(axis=0)
     dof = tuple(d for d, p in zip(dofs, power.tolist(), strict=True) if p > 0.4 * power.max())
-    frame, detail = "none", "in no one direction"
-    if told:
-        frame, direction, _ = told[0][1].split("|")
-        detail = {
-            "object_velocity": f"{_SAID[direction]}, wherever the object heads",
-            "world": f"along {direction} of the table",
-            "object": f"along {direction} of the object",
-            "push_order": "along the motion, changing from push to push",
-            "speed": "along the motion, growing with speed",
-        }[frame]
-        frame = "object_velocity" if frame == "speed" else frame
+    frame, detail = ("none", "in no one direction") if not told else _direction(told[0][1])
     where = " and ".join({"contact": "while it is pushed", "free_slide": "in its free slide"}[p] for p in phase)
     statement = f"{where}{_amount(wrenches)}, {detail}"
     return Location(statement=statement, phase=phase, dof=dof, frame=frame, windows=windows)
