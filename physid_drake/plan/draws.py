@@ -38,7 +38,12 @@ def uncertain_names(model: Model) -> list[str]:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Draw:
-    """One way in which a push may go: the model, this push's friction in it, and where the object really starts."""
+    """One way in which a push may go.
+
+    Attributes:
+        model: with this push's friction in it.
+        situation: with where the object really starts.
+    """
 
     model: Model
     situation: Situation
