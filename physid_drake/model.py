@@ -34,9 +34,58 @@ from physid_drake.recording import Box, Cylinder, MeshShape, Prism, Shape
 Array = NDArray[np.float64]
 
 FORMAT = "physid-model/1"
+ROUND_OFF = 1e-9  # of a correlation's roots
 _SHAPES: dict[str, type[Box] | type[Cylinder] | type[Prism] | type[MeshShape]] = {
     "box": Box, "cylinder": Cylinder, "prism": Prism, "mesh": MeshShape,
 }  # fmt: skip
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Correlation:
+    """How estimates vary together: that of their normal scores, the parameter of a Gaussian copula.
+
+    It says nothing of how widely each varies, which is what its interval is for, and is the same for a value and for
+    its logarithm.
+
+    Attributes:
+        names: of the estimates, as in the intervals.
+        matrix: (n, n) rows [-].
+
+    Raises:
+        ConfigError: if names repeat, or the matrix is no correlation.
+
+    Source: R. B. Nelsen, An Introduction to Copulas, 2nd ed., 2006, section 2.3 (Sklar).
+    """
+
+    names: tuple[str, ...]
+    matrix: tuple[tuple[float, ...], ...]
+
+    @classmethod
+    def of(cls, names: Sequence[str], matrix: Array) -> Correlation:
+        """From a matrix (n, n), which round-off may have left a little off symmetric."""
+        even = np.clip(0.5 * (matrix + matrix.T), -1.0, 1.0)
+        np.fill_diagonal(even, 1.0)
+        return cls(names=tuple(names), matrix=tuple(tuple(row) for row in even.tolist()))
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        if len(set(self.names)) != count:
+            raise ConfigError(f"correlation: names must be unique, but are {', '.join(self.names)}.")
+        if len(self.matrix) != count or any(len(row) != count for row in self.matrix):
+            raise ConfigError(f"correlation: {count} names need a matrix of {count} rows of {count} numbers.")
+        matrix = np.array(self.matrix, dtype=np.float64).reshape(count, count)
+        even = np.array_equal(matrix, matrix.T) and np.array_equal(np.diag(matrix), np.ones(count))
+        if not even or (count and float(np.linalg.eigvalsh(matrix)[0]) < -ROUND_OFF):
+            raise ConfigError("correlation: the matrix must be symmetric, 1 on its diagonal, without negative roots.")
+
+    def among(self, names: Sequence[str]) -> Array:
+        """The correlation (k, k) of the named estimates; 0 with what it does not hold."""
+        matrix = np.eye(len(names))
+        held = [(i, self.names.index(name)) for i, name in enumerate(names) if name in self.names]
+        for i, a in held:
+            for j, b in held:
+                matrix[i, j] = self.matrix[a][b]
+        return matrix
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -52,6 +101,7 @@ class Model:
         body: theta.
         effects: physics beyond the plain cell.
         intervals: 90 % intervals as they were found, by ``theta.<name>`` and ``<effect>.<parameter>``.
+        correlation: of what has an interval of two numbers; None where it is not known.
     """
 
     recording: str
@@ -62,6 +112,7 @@ class Model:
     body: Body
     effects: tuple[Effect, ...] = ()
     intervals: dict[str, Any] = dc.field(default_factory=dict)
+    correlation: Correlation | None = None
 
     def build(self) -> ModelCell:
         """The Drake cell with theta in its Context and the effects at their seams."""
@@ -73,7 +124,7 @@ class Model:
 
     def dump(self) -> str:
         """The text of ``model.yaml``; a mesh is named by its absolute path."""
-        content = {
+        content: dict[str, Any] = {
             "format": FORMAT,
             "recording": self.recording,
             "object": _dump_shape(self.shape),
@@ -86,6 +137,8 @@ class Model:
             "effects": [{"name": e.name, "parameters": _plain(dc.asdict(e))} for e in self.effects],
             "intervals": _plain(self.intervals),
         }  # fmt: skip
+        if self.correlation is not None:
+            content["correlation"] = _plain(dc.asdict(self.correlation))
         return str(yaml.safe_dump(content, sort_keys=False))
 
 
@@ -198,7 +251,19 @@ def _model(content: dict[str, Any], file: Path) -> Model:
         body=Body(**theta),
         effects=tuple(_load_effect(e) for e in content["effects"]),
         intervals=content.get("intervals", {}),
+        correlation=_load_correlation(content),
     )
+
+
+def _load_correlation(content: dict[str, Any]) -> Correlation | None:
+    found = content.get("correlation")
+    if found is None:
+        return None
+    unknown = [name for name in found["names"] if name not in content.get("intervals", {})]
+    if unknown:
+        raise ConfigError(f"correlation: '{unknown[0]}' has no interval.")
+    rows = tuple(tuple(float(v) for v in row) for row in found["matrix"])
+    return Correlation(names=tuple(str(name) for name in found["names"]), matrix=rows)
 
 
 def _load_effect(content: dict[str, Any]) -> Effect:

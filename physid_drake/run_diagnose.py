@@ -14,13 +14,14 @@ from rich.console import Console
 
 from physid_drake.cell import CellConfig
 from physid_drake.diagnose import Case, Diagnosis, Evidence, case_of, diagnose
+from physid_drake.diagnose.estimates import correlation_of
 from physid_drake.diagnose.fit import Fitted
 from physid_drake.diagnose.memory import Memory
 from physid_drake.effects import effect_named
 from physid_drake.errors import ConfigError
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.identify.rollouts import simulate
-from physid_drake.model import Model
+from physid_drake.model import Correlation, Model
 from physid_drake.recording import Recording, read_recording
 from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
 from physid_drake.report.diagnosis_page import ShownPush, diagnosis_page
@@ -206,13 +207,15 @@ def _predicted(fitted: Fitted, i: int, recorded: np.ndarray) -> np.ndarray:
 def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
     """The model that leaves: with the effects if they were found, else plain."""
     case = evidence.case
-    state = evidence.final.state if diagnosis.effects else evidence.plain.state
-    spec = case.pool.spec
+    fitted = evidence.final if diagnosis.effects else evidence.plain
+    state, spec = fitted.state, case.pool.spec
     intervals: dict[str, object] = {
         f"theta.{name}": list(t.ci90) for name, t in diagnosis.theta.items() if t.ci90 is not None
     }
     for effect in diagnosis.effects:
         intervals |= {f"{effect.name}.{name}": p.ci90 for name, p in effect.parameters.items()}
+    names, matrix = correlation_of(case, fitted)
+    kept = [k for k, name in enumerate(names) if name in intervals]
     return Model(
         recording=case.recording.name,
         shape=spec.shape,
@@ -222,4 +225,5 @@ def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
         body=case.thetas.body(np.asarray(case.thetas.space.from_unit(state.u))),
         effects=tuple(e.effect(case) for e in state.effects) if diagnosis.effects else (),
         intervals=intervals,
+        correlation=Correlation.of([names[k] for k in kept], matrix[np.ix_(kept, kept)]),
     )

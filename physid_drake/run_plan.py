@@ -13,6 +13,7 @@ import numpy as np
 from rich.console import Console
 
 from physid_drake.errors import ConfigError
+from physid_drake.identify.polish import scatter_freedom
 from physid_drake.model import Model, load_model
 from physid_drake.plan import DistanceToGoal, Plan, Situation, plan
 from physid_drake.plan.draws import uncertain_names
@@ -34,10 +35,12 @@ class Learnt:
 
     Attributes:
         friction_scatter: of support friction from push to push [-].
+        scatter_freedom: degrees of freedom with which it is known.
         pushes: in its recording.
     """
 
     friction_scatter: float = 0.0
+    scatter_freedom: float = math.inf
     pushes: int = 0
 
 
@@ -65,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
             rng=np.random.default_rng(_seed(arguments.seed)),
             budget=BUDGETS[policy.space.dimension] if arguments.budget is None else arguments.budget,
             search=arguments.search, draws=arguments.draws, risk=arguments.risk, tolerance=arguments.tolerance,
-            friction_scatter=learnt.friction_scatter, tick=tick,
+            friction_scatter=learnt.friction_scatter, scatter_freedom=learnt.scatter_freedom, tick=tick,
         )  # fmt: skip
     with_effects = outcome_under(made, full) if arguments.plain and full.effects else None
     folder = RunFolder.open(
@@ -134,16 +137,17 @@ def _learnt(folder: Path) -> Learnt:
         try:
             content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
             scatter = float(content["friction_scatter"])
-            pushes = (
-                len(content["fit"]["per_push"]) if name == "diagnosis.json"
-                else len(content["held_out"]["pushes"]) + len(content["training"]["pushes"])
-            )  # fmt: skip
+            if name == "diagnosis.json":
+                fitted = pushes = len(content["fit"]["per_push"])
+            else:
+                fitted = len(content["training"]["pushes"])
+                pushes = fitted + len(content["held_out"]["pushes"])
         except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError) as error:
             text = " ".join(str(error).split())
             raise ConfigError(f"'{file}': cannot be read: {type(error).__name__}: {text}.") from error
         if not 0.0 <= scatter < 1.0:
             raise ConfigError(f"'{file}': friction_scatter must be in [0, 1), but is {scatter:g}.")
-        return Learnt(friction_scatter=scatter, pushes=pushes)
+        return Learnt(friction_scatter=scatter, scatter_freedom=scatter_freedom(fitted), pushes=pushes)
     return Learnt()
 
 

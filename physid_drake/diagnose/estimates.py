@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 Tick = Callable[[str, int, int], None]
 
 SAMPLES = 400  # of an effect's chart, for the intervals of its parameters
+JOINT_SAMPLES = 2000  # of theta and all charts, for how the estimates vary together
 IDENTIFIABLE = 0.5  # posterior over prior standard deviation
 
 
@@ -70,12 +71,15 @@ def _plain(value: Any) -> Any:
     return [list(row) for row in value] if isinstance(value, tuple) else value
 
 
+def _turned(effect: Effect, values: Sequence[Any]) -> Array:
+    """Draws of an axis, turned to within a quarter turn of the value [rad]."""
+    here = float(effect.angle)  # type: ignore[attr-defined]
+    return np.asarray(here + (np.asarray(values) - here + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
+
+
 def _interval(effect: Effect, name: str, values: Sequence[Any]) -> Any:
     if name == "angle":
-        # An axis: the draws are turned to within a quarter turn of the value.
-        here = float(getattr(effect, name))
-        turned = here + (np.asarray(values) - here + 0.5 * math.pi) % math.pi - 0.5 * math.pi
-        return [float(q) for q in np.quantile(turned, [0.05, 0.95])]
+        return [float(q) for q in np.quantile(_turned(effect, values), [0.05, 0.95])]
     low, high = np.quantile(np.asarray(values, dtype=np.float64), [0.05, 0.95], axis=0)
     return [low.tolist(), high.tolist()]
 
@@ -105,6 +109,33 @@ def theta_of(evidence: Evidence, fitted: Fitted) -> dict[str, ThetaEstimate]:
             before=float(before[j]),
         )
     return result
+
+
+def correlation_of(case: Case, fitted: Fitted) -> tuple[tuple[str, ...], Array]:
+    """How the estimates of a model vary together, by drawing theta and the effects' chart points.
+
+    Returns:
+        Names, ``theta.<name>`` and ``<effect>.<parameter>``, of what is one number and varies; and the correlation
+        (n, n) of their normal scores, which does not depend on the coordinates.
+    """
+    state, rng = fitted.state, np.random.default_rng(0)
+    count = fitted.own_dimension
+    covariance = shared_covariance(fitted)[:count, :count]
+    moves = rng.multivariate_normal(np.zeros(count), covariance, JOINT_SAMPLES, method="eigh") * _t_factor(fitted)
+    names = case.thetas.space.names
+    drawn: dict[str, Array] = {f"theta.{name}": moves[:, j] for j, name in enumerate(names)}
+    at = len(names)
+    for point in state.effects:
+        here = point.effect(case)
+        effects = [point.moved(case, move).effect(case) for move in moves[:, at : at + len(point.free)]]
+        at += len(point.free)
+        for name in here.units():
+            if isinstance(getattr(here, name), float):
+                values = [getattr(effect, name) for effect in effects]
+                drawn[f"{here.name}.{name}"] = _turned(here, values) if name == "angle" else np.array(values)
+    varying = {name: values for name, values in drawn.items() if np.ptp(values) > 0.0}
+    scores = [stats.norm.ppf((stats.rankdata(v) - 0.5) / len(v)) for v in varying.values()]
+    return tuple(varying), np.atleast_2d(np.corrcoef(scores)) if scores else np.zeros((0, 0))
 
 
 def smallest(evidence: Evidence, alpha: float) -> tuple[Detectable, ...]:

@@ -279,8 +279,7 @@ def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
     S. L. Zeger, Biometrika 73, 1986 (the sandwich over clusters).
     """
     space = thetas.space
-    information = polished.jacobian.T @ polished.jacobian
-    covariance = np.linalg.inv(information)
+    covariance = polished.covariance
     prior_rows = polished.jacobian[-space.dimension :]
     prior_spread = np.sqrt(np.diag(np.linalg.inv(prior_rows.T @ prior_rows)))
     curvature = np.sqrt(np.diag(covariance))

@@ -55,6 +55,25 @@ class Polished:
     unknowns: tuple[dict[str, float], ...]
     rollouts: int
 
+    @property
+    def covariance(self) -> Array:
+        """Of theta (d, d) in the unit cube, from the cost's curvature."""
+        return np.asarray(np.linalg.inv(self.jacobian.T @ self.jacobian))
+
+    @property
+    def correlation(self) -> Array:
+        """Of theta (d, d), each entry on its parameter's scale, from the cost's curvature.
+
+        Not from the pushes' disagreement, which widens the intervals: of few pushes it tells no correlation.
+        """
+        stds = np.sqrt(np.diag(self.covariance))
+        return np.asarray(self.covariance / np.outer(stds, stds))
+
+
+def scatter_freedom(pushes: int) -> float:
+    """Degrees of freedom with which so many pushes tell friction's scatter: theirs and those of the first guess."""
+    return SCATTER_WEIGHT + (pushes if pushes >= SCATTER_PUSHES else 0)
+
 
 class Polisher:
     """Alternates: linearise the pushes' own unknowns, then fit theta with them marginalised."""

@@ -1,4 +1,4 @@
-"""Models drawn from what is believed about one: its 90 % intervals, and friction's scatter from push to push."""
+"""How a push may go: a model's estimates, this push's friction and the object's start, drawn from the belief."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from physid_drake.cell import Body
 from physid_drake.errors import ConfigError
 from physid_drake.identify.theta import friction_names
 from physid_drake.model import Model
+from physid_drake.plan.trajectory import Situation
 
 Array = NDArray[np.float64]
 
@@ -35,26 +36,70 @@ def uncertain_names(model: Model) -> list[str]:
     return names
 
 
-def draw_models(
-    model: Model, count: int, rng: np.random.Generator, *, friction_scatter: float = 0.0
-) -> tuple[Model, ...]:
-    """Models from the belief that the intervals are: independent normals, log-normal where a value is positive.
+@dc.dataclass(frozen=True, kw_only=True)
+class Draw:
+    """One way in which a push may go.
+
+    Attributes:
+        model: with this push's friction in it.
+        situation: with where the object really starts.
+    """
+
+    model: Model
+    situation: Situation
+
+
+def draws_of(
+    model: Model,
+    situation: Situation,
+    count: int,
+    rng: np.random.Generator,
+    *,
+    friction_scatter: float = 0.0,
+    scatter_freedom: float = math.inf,
+) -> tuple[Draw, ...]:
+    """Draws from the belief that intervals, correlation and scatter are.
+
+    Each estimate is normal, log-normal where it is positive, with its interval; a Gaussian copula ties them.
+    Estimates that the model's correlation does not hold are independent. Friction's departure in this push is
+    Student's: normal, with a variance that a few pushes have told.
 
     Args:
         model: with its intervals.
+        situation: where the object is seen, and how well.
         count: how many.
         rng: scrambles a Sobol sequence, so that few draws cover the belief evenly.
         friction_scatter: standard deviation of one push's support friction over that of theta [-].
+        scatter_freedom: degrees of freedom with which the scatter is known; infinite if it is exact.
 
     Raises:
         ConfigError: if an interval is not two numbers or names what the model has not.
+
+    Source: A. Gelman et al., Bayesian Data Analysis, 3rd ed., 2013, section 3.2 (Student's predictive).
     """
     names = uncertain_names(model)
-    if count < 1 or (not names and friction_scatter == 0.0):
-        return (model,) * max(0, count)
-    sobol = qmc.Sobol(len(names) + 1, scramble=True, seed=rng).random_base2(max(1, math.ceil(math.log2(count))))
-    scores = np.clip(stats.norm.ppf(np.clip(sobol[:count], 1e-6, 1.0 - 1e-6)), -FURTHEST, FURTHEST)
-    return tuple(_moved(model, dict(zip(names, row[:-1], strict=True)), friction_scatter * row[-1]) for row in scores)
+    if count < 1:
+        return ()
+    sobol = qmc.Sobol(len(names) + 4, scramble=True, seed=rng).random_base2(max(1, math.ceil(math.log2(count))))
+    scores = stats.norm.ppf(np.clip(sobol[:count], 1e-6, 1.0 - 1e-6))
+    tied = np.eye(len(names)) if model.correlation is None else model.correlation.among(names)
+    estimates = np.clip(scores[:, :-4] @ _root(tied), -FURTHEST, FURTHEST)
+    own = np.clip(scores[:, -4:], -FURTHEST, FURTHEST)
+    departures = friction_scatter * stats.t.ppf(stats.norm.cdf(own[:, 0]), scatter_freedom)
+    starts = np.array(situation.start) + own[:, 1:] * situation.start_std
+    return tuple(
+        Draw(
+            model=_moved(model, dict(zip(names, row, strict=True)), float(departure)),
+            situation=dc.replace(situation, start=(float(x), float(y), float(yaw))),
+        )
+        for row, departure, (x, y, yaw) in zip(estimates, departures, starts, strict=True)
+    )
+
+
+def _root(correlation: Array) -> Array:
+    """The symmetric root (n, n) of a correlation, which need not be regular."""
+    values, vectors = np.linalg.eigh(correlation)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
 
 
 def _interval(name: str, interval: Any) -> tuple[float, float] | None:

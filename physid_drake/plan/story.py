@@ -14,9 +14,9 @@ from physid_drake.belief import Belief
 from physid_drake.errors import ConfigError
 from physid_drake.model import Model
 from physid_drake.plan.costs import Cost, cost_of, loss_of
-from physid_drake.plan.draws import draw_models, uncertain_names
-from physid_drake.plan.trajectory import Ending, Situation, Trajectory, hand_radius_of, trajectory_of
-from physid_drake.policies import Policy
+from physid_drake.plan.draws import Draw, draws_of, uncertain_names
+from physid_drake.plan.trajectory import Ending, Situation, Trajectory, hand_radius_of, path_of, trajectory_of
+from physid_drake.policies import PlannedPush, Policy
 from physid_drake.search import SearchResult, search_minimum, search_named
 
 Array = NDArray[np.float64]
@@ -138,6 +138,7 @@ def plan(
     sweep: int = 16,
     tolerance: float = TOLERANCE,
     friction_scatter: float = 0.0,
+    scatter_freedom: float = math.inf,
     tick: Tick | None = None,
 ) -> Plan:
     """Search a policy's settings for the least cost.
@@ -158,6 +159,7 @@ def plan(
         sweep: settings of the sweep; 0 for none.
         tolerance: cost up to which an end counts as a success [m].
         friction_scatter: of support friction from push to push [-], drawn along.
+        scatter_freedom: degrees of freedom with which the scatter is known; infinite if it is exact.
         tick: told stage, steps done and steps in all.
 
     Raises:
@@ -169,12 +171,14 @@ def plan(
     _check(budget, draws, sweep, tolerance, search)
     hand_radius_of(model)
     streams = [np.random.default_rng(s) for s in rng.integers(2**63, size=3)]
-    models: tuple[Model, ...] = ()
-    if draws and (uncertain_names(model) or friction_scatter > 0.0):
-        models = draw_models(model, draws, streams[0], friction_scatter=friction_scatter)
-    if risk and not models:
+    drawn: tuple[Draw, ...] = ()
+    if uncertain_names(model) or friction_scatter > 0.0 or any(situation.start_std):
+        drawn = draws_of(
+            model, situation, draws, streams[0], friction_scatter=friction_scatter, scatter_freedom=scatter_freedom
+        )
+    if risk and not drawn:
         raise ConfigError("plan: the mean over the belief needs draws, and a model with intervals to draw from.")
-    story = _Story(model, models, policy, cost, situation, tick or (lambda stage, done, total: None))
+    story = _Story(model, drawn, policy, cost, situation, tick or (lambda stage, done, total: None))
     objective = story.mean_costs if risk else story.likely_costs
     found = search_minimum(
         objective, policy.space, policy.space.sample(streams[1], CANDIDATES, from_prior=False),
@@ -189,8 +193,30 @@ def plan(
     return Plan(
         model=model, policy=policy, cost_function=cost, situation=situation, tolerance=tolerance, settings=best,
         predicted=predicted, cost=cost_of(cost, predicted, model.table), loss=story.loss,
-        spread=story.spread(best) if models else None, sweep=rows, search=found, risk=risk,
+        spread=story.spread(best) if drawn else None, sweep=rows, search=found, risk=risk,
     )  # fmt: skip
+
+
+def spread_of(
+    draws: Sequence[Draw], pushes: tuple[PlannedPush, ...], cost: Cost, *, model: Model, situation: Situation
+) -> Spread:
+    """What draws from the belief say of pushes: the hand aims at where the object is seen.
+
+    Args:
+        draws: at least one.
+        pushes: made one after the other.
+        cost: of the end.
+        model: that the pushes are made for.
+        situation: where the object is seen.
+    """
+    path = path_of(model, pushes[0], situation.start)
+    trajectories = [trajectory_of(d.model, pushes, d.situation, path=path) for d in draws]
+    costs, loss = [cost_of(cost, t, model.table) for t in trajectories], loss_of(cost, model.table)
+    return Spread(
+        costs=np.array([c if math.isfinite(c) else loss for c in costs]),
+        ends=np.array([t.end for t in trajectories]),
+        endings=tuple(t.ending for t in trajectories),
+    )
 
 
 def outcome_under(made: Plan, model: Model) -> tuple[Trajectory, float]:
@@ -223,9 +249,9 @@ class _Story:
     """The rollouts of one plan."""
 
     def __init__(
-        self, model: Model, models: Sequence[Model], policy: Policy, cost: Cost, situation: Situation, tick: Tick
+        self, model: Model, draws: Sequence[Draw], policy: Policy, cost: Cost, situation: Situation, tick: Tick
     ) -> None:
-        self._model, self._models, self._policy = model, models, policy
+        self._model, self._draws, self._policy = model, draws, policy
         self._cost, self._situation, self._tick = cost, situation, tick
         self.loss = loss_of(cost, model.table)
 
@@ -241,13 +267,8 @@ class _Story:
         return np.array([self.spread(s).mean for s in settings])
 
     def spread(self, settings: Array) -> Spread:
-        trajectories = [self.trajectory(m, settings) for m in self._models]
-        costs = [cost_of(self._cost, t, self._model.table) for t in trajectories]
-        return Spread(
-            costs=np.array([c if math.isfinite(c) else self.loss for c in costs]),
-            ends=np.array([t.end for t in trajectories]),
-            endings=tuple(t.ending for t in trajectories),
-        )
+        pushes = self._policy.pushes(settings)
+        return spread_of(self._draws, pushes, self._cost, model=self._model, situation=self._situation)
 
     def sweep(self, best: Array, count: int) -> tuple[SweepRow, ...]:
         """Costs along the swept setting, evenly over its bounds, the others at their best."""
@@ -264,7 +285,7 @@ class _Story:
                     value=value,
                     cost=cost_of(self._cost, trajectory, self._model.table),
                     ending=trajectory.ending,
-                    spread=self.spread(settings) if self._models else None,
+                    spread=self.spread(settings) if self._draws else None,
                 )
             )
         return tuple(rows)

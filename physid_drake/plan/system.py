@@ -12,9 +12,10 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
 from physid_drake.identify import Identification
+from physid_drake.identify.polish import scatter_freedom
 from physid_drake.identify.problem import CellSpec, PushProblem
 from physid_drake.identify.system import PUSH_PERIOD
-from physid_drake.model import Model
+from physid_drake.model import Correlation, Model
 from physid_drake.plan.config import PlanConfig
 from physid_drake.plan.costs import DistanceToGoal
 from physid_drake.plan.robot import Robot
@@ -166,7 +167,8 @@ class Planner:
             model, policy_for(self.config.policy, model, self.situation.start, self.goal),
             DistanceToGoal(goal=self.goal), situation=self.situation, rng=np.random.default_rng(stream),
             budget=self.config.budget, draws=self.config.draws, sweep=self.config.sweep,
-            tolerance=self.config.tolerance_m, friction_scatter=result.polished.friction_scatter, tick=tick,
+            tolerance=self.config.tolerance_m, friction_scatter=result.polished.friction_scatter,
+            scatter_freedom=scatter_freedom(len(result.polished.residuals)), tick=tick,
         )  # fmt: skip
 
 
@@ -189,20 +191,24 @@ def planner_of(config: PlanConfig, spec: CellSpec, problems: Sequence[PushProble
         start = (config.start_m[0], config.start_m[1], math.radians(config.start_deg))
     goal = (config.goal_m[0], config.goal_m[1]) if config.goal_m else default_goal(start, spec.table)
     check_task(start, goal, spec.table)
-    situation = Situation(start=start, order=len(problems), hand_height=first.hand_height)
+    x, y, yaw = first.start_std[:3].tolist()  # as well as the recording's tracker sees an object at rest
+    situation = Situation(
+        start=start, order=len(problems), hand_height=first.hand_height, start_std=(x, y, yaw)
+    )  # fmt: skip
     return Planner(config=config, spec=spec, situation=situation, goal=goal, name=name, seed=seed)
 
 
 def identified_model(result: Identification, spec: CellSpec, name: str) -> Model:
-    """The plain cell with the identified theta and its intervals.
+    """The plain cell with the identified theta, its intervals and how they vary together.
 
     Args:
         result: the identification.
         spec: of the cell it was made with.
         name: of the recording.
     """
+    intervals = {f"theta.{e.name}": list(e.ci90) for e in result.estimates}
     return Model(
         recording=name, shape=spec.shape, hand_radius=spec.hand_radius, table=spec.table, config=spec.config,
-        body=result.thetas.body(result.theta),
-        intervals={f"theta.{e.name}": list(e.ci90) for e in result.estimates},
+        body=result.thetas.body(result.theta), intervals=intervals,
+        correlation=Correlation.of(tuple(intervals), result.polished.correlation),
     )  # fmt: skip

@@ -76,11 +76,13 @@ class Situation:
         start: x, y [m], yaw [rad] of the object, as the tracker reports it.
         order: number of the next push since the recording began, for physics that changes from push to push.
         hand_height: of the tip's centre above the table [m]; None for half the object's height.
+        start_std: standard deviation of where the object stands about ``start`` [m, m, rad].
     """
 
     start: Pose
     order: int = 0
     hand_height: float | None = None
+    start_std: Pose = (0.0, 0.0, 0.0)
 
 
 @cache

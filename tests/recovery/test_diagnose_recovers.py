@@ -15,6 +15,8 @@ from physid_drake.diagnose import case_of, diagnose
 from physid_drake.diagnose.memory import Memory
 from physid_drake.errors import RecordingError
 from physid_drake.identify.config import ThetaConfig
+from physid_drake.plan import Situation
+from physid_drake.plan.draws import draws_of
 from physid_drake.recording import Sensors
 from physid_drake.report.diagnosis import diagnosis_json
 from physid_drake.run_diagnose import model_of, show
@@ -69,7 +71,15 @@ def test_the_model_that_leaves_predicts_what_the_diagnosis_says(tilted, tmp_path
     file = tmp_path / "model.yaml"
     file.write_text(model.dump(), encoding="utf-8")
     loaded = load_model(file)
-    assert loaded.effects == model.effects
+    assert loaded.effects == model.effects and loaded.correlation == model.correlation
+    assert {name for name, interval in model.intervals.items() if interval} == set(model.correlation.names)
+    draws = draws_of(loaded, Situation(start=(0.0, 0.0, 0.0)), 128, np.random.default_rng(0))
+    names = model.correlation.names
+    i, j = names.index("theta.support_friction"), names.index("theta.hand_friction")
+    drawn = np.corrcoef(
+        [np.log(d.model.body.support_friction[0]) for d in draws], [np.log(d.model.body.hand_friction) for d in draws]
+    )
+    assert drawn[0, 1] == pytest.approx(model.correlation.matrix[i][j], abs=0.1)
     problem = made.problems[0]
     run = {"start": problem.start, "path": problem.path, "begin": problem.begin, "end": problem.end,
            "hand_height": problem.hand_height}  # fmt: skip

@@ -126,6 +126,18 @@ def test_pushes_that_feel_only_the_sum_tell_one_combination_with_its_singular_va
     assert len(told.not_apart) == 4
 
 
+def test_mass_and_friction_of_which_a_force_tells_the_product_vary_against_one_another():
+    thetas = tied((1, 1), "mass", "support_friction")
+    strength = 30.0
+    a, b = strength * np.log(thetas.space.upper / thetas.space.lower)  # of ln m + ln mu, in the unit cube
+    flat = 12.0  # information of a uniform prior there
+    polished = fit(thetas, [strength, strength])
+    rho = -a * b / np.sqrt((a**2 + flat) * (b**2 + flat))
+    np.testing.assert_allclose(polished.correlation, [[1.0, rho], [rho, 1.0]], rtol=1e-6)
+    std = np.sqrt((b**2 + flat) / ((a**2 + flat) * (b**2 + flat) - (a * b) ** 2))
+    assert np.sqrt(polished.covariance[0, 0]) == pytest.approx(std) and rho < -0.95
+
+
 def test_what_is_told_does_not_depend_on_the_order_of_what_else_is_unknown():
     """An unknown that the pushes cannot tell from a combination of cells takes that combination away."""
     thetas = tied((2, 1), "mass", "support_friction")

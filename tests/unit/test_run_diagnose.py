@@ -1,5 +1,7 @@
 """The ``diagnose`` command's refusals, and models that cannot be read: one clear line, nothing half-written."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import yaml
@@ -11,8 +13,10 @@ from physid_drake.diagnose.memory import Memory
 from physid_drake.effects.body import UnevenSupport
 from physid_drake.effects.forces import ViscousDrag
 from physid_drake.errors import ConfigError
-from physid_drake.model import Model
+from physid_drake.model import Correlation, Model
 from physid_drake.recording import Prism
+
+DRAG = "viscous_drag.coefficient"
 
 
 @pytest.mark.parametrize(
@@ -66,9 +70,31 @@ def test_a_model_survives_its_file(model, tmp_path):
     assert loaded.plain().effects == ()
 
 
+def test_how_estimates_vary_together_survives_the_file_and_may_be_absent(model, tmp_path):
+    file = tmp_path / "model.yaml"
+    names = ("theta.mass", "viscous_drag.coefficient")
+    correlation = Correlation.of(names, np.array([[1.0, -1.0 / 3.0], [-1.0 / 3.0, 1.0]]))
+    told = replace(model, intervals={**model.intervals, "theta.mass": [0.1, 0.3]}, correlation=correlation)
+    file.write_text(told.dump(), encoding="utf-8")
+    assert load_model(file).correlation == correlation
+    file.write_text(model.dump(), encoding="utf-8")
+    assert "correlation" not in file.read_text() and load_model(file).correlation is None
+
+
+def test_what_a_correlation_does_not_hold_is_independent():
+    correlation = Correlation.of(("a", "b"), np.array([[1.0, 0.5], [0.5, 1.0]]))
+    np.testing.assert_array_equal(correlation.among(["b", "c", "a"]), [[1, 0, 0.5], [0, 1, 0], [0.5, 0, 1]])
+
+
 @pytest.mark.parametrize(
     ("change", "named"),
     [
+        ({"correlation": {"names": ["theta.colour"], "matrix": [[1.0]]}}, "theta.colour"),
+        ({"correlation": {"names": [DRAG, DRAG], "matrix": [[1.0, 0.0], [0.0, 1.0]]}}, "unique"),
+        ({"correlation": {"names": [DRAG], "matrix": [[1.0, 0.0]]}}, "1 rows"),
+        ({"correlation": {"names": [DRAG], "matrix": [[0.5]]}}, "diagonal"),
+        ({"correlation": {"names": [DRAG], "matrix": [["x"]]}}, "x"),
+        ({"correlation": 3}, "model"),
         ({"format": "physid-model/0"}, "physid-model/1"),
         ({"effects": [{"name": "phlogiston", "parameters": {}}]}, "phlogiston"),
         ({"effects": [{"name": "viscous_drag", "parameters": {"colour": 1.0}}]}, "colour"),

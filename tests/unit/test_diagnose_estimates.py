@@ -1,0 +1,54 @@
+"""How a diagnosis' estimates vary together, from a fit made by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from physid_drake.diagnose.estimates import correlation_of
+from physid_drake.diagnose.fit import EffectPoint
+from physid_drake.effects import Surroundings
+from physid_drake.effects.body import UnevenSupport
+from physid_drake.effects.forces import TableTilt
+
+AROUND = Surroundings(
+    mass=0.2, friction=0.3, size=np.array([0.12, 0.05]), height=0.03, region=np.array([[-0.5, -0.5], [0.5, 0.5]]),
+    top_speed=0.5, pushes=10, has_hand=True, rolls=False, interval=0.01,
+)  # fmt: skip
+CASE = SimpleNamespace(thetas=SimpleNamespace(space=SimpleNamespace(names=("support_friction",))), around=AROUND)
+
+
+def fitted(*points, covariance):
+    """A fit with one unknown of theta, these effects, and a tolerance that is none of the estimates."""
+    count = 1 + sum(len(p.free) for p in points)
+    precision = np.zeros((count + 1, count + 1))
+    precision[:count, :count], precision[count, count] = np.linalg.inv(covariance), 1.0
+    return SimpleNamespace(
+        state=SimpleNamespace(u=np.array([0.5]), effects=points), own_dimension=count, reduced_chi2=1.0,
+        solution=SimpleNamespace(precision=precision), pushes=range(10),
+    )  # fmt: skip
+
+
+def point(kind, free):
+    zeros = np.zeros(len(kind.chart(AROUND)))
+    return EffectPoint(kind=kind, point=zeros, free=free, origin=zeros)
+
+
+def test_theta_and_an_effect_whose_chart_is_its_parameters_vary_as_the_fit_says():
+    stds = np.array([0.02, 0.003, 0.004])
+    wanted = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, -0.3], [0.0, -0.3, 1.0]])
+    names, found = correlation_of(
+        CASE, fitted(point(TableTilt, (0, 1)), covariance=wanted * np.outer(stds, stds))
+    )  # fmt: skip
+    assert names == ("theta.support_friction", "table_tilt.x", "table_tilt.y")
+    np.testing.assert_allclose(found, wanted, atol=3.0 / np.sqrt(2000))
+    assert found[0, 1] == pytest.approx(0.9, abs=0.015)
+
+
+def test_what_does_not_vary_or_is_no_single_number_is_left_out():
+    names, found = correlation_of(CASE, fitted(point(TableTilt, (0,)), covariance=1e-4 * np.eye(2)))
+    assert names == ("theta.support_friction", "table_tilt.x") and found.shape == (2, 2)
+    support = point(UnevenSupport, (0,))
+    names, found = correlation_of(CASE, fitted(support, covariance=1e-4 * np.eye(2)))
+    assert names == ("theta.support_friction",)
+    np.testing.assert_allclose(found, 1.0)
