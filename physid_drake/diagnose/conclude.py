@@ -81,7 +81,7 @@ def _verdict(evidence: Evidence, p_value: float, alpha: float, detectable: Seque
     if p_value >= alpha:
         blind = float(np.median([d.sigmas for d in detectable])) > VISIBLE if detectable else True
         return "underpowered" if blind else "consistent"
-    if not evidence.steps or unexplained(evidence.plain, evidence.final):
+    if not evidence.steps or unexplained(evidence.plain, evidence.final, noise_known=evidence.case.noise.known):
         return "unexplained"
     return "ambiguous" if any(class_of(evidence.plain, step) for step in evidence.steps) else "explained"
 

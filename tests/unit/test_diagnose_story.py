@@ -106,3 +106,9 @@ def test_a_plain_fit_in_a_wrong_basin_is_left_if_an_effect_leads_out_of_it():
 def test_a_large_effect_may_leave_what_two_honest_laws_of_it_differ_by(before, after, left):
     plain, final = SimpleNamespace(reduced_chi2=before), SimpleNamespace(reduced_chi2=after)
     assert unexplained(plain, final) is left
+
+
+def test_where_the_noise_is_not_known_an_effect_must_halve_the_cost():
+    plain = SimpleNamespace(reduced_chi2=0.9)
+    assert unexplained(plain, SimpleNamespace(reduced_chi2=0.6), noise_known=False)
+    assert not unexplained(plain, SimpleNamespace(reduced_chi2=0.3), noise_known=False)
