@@ -13,7 +13,7 @@ from scipy import stats
 from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.confirm import EXPLAINED, Candidate, push_scores, rivals, standard_error
 from physid_drake.diagnose.estimates import parameters_of, rms, smallest, theta_of
-from physid_drake.diagnose.evidence import Evidence, mismatch, unexplained
+from physid_drake.diagnose.evidence import Evidence, mismatch, predicts_better, unexplained
 from physid_drake.diagnose.fit import Fitted
 from physid_drake.diagnose.linear import left_out_scores
 from physid_drake.diagnose.localise import locate
@@ -81,9 +81,24 @@ def _verdict(evidence: Evidence, p_value: float, alpha: float, detectable: Seque
     if p_value >= alpha:
         blind = float(np.median([d.sigmas for d in detectable])) > VISIBLE if detectable else True
         return "underpowered" if blind else "consistent"
-    if not evidence.steps or unexplained(evidence.plain, evidence.final, noise_known=evidence.case.noise.known):
+    if not evidence.steps or not _explained(evidence):
         return "unexplained"
     return "ambiguous" if any(class_of(evidence.plain, step) for step in evidence.steps) else "explained"
+
+
+def _explained(evidence: Evidence) -> bool:
+    """Whether the last model accounts for the pushes."""
+    if evidence.case.noise.known:
+        return not unexplained(evidence.plain, evidence.final)
+    # The noise was taken to be what the plain cell leaves: only what is left of left-out pushes' errors speaks.
+    before, after = (_left_out_rms(evidence.case, fitted) for fitted in (evidence.plain, evidence.final))
+    return predicts_better(before, after)
+
+
+def _left_out_rms(case: Case, fitted: Fitted) -> float:
+    """Root mean square of the poses' errors of pushes that are left out, in standard deviations."""
+    _, residuals = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std)
+    return rms(np.concatenate([f.poses(r) / f.sigmas for f, r in zip(case.features, residuals, strict=True)]))
 
 
 def _location(evidence: Evidence, verdict: str, findings: Sequence[EffectFinding], seed: int) -> Location | None:

@@ -26,7 +26,7 @@ NOISE_LIKE = 0.2  # as the cell leaves where nothing is missing
 MOST_SHARE = 0.25  # of what the plain cell leaves: an effect that takes away less explains something else
 MOST_LEFT = 0.5  # where little was left before, and at most
 EVER_LEFT = 2.0  # where much was, since
-MOST_OF_UNKNOWN = 0.5  # of the plain cell's cost, where that is all that tells the noise
+MOST_OF_UNKNOWN = 0.5  # of the mean square of left-out errors, where the noise is not known
 LAW_ERROR = 0.1  # of an effect's motion is what two honest implementations of a spring or a liquid differ by
 
 
@@ -74,13 +74,18 @@ def mismatch(fitted: Fitted, screening: Screening | None) -> float:
     return float(-np.expm1(2.0 * np.log1p(-min(best, 1.0 - 1e-16))))
 
 
-def unexplained(plain: Fitted, final: Fitted, *, noise_known: bool = True) -> bool:
-    """Whether a model leaves more than noise, the cell's error and what two honest laws of an effect differ by.
-
-    Where the noise is not known it was taken to be what the plain cell leaves, and only the ratio speaks.
-    """
-    if not noise_known:
-        return final.reduced_chi2 > MOST_OF_UNKNOWN * plain.reduced_chi2
+def unexplained(plain: Fitted, final: Fitted) -> bool:
+    """Whether a model leaves more than noise, the cell's error and what two honest laws of an effect differ by."""
     before, left = plain.reduced_chi2 - 1.0, final.reduced_chi2 - 1.0
     most = min(MOST_LEFT + LAW_ERROR**2 * max(0.0, before), EVER_LEFT)
     return left > most or left > max(NOISE_LIKE, MOST_SHARE * before)
+
+
+def predicts_better(before: float, after: float) -> bool:
+    """Whether left-out pushes show that a model explains a recording whose noise is not known.
+
+    Args:
+        before: root mean square of their errors with the plain cell.
+        after: with the model.
+    """
+    return after**2 <= MOST_OF_UNKNOWN * before**2
