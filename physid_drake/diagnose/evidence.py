@@ -21,13 +21,13 @@ Tick = Callable[[str, int, int], None]
 
 # The cell's own error that guard, floor and tolerances leave: cost per degree of freedom where nothing is missing.
 SLACK = 1.15
-# Cost per degree of freedom beyond noise that a model with effects may leave.
-NOISE_LIKE = 0.2  # as the cell leaves where nothing is missing
-MOST_SHARE = 0.25  # of what the plain cell leaves: an effect that takes away less explains something else
-MOST_LEFT = 0.5  # where little was left before, and at most
-EVER_LEFT = 2.0  # where much was, since
+# What a model with effects may leave, as cost per degree of freedom above 1:
+NOISE_LIKE = 0.2  # always, as the cell leaves where nothing is missing
+MOST_SHARE = 0.25  # of what the plain cell leaves: an effect that leaves more explains something else
+MOST_LEFT = 0.5  # beside what two laws of one effect differ by
+EVER_LEFT = 2.0  # in all
+LAW_ERROR = 0.1  # of an effect's motion: two honest implementations of a spring or a liquid differ by that much
 MOST_OF_UNKNOWN = 0.5  # of the mean square of left-out errors, where the noise is not known
-LAW_ERROR = 0.1  # of an effect's motion is what two honest implementations of a spring or a liquid differ by
 
 
 @dc.dataclass(frozen=True, kw_only=True)
