@@ -43,6 +43,10 @@ PAUSE = 0.4  # s between two pushes
 LONGEST = 60.0  # s of the whole animation; longer recordings are shown faster
 PLAIN_TABLE = (1.20, 0.80)  # m: the shipped model with its legs and robots
 
+# Drake aborts the process where a Meshcat is destroyed by another thread than the one that made it. A diagram is a
+# cycle of references, and Python collects cycles in any thread (that of a pool of processes, say): none is destroyed.
+_kept: list[Meshcat] = []
+
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
@@ -63,6 +67,8 @@ class Stage:
             meshcat: a running one; None starts one that serves on a free port.
         """
         self.meshcat = meshcat or Meshcat(MeshcatParams(show_stats_plot=False))
+        if self.meshcat not in _kept:
+            _kept.append(self.meshcat)
         self._recording = recording
         self._solid: Solid = solid_of(recording.object.shape)
         builder = DiagramBuilder()

@@ -1,5 +1,8 @@
 """What is put on Meshcat's stage."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -32,3 +35,18 @@ def test_every_missing_wrench_is_an_arrow(stage):
 def test_a_wrench_stands_out_beyond_two_standard_deviations():
     assert missing(0.25, 0.0, 0.1).stands_out and missing(0.0, -0.25, 0.1).stands_out
     assert not missing(0.19, 0.19, 0.1).stands_out
+
+
+def test_a_stage_that_another_thread_collects_does_not_end_the_process():
+    code = """
+import gc, threading
+from physid_drake.recording import read_recording
+from physid_drake.report.stage import Stage
+from physid_drake.resources import shipped
+Stage(read_recording(shipped("recordings") / "eraser_reference"))
+thread = threading.Thread(target=gc.collect)
+thread.start()
+thread.join()
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
