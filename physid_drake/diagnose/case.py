@@ -29,6 +29,7 @@ Tick = Callable[[str, int, int], None]
 TRAVEL_PER_TICK = 2.5e-4
 PACES = (1.0, 1.5, 2.0, 3.0, 4.0)
 MOST_PUSHES = 24  # more take longer and tell little more
+MOST_ENDPOINTS = 40  # of pushes of which only the ends are known, and which tell less each
 UNIT_SCATTER = 0.025  # of friction, push to push: the columns' unit and the median of its prior
 LEAST_MOTION = 6.0  # standard deviations: an object that moves less in every push does not move
 # A rollout's own error acts like a start that is known no better than this [m, m, rad].
@@ -76,7 +77,7 @@ class Case:
 
 
 def case_of(
-    recording: Recording, config: CellConfig, theta: ThetaConfig, *, jobs: int = 0, most: int = MOST_PUSHES
+    recording: Recording, config: CellConfig, theta: ThetaConfig, *, jobs: int = 0, most: int | None = None
 ) -> Case:
     """Prepare a recording.
 
@@ -85,7 +86,8 @@ def case_of(
         config: of the cell.
         theta: the plain cell's unknowns.
         jobs: processes; 0 takes the machine's cores.
-        most: pushes to look at; of more, so many are taken at equal distances.
+        most: pushes to look at; of more, so many are taken at equal distances. None takes ``MOST_PUSHES``, or
+            ``MOST_ENDPOINTS`` where only the ends of most pushes are known.
 
     Raises:
         RecordingError: if the object never moves, or there is no push.
@@ -93,6 +95,9 @@ def case_of(
     if not recording.pushes:
         raise RecordingError(f"recording '{recording.name}': there is no push to diagnose; record at least three.")
     noise, sensors = tracker_noise(recording)
+    if most is None:
+        ends = sum(push.endpoint_only for push in recording.pushes)
+        most = MOST_ENDPOINTS if 2 * ends > len(recording.pushes) else MOST_PUSHES
     orders = np.unique(
         np.linspace(0, len(recording.pushes) - 1, min(most, len(recording.pushes))).round().astype(int)
     )

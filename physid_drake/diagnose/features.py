@@ -19,7 +19,7 @@ from physid_drake.recording import Push, rest_segments
 Array = NDArray[np.float64]
 
 WINDOWS = 14  # while the object moves
-FORCE_MEMORY = 0.3  # s: over which a force that wanders with the place on the table is the same
+FORCE_MEMORY = 0.03  # m of the hand's way: over which a force that wanders with the place on the table is the same
 # What is left of the cell's own error after the touch: about a constant [m, m, rad].
 FLOOR = np.array([5e-5, 5e-5, 1.0e-3])
 
@@ -92,7 +92,9 @@ def _force_noise(problem: PushProblem, scatter: float) -> Array:
     if not k:
         return np.zeros((0, 0))
     size = float(np.sqrt((problem.forces**2).sum(axis=1).mean())) * scatter
-    gaps = np.abs(problem.force_times[:, None] - problem.force_times[None, :])
+    places = np.zeros((k, 2)) if problem.path is None else problem.path.positions(problem.force_times)
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
+    gaps = np.abs(way[:, None] - way[None, :])
     wandering = size**2 * np.exp(-gaps / FORCE_MEMORY) / np.outer(problem.force_std, problem.force_std)
     block = np.eye(k) + wandering
     zero = np.zeros((k, k))

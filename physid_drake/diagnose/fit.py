@@ -357,7 +357,7 @@ class Fitter:
 
         Args:
             state: where to start.
-            rounds: at most so many steps.
+            rounds: at most so many steps, not fewer than ``careful``.
             careful: in so many first rounds only the shared parameters move, the pushes' unknowns stay at zero and
                 the scatter at its prior's median: far from the answer they would explain anything.
             like: a fitted model whose derivatives for theta and the pushes' unknowns are near enough.
@@ -369,19 +369,22 @@ class Fitter:
         """
         best = self.linearise(state, learn_scatter=careful == 0, like=like)
         like = best if renew else like
-        for k in range(rounds):
+        k = 0
+        while k < rounds:
             if say is not None:
                 say(f"round {k + 1} of at most {rounds}")
             released = k + 1 >= careful
             trial = self._tried(best, cautious=k < careful, released=released)
             gained = actual_cost(best) - actual_cost(trial)
-            if gained <= 0.0 and k + 1 != careful:
-                break
-            if gained < SETTLED and k >= careful:
-                return trial
+            if k + 1 < careful and gained <= 0.0:
+                k = careful - 1  # nothing more to gain with the unknowns at zero
+                continue
+            if k >= careful and gained < SETTLED:
+                return trial if gained > 0.0 else best
             anew = renew and k + 1 < rounds and gained > RENEWED * len(best.pushes)
             best = self.linearise(trial.state, learn_scatter=released, like=None if anew else like, at=trial)
             like = best if anew else like
+            k += 1
         return best
 
     def _tried(self, best: Fitted, *, cautious: bool, released: bool) -> Fitted:

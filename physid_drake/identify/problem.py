@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 FORCE_BIN = 0.1  # s: forces are compared as means over such windows; single samples of a stiff contact chatter
 FORCE_SHARE = 0.05  # of the force: how well a rigid-body contact force is expected to be predicted
+LOADED = 0.3  # of the largest force: a window with more has contact
+TOUCH_SIGMAS = 3.0  # of the start pose
 DEFAULT_POSITION_STD = 5e-4  # m, where neither stated nor seen
 DEFAULT_ROTATION_STD = 5e-3  # rad
 DEFAULT_HAND_STD = 1e-4  # m
@@ -168,6 +170,9 @@ def _problem(recording: Recording, order: int, noise: Noise, height: float) -> P
         np.arange(len(planar)) > first if push.endpoint_only or path is None else np.ones(len(planar), dtype=bool)
     )
     force_times, forces, force_std = _force_windows(push, noise)
+    if path is not None:
+        told = ~_touching(path, force_times, forces, force_std, float(start_std[0]))
+        force_times, forces, force_std = force_times[told], forces[told], force_std[told]
     return PushProblem(
         name=push.name,
         order=order,
@@ -253,3 +258,21 @@ def _force_windows(push: Push, noise: Noise) -> tuple[Array, Array, Array]:
     count = np.array([np.count_nonzero(index == k) for k in kept])
     largest = float(np.linalg.norm(mean, axis=1).max(initial=0.0))
     return middle, mean, np.sqrt(noise.force**2 / count + (FORCE_SHARE * largest) ** 2)
+
+
+def _touching(path: HandPath, middles: Array, forces: Array, stds: Array, start_std: float) -> NDArray[np.bool_]:
+    """Windows (k,) about the first touch in which nobody can say whether there is contact.
+
+    A slow hand meets an object whose place the tracker knows to ``start_std`` [m] that much earlier or later: there
+    the force jumps between nothing and all, and tells nothing but the gap.
+    """
+    sizes = np.linalg.norm(forces, axis=1)
+    loaded: NDArray[np.bool_] = sizes > np.maximum(LOADED * sizes.max(initial=0.0), stds)
+    if not loaded.any() or loaded[0]:
+        return np.zeros(len(middles), dtype=bool)
+    touch = float(middles[np.argmax(loaded)])
+    way = path.positions(np.array([touch, touch + 2.0 * FORCE_BIN]))
+    speed = float(np.linalg.norm(way[1] - way[0])) / (2.0 * FORCE_BIN)
+    unsure = TOUCH_SIGMAS * start_std / max(speed, 1e-6)
+    near: NDArray[np.bool_] = np.abs(middles - touch) < unsure + 0.5 * FORCE_BIN
+    return near if unsure > 0.5 * FORCE_BIN else np.zeros(len(middles), dtype=bool)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from runs import shipped_pushes
 
+from physid_drake.cell.hand_path import straight_path
 from physid_drake.errors import RecordingError
-from physid_drake.identify.problem import FORCE_SHARE, Noise, noise_of, problems_of, spec_of
+from physid_drake.identify.problem import FORCE_SHARE, Noise, _touching, noise_of, problems_of, spec_of
 from physid_drake.recording import (
     Cylinder,
     ForceStream,
@@ -233,6 +234,25 @@ def test_forces_are_means_over_windows(recording):
 
 def test_a_window_of_one_sample_is_left_out(recording):
     assert first(with_forces(recording, lambda t: np.zeros((len(t), 3)), rate=9.0)).force_times.size == 0
+
+
+MIDDLES = 0.05 + 0.1 * np.arange(90)
+SLOW = straight_path(np.zeros(2), np.array([0.02, 0.0]), 0.0, 10.0)  # 2 mm/s: half a millimetre in 0.25 s
+
+
+def touched_after(time):
+    return np.column_stack([np.where(time < MIDDLES, 4.0, 0.0), np.zeros(90)])
+
+
+def test_a_slow_touch_whose_time_the_tracker_does_not_tell_is_left_out():
+    unsure = _touching(SLOW, MIDDLES, touched_after(3.0), np.full(90, 0.2), 5e-4)
+    # Three standard deviations are 0.75 s, and half a window, on both sides of the touch at 3.05 s.
+    np.testing.assert_array_equal(unsure, np.abs(MIDDLES - 3.05) < 0.79)
+
+
+def test_a_touch_that_the_tracker_tells_is_kept():
+    assert not _touching(SLOW, MIDDLES, touched_after(3.0), np.full(90, 0.2), 1e-5).any()
+    assert not _touching(SLOW, MIDDLES, touched_after(0.0), np.full(90, 0.2), 5e-4).any()  # from the start
 
 
 def test_without_forces_there_are_no_windows(recording):
