@@ -51,6 +51,7 @@ class Case:
         pool: makes the rollouts.
         around: the effects' scales.
         config: of the cell.
+        odd: (n,) how many times as loud as the others a push is; empty where none is.
     """
 
     recording: Recording
@@ -63,13 +64,26 @@ class Case:
     pool: RolloutPool
     around: Surroundings
     config: CellConfig
+    odd: tuple[float, ...] = ()
 
-    def louder(self, factor: float, force_factor: float) -> Case:
-        """The case with ``factor`` times the noise of the poses, and ``force_factor`` times the force's wandering."""
-        noise = self.noise.louder(factor, force_factor)
-        pushes = self.recording.pushes
-        features = tuple(features_of(push, p, noise) for push, p in zip(pushes, self.problems, strict=True))
-        return dc.replace(self, noise=noise, features=features)
+    def louder(self, factor: float, force_factor: float, odd: Sequence[float] = ()) -> Case:
+        """The case with more noise.
+
+        Args:
+            factor: times the noise of the poses.
+            force_factor: times the wandering of the forces.
+            odd: (n,) how many times as loud as the others a push is, in all; none where empty.
+        """
+        common = self.noise.louder(factor, force_factor)
+        odd = tuple(odd) or (1.0,) * len(self.problems)
+        features = tuple(
+            features_of(push, problem, common if times == 1.0 else common.louder(times))
+            for push, problem, times in zip(self.recording.pushes, self.problems, odd, strict=True)
+        )
+        strange = [f"{p.name} ({times:.1f})" for p, times in zip(self.problems, odd, strict=True) if times > 1.0]
+        said = (f"pushes that stand out count as so many times noisier: {', '.join(strange)}",) if strange else ()
+        warnings = (*(w for w in common.warnings if not w.startswith("pushes that stand out")), *said)
+        return dc.replace(self, noise=dc.replace(common, warnings=warnings), features=features, odd=odd)
 
     def vectors(self, predictions: Sequence[Prediction | None], owners: Sequence[int]) -> list[Array | None]:
         """Features of predictions, each of the push ``owners`` says."""

@@ -13,7 +13,7 @@ from scipy import stats
 from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.confirm import EXPLAINED, Candidate, push_scores, rivals, standard_error
 from physid_drake.diagnose.estimates import parameters_of, rms, smallest, theta_of
-from physid_drake.diagnose.evidence import Evidence, mismatch, predicts_better, unexplained
+from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, mismatch, unexplained
 from physid_drake.diagnose.fit import Fitted
 from physid_drake.diagnose.linear import left_out_scores
 from physid_drake.diagnose.localise import locate
@@ -41,7 +41,9 @@ VISIBLE = 10.0  # standard deviations of motion: pushes that would not show such
 def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
     """The verdict and all figures, from evidence; no rollouts."""
     case, plain, final = evidence.case, evidence.plain, evidence.final
-    p_value = mismatch(plain, evidence.screening if evidence.steps else None)
+    p_value = evidence.detected
+    if p_value is None:
+        p_value = mismatch(plain, evidence.screening if evidence.steps else None)
     detectable = smallest(evidence, alpha)
     verdict = _verdict(evidence, p_value, alpha, detectable)
     findings = _findings(evidence) if verdict in ("explained", "ambiguous") else ()
@@ -90,15 +92,8 @@ def _explained(evidence: Evidence) -> bool:
     """Whether the last model accounts for the pushes."""
     if evidence.case.noise.known:
         return not unexplained(evidence.plain, evidence.final)
-    # The noise was taken to be what the plain cell leaves: only what is left of left-out pushes' errors speaks.
-    before, after = (_left_out_rms(evidence.case, fitted) for fitted in (evidence.plain, evidence.final))
-    return predicts_better(before, after)
-
-
-def _left_out_rms(case: Case, fitted: Fitted) -> float:
-    """Root mean square of the poses' errors of pushes that are left out, in standard deviations."""
-    _, residuals = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std)
-    return rms(np.concatenate([f.poses(r) / f.sigmas for f, r in zip(case.features, residuals, strict=True)]))
+    # A noise that was taken to be what a model leaves: it must have become much less.
+    return evidence.noise_share <= MOST_OF_UNKNOWN
 
 
 def _location(evidence: Evidence, verdict: str, findings: Sequence[EffectFinding], seed: int) -> Location | None:

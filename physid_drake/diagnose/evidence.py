@@ -27,7 +27,7 @@ MOST_SHARE = 0.25  # of what the plain cell leaves: an effect that leaves more e
 MOST_LEFT = 0.5  # beside what two laws of one effect differ by
 EVER_LEFT = 2.0  # in all
 LAW_ERROR = 0.1  # of an effect's motion: two honest implementations of a spring or a liquid differ by that much
-MOST_OF_UNKNOWN = 0.5  # of the mean square of left-out errors, where the noise is not known
+MOST_OF_UNKNOWN = 0.5  # of the noise's variance, where it is not known
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -46,6 +46,9 @@ class Evidence:
         remaining: screening of what it leaves.
         wrenches: what is missing from the plain cell, window by window.
         next_push: that would tell the rivals apart.
+        noise_share: where the noise is not known, the share of its variance that the last model needs of what the
+            plain cell needs; 1 where it is known.
+        detected: p-value of the plain cell where the noise was as loud as what it leaves; None where it is known.
     """
 
     case: Case
@@ -59,6 +62,8 @@ class Evidence:
     remaining: Screening
     wrenches: tuple[MissingWrench, ...] = ()
     next_push: NextPush | None = None
+    noise_share: float = 1.0
+    detected: float | None = None
 
 
 def mismatch(fitted: Fitted, screening: Screening | None) -> float:
@@ -79,13 +84,3 @@ def unexplained(plain: Fitted, final: Fitted) -> bool:
     before, left = plain.reduced_chi2 - 1.0, final.reduced_chi2 - 1.0
     most = min(MOST_LEFT + LAW_ERROR**2 * max(0.0, before), EVER_LEFT)
     return left > most or left > max(NOISE_LIKE, MOST_SHARE * before)
-
-
-def predicts_better(before: float, after: float) -> bool:
-    """Whether left-out pushes show that a model explains a recording whose noise is not known.
-
-    Args:
-        before: root mean square of their errors with the plain cell.
-        after: with the model.
-    """
-    return after**2 <= MOST_OF_UNKNOWN * before**2

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.conclude import class_of, conclude
 from physid_drake.diagnose.confirm import EXPLAINED, Candidate, confirm, push_scores, rejudged, worthwhile
-from physid_drake.diagnose.estimates import rms
-from physid_drake.diagnose.evidence import Evidence, mismatch
+from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, mismatch
 from physid_drake.diagnose.fit import Fitted, Fitter, State
-from physid_drake.diagnose.linear import own_unknowns
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
+from physid_drake.diagnose.loudness import as_loud_as_left, quieter
 from physid_drake.diagnose.memory import Memory
 from physid_drake.diagnose.next_push import next_push
 from physid_drake.diagnose.plain import coarse, fit_plain, numerics
@@ -29,7 +28,6 @@ Tick = Callable[[str, int, int], None]
 MOST_EFFECTS = 3
 LONGEST = 600  # rollouts per push after which no further effect is looked for
 ANOTHER_BASIN = 10.0  # nats by which a plain fit must be better to be another one
-LOUDER = 4  # rounds in which an unknown noise is found
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
 HOPELESS = 6.0  # cost per degree of freedom with two effects: no third one of the catalogue will make up for that
 
@@ -67,19 +65,27 @@ def gather(
     """
     search_rng, screen_rng = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2))
     kinds = applicable(case.around, effects)
-    rough = coarse(case)
+    assumed = (case, coarse(case))
+    rough = assumed[1]
     first = _first(rough, search_rng, tick, memory)
     if not case.noise.known:
-        # Only ratios can speak then: the plain cell is taken to leave noise, and effects must leave less of it.
-        case, rough, first = _as_loud_as_left(case, rough, first)
-    guard, found = _looks(rough, first, kinds, tick, memory)
-    allowed = tolerances(rough, found)
-    fitter = Fitter(rough, guard, allowed)
-    grown = _grown(fitter, _Looked.at(fitter.guard(first), found, screen_rng), kinds, alpha, screen_rng, tick)
-    grown = _pruned(fitter, grown, screen_rng, tick)
+        case, rough, first = as_loud_as_left(*assumed, first)
+    look = _Search(kinds=kinds, alpha=alpha, rng=screen_rng, tick=tick)
+    fitter, grown = look.grown(rough, first, memory)
+    share, detected = 1.0, None
+    if not case.noise.known and grown.steps:
+        model = Fitter(rough).linearise(grown.last.fitted.state)
+        again, rough_again, _ = as_loud_as_left(*assumed, model)
+        share, detected = quieter(case, again), grown.base.p_value
+        if share <= MOST_OF_UNKNOWN:
+            # What was noise so far was missing physics: with less noise the pushes tell more.
+            tick("plain fit with less noise", 0, 0)
+            first = Fitter(rough_again).fit(grown.base.fitted.state, renew=True)
+            case, rough = again, rough_again
+            fitter, grown = look.grown(rough, first, Memory())
     plain = grown.base.fitted
     steps = [_reconsidered(fitter, plain, grown.last.fitted, k, step, tick) for k, step in enumerate(grown.steps)]
-    fine = Fitter(case, guard, allowed)
+    fine = Fitter(case, fitter.extra, fitter.tolerances)
     tick("on short ticks", 0, 0)
     refined = fine.refine(plain)
     final = fine.refine(grown.last.fitted) if steps else refined
@@ -87,7 +93,26 @@ def gather(
     return Evidence(
         case=case, fitter=fine, plain=refined, screening=grown.base.screening, signatures=grown.base.signatures,
         steps=tuple(steps), rejected=grown.rejected, final=final, remaining=grown.last.screening,
+        noise_share=share, detected=detected,
     )  # fmt: skip
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class _Search:
+    """How a model is grown from a plain fit."""
+
+    kinds: Sequence[type[Effect]]
+    alpha: float
+    rng: np.random.Generator
+    tick: Tick
+
+    def grown(self, rough: Case, first: Fitted, memory: Memory) -> tuple[Fitter, _Grown]:
+        """Look at the whole catalogue, add effects, and take out what became superfluous."""
+        guard, found = _looks(rough, first, self.kinds, self.tick, memory)
+        fitter = Fitter(rough, guard, tolerances(rough, found))
+        looked = _Looked.at(fitter.guard(first), found, self.rng)
+        grown = _grown(fitter, looked, self.kinds, self.alpha, self.rng, self.tick)
+        return fitter, _pruned(fitter, grown, self.rng, self.tick)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -204,34 +229,6 @@ def _first(case: Case, rng: np.random.Generator, tick: Tick, memory: Memory) -> 
     memory.keep("plain", [found.u, np.array(found.scatter), *found.own])
     # All derivatives here, so that a run that goes on from what was kept has the same bits.
     return Fitter(case).linearise(found)
-
-
-def _as_loud_as_left(case: Case, rough: Case, fitted: Fitted) -> tuple[Case, Case, Fitted]:
-    """Noise so large that the plain model leaves just that, in poses and in forces, for both cases."""
-    for _ in range(LOUDER):
-        factors = _left_over(rough, fitted)
-        case, rough = case.louder(*factors), rough.louder(*factors)
-        fitted = Fitter(rough).linearise(fitted.state)
-        if fitted.reduced_chi2 < 1.1:
-            break
-    return case, rough, fitted
-
-
-def _left_over(case: Case, fitted: Fitted) -> tuple[float, float]:
-    """How many times their deviations poses and forces (relative to a scatter of one) are off, at least 1."""
-    poses, forces = [], []
-    for push, features in zip(fitted.pushes, case.features, strict=True):
-        own = own_unknowns(push, fitted.state.scatter, fitted.solution.beta)
-        left = push.residual - push.shared @ fitted.solution.beta - push.own @ own
-        count = 3 * len(features.middles)
-        poses.append(left[:count])
-        if len(left) > count:
-            white = np.linalg.solve(np.linalg.cholesky(push.noise[count:, count:]), left[count:])
-            forces.append(white)
-    # The pushes' unknowns took a part of what is left: the cost says how much.
-    share = float(np.sqrt(fitted.reduced_chi2 / np.mean(np.concatenate([*poses, *forces]) ** 2)))
-    sizes = [share * rms(np.concatenate(values)) if values else 1.0 for values in (poses, forces)]
-    return max(1.0, sizes[0]), max(1.0, sizes[1])
 
 
 def _looks(

@@ -7,7 +7,7 @@ import pytest
 
 from physid_drake.diagnose import story
 from physid_drake.diagnose.confirm import Candidate
-from physid_drake.diagnose.evidence import predicts_better, unexplained
+from physid_drake.diagnose.evidence import unexplained
 from physid_drake.diagnose.fit import State
 
 PUSHES = 8
@@ -106,9 +106,3 @@ def test_a_plain_fit_in_a_wrong_basin_is_left_if_an_effect_leads_out_of_it():
 def test_a_large_effect_may_leave_what_two_honest_laws_of_it_differ_by(before, after, left):
     plain, final = SimpleNamespace(reduced_chi2=before), SimpleNamespace(reduced_chi2=after)
     assert unexplained(plain, final) is left
-
-
-def test_where_the_noise_is_not_known_an_effect_must_halve_the_left_out_error():
-    assert predicts_better(2.4, 1.5)
-    assert not predicts_better(2.4, 2.0)
-    assert not predicts_better(2.4, 2.6)

@@ -1,0 +1,77 @@
+"""How loud a noise is that nobody states and no rest shows: as loud as what a model leaves.
+
+Only ratios speak then. The plain cell is taken to leave noise, and an effect has to leave much less of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from physid_drake.diagnose.case import Case
+from physid_drake.diagnose.estimates import rms
+from physid_drake.diagnose.fit import Fitted, Fitter
+from physid_drake.diagnose.linear import own_unknowns
+
+Array = NDArray[np.float64]
+
+ROUNDS = 4  # in which the noise is found: the pushes' unknowns take less of it, the louder it is
+SETTLED = 1.1  # cost per degree of freedom
+ODD = 2.0  # times the usual error of a push: one with more is given its own noise
+
+
+def as_loud_as_left(case: Case, rough: Case, fitted: Fitted) -> tuple[Case, Case, Fitted]:
+    """Noise so large that a model leaves just that, in poses and in forces.
+
+    As loud as most pushes say: one that stands out is louder by itself.
+
+    Args:
+        case: with the noise that is assumed at least.
+        rough: the same on longer ticks.
+        fitted: a model of ``rough``.
+
+    Returns:
+        Both cases with that noise, and the model linearised in the second.
+    """
+    for _ in range(ROUNDS):
+        factor, force_factor, odd = _left_over(rough, fitted)
+        case, rough = case.louder(factor, force_factor, odd), rough.louder(factor, force_factor, odd)
+        fitted = Fitter(rough).linearise(fitted.state)
+        if fitted.reduced_chi2 < SETTLED:
+            break
+    return case, rough, fitted
+
+
+def quieter(before: Case, after: Case) -> float:
+    """Share of the noise's variance that is left."""
+    return (after.noise.position / before.noise.position) ** 2
+
+
+def _left_over(case: Case, fitted: Fitted) -> tuple[float, float, list[float]]:
+    """How many times their deviations poses and forces are off, at least 1, and how many times more each push."""
+    poses, forces = _left(case, fitted)
+    # The pushes' unknowns took a part of what is left: the cost says how much.
+    share = float(np.sqrt(fitted.reduced_chi2 / np.mean(np.concatenate([*poses, *forces]) ** 2)))
+    before = case.odd or (1.0,) * len(poses)
+    each = [share * rms(left) * times for left, times in zip(poses, before, strict=True)]
+    # Squares of normal errors have the median of the chi-square distribution.
+    usual = float(np.median([e**2 * len(p) / stats.chi2.median(len(p)) for e, p in zip(each, poses, strict=True)]))
+    factor = max(1.0, float(np.sqrt(usual)))
+    force_factor = max(1.0, share * rms(np.concatenate(forces))) if forces else 1.0
+    return factor, force_factor, [max(1.0, e / (ODD * factor)) for e in each]
+
+
+def _left(case: Case, fitted: Fitted) -> tuple[Sequence[Array], Sequence[Array]]:
+    """What a model leaves of poses, in standard deviations, and of forces, white; a list per push."""
+    poses, forces = [], []
+    for push, features in zip(fitted.pushes, case.features, strict=True):
+        own = own_unknowns(push, fitted.state.scatter, fitted.solution.beta)
+        left = push.residual - push.shared @ fitted.solution.beta - push.own @ own
+        count = 3 * len(features.middles)
+        poses.append(left[:count])
+        if len(left) > count:
+            forces.append(np.linalg.solve(np.linalg.cholesky(push.noise[count:, count:]), left[count:]))
+    return poses, forces
