@@ -23,7 +23,7 @@ from physid_drake.recording.adapters import convert_cmu, convert_cube, convert_m
 PUSHES: Final = 40
 """Pushes that are diagnosed."""
 FRESH: Final = 8
-"""Pushes that are drawn with them and that the diagnosis does not get."""
+"""Pushes that are drawn with them and that the diagnosis does not get; a quarter where there are few."""
 CMU: Final = ("patch", "30_90_30_30_30_90", "10_130_10_10_10_130", "30_63.33_43.33_30_43.33_63.33")
 MIT_SHAPES: Final = ("rect1", "rect2", "rect3", "tri1", "tri2", "tri3", "ellip1", "ellip2", "ellip3", "hex", "butter")
 SQUARE: Final = "square_drops"
@@ -126,6 +126,7 @@ def prepare(case: RealCase, published: Path, out: Path, *, pushes: int = PUSHES,
 def _split(drawn: Recording, case: RealCase, given: Path, held: Path, pushes: int, seed: int) -> None:
     """The pushes that are diagnosed, and the fresh ones; each part keeps its order."""
     order = np.random.default_rng([seed, 1]).permutation(len(drawn.pushes))
+    pushes = min(pushes, len(order) - min(FRESH, len(order) // 4))
     for part, folder in ((order[:pushes], given), (order[pushes:], held)):
         if len(part):
             write_recording(replace(drawn.subset(sorted(part.tolist())), name=case.id), folder)
