@@ -151,8 +151,8 @@ def _register_prove(subparsers: Subparsers) -> None:
     parser.add_argument("--real", type=Path, metavar="FOLDER",
                         help="instead of worlds, recordings of robots that others published")  # fmt: skip
     parser.add_argument("--only", nargs="+", metavar="NAME", help="of --real: only cases whose names begin so")
-    parser.add_argument("--pushes", type=int, default=40, metavar="N",
-                        help="of --real: pushes that are diagnosed (default 40)")  # fmt: skip
+    parser.add_argument("--pushes", type=int, default=20, metavar="N",
+                        help="of --real: pushes that are diagnosed (default 20)")  # fmt: skip
     parser.set_defaults(run=_run_prove)
 
 
@@ -195,7 +195,7 @@ def _register_plan(subparsers: Subparsers) -> None:
         help="greedy_entropy (default), entropy_search or random",
     )
     parser.add_argument("--budget", type=int, metavar="N", help="settings tried (default: 24, 48 or 64, by policy)")
-    parser.add_argument("--draws", type=int, default=40, metavar="N", help="of theta, for the spread (default 40)")
+    parser.add_argument("--draws", type=int, default=20, metavar="N", help="of theta, for the spread (default 20)")
     parser.add_argument("--risk", action="store_true", help="make the mean cost over the draws small")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (default 0)")
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="where results go (default: plans/RECORDING)")

@@ -29,7 +29,6 @@ Tick = Callable[[str, int, int], None]
 TRAVEL_PER_TICK = 2.5e-4
 PACES = (1.0, 1.5, 2.0, 3.0, 4.0)
 MOST_PUSHES = 24  # more take longer and tell little more
-MOST_ENDPOINTS = 40  # of pushes of which only the ends are known, and which tell less each
 UNIT_SCATTER = 0.025  # of friction, push to push: the columns' unit and the median of its prior
 LEAST_MOTION = 6.0  # standard deviations: an object that moves less in every push does not move
 # A rollout's own error acts like a start that is known no better than this [m, m, rad].
@@ -91,7 +90,7 @@ class Case:
 
 
 def case_of(
-    recording: Recording, config: CellConfig, theta: ThetaConfig, *, jobs: int = 0, most: int | None = None
+    recording: Recording, config: CellConfig, theta: ThetaConfig, *, jobs: int = 0, most: int = MOST_PUSHES
 ) -> Case:
     """Prepare a recording.
 
@@ -100,8 +99,7 @@ def case_of(
         config: of the cell.
         theta: the plain cell's unknowns.
         jobs: processes; 0 takes the machine's cores.
-        most: pushes to look at; of more, so many are taken at equal distances. None takes ``MOST_PUSHES``, or
-            ``MOST_ENDPOINTS`` where only the ends of most pushes are known.
+        most: pushes to look at; of more, so many are taken at equal distances.
 
     Raises:
         RecordingError: if the object never moves, or there is no push.
@@ -109,9 +107,6 @@ def case_of(
     if not recording.pushes:
         raise RecordingError(f"recording '{recording.name}': there is no push to diagnose; record at least three.")
     noise, sensors = tracker_noise(recording)
-    if most is None:
-        ends = sum(push.endpoint_only for push in recording.pushes)
-        most = MOST_ENDPOINTS if 2 * ends > len(recording.pushes) else MOST_PUSHES
     orders = np.unique(
         np.linspace(0, len(recording.pushes) - 1, min(most, len(recording.pushes))).round().astype(int)
     )

@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.conclude import class_of, conclude
-from physid_drake.diagnose.confirm import EXPLAINED, Candidate, confirm, push_scores, rejudged, worthwhile
+from physid_drake.diagnose.confirm import (
+    EXPLAINED,
+    WORTH_A_TRY,
+    Candidate,
+    confirm,
+    push_scores,
+    rejudged,
+    worthwhile,
+)
 from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, mismatch
 from physid_drake.diagnose.fit import Fitted, Fitter, State
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
@@ -82,7 +90,7 @@ def gather(
             tick("plain fit with less noise", 0, 0)
             first = Fitter(rough_again).fit(grown.base.fitted.state, renew=True)
             case, rough = again, rough_again
-            fitter, grown = look.grown(rough, first, Memory())
+            fitter, grown = dc.replace(look, kinds=_in_question(grown)).grown(rough, first, Memory())
     plain = grown.base.fitted
     steps = [_reconsidered(fitter, plain, grown.last.fitted, k, step, tick) for k, step in enumerate(grown.steps)]
     fine = Fitter(case, fitter.extra, fitter.tolerances)
@@ -95,6 +103,14 @@ def gather(
         steps=tuple(steps), rejected=grown.rejected, final=final, remaining=grown.last.screening,
         noise_share=share, detected=detected,
     )  # fmt: skip
+
+
+def _in_question(grown: _Grown) -> list[type[Effect]]:
+    """The effects that were found, and those whose score tests came near enough to be tried."""
+    scores = grown.base.screening.scores
+    least = WORTH_A_TRY * max(s.gain for s in scores)
+    found = {step[0].name for step in grown.steps}
+    return [s.kind for s in scores if s.gain >= least or s.kind.name in found]
 
 
 @dc.dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,7 @@ from physid_drake.errors import PhysidError
 from physid_drake.recording import Recording, read_recording, write_recording
 from physid_drake.recording.adapters import convert_cmu, convert_cube, convert_mit
 
-PUSHES: Final = 40
+PUSHES: Final = 20
 """Pushes that are diagnosed."""
 FRESH: Final = 8
 """Pushes that are drawn with them and that the diagnosis does not get; a quarter where there are few."""
