@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from physid_drake.prove.diagnosing import RESULT, attempt_of
 from physid_drake.prove.real import RealCase
@@ -26,6 +27,7 @@ PUBLISHED: Final = ("quadratic", "poly4")
 _CORNER: Final = 0.05  # m from the right-angle corner of the CMU triangle to its centroid, along x and along y
 _LEG: Final = 0.15
 _GRID: Final = 1e-3  # m
+_ROUNDS: Final = 50  # in which springs that would pull are let go
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,13 +35,13 @@ class Pressure:
     """A recovered pressure map against the points that the object stood on.
 
     Attributes:
-        weights: (n, n) relative pressure, rows along x of B.
+        map: (150, 150) pressure over its mean per square millimetre, rows along x of B; zero outside the triangle.
         points: (3, 2) of support, in B [m].
         near: share of the weight within `NEAR` of the points.
         even: the same share if the pressure were even.
     """
 
-    weights: tuple[tuple[float, ...], ...]
+    map: Array
     points: tuple[tuple[float, float], ...]
     near: float
     even: float
@@ -144,20 +146,50 @@ def points_of_support(name: str) -> Array | None:
     return points
 
 
-def weight_near(weights: Array, points: Array) -> tuple[float, float]:
+def balanced_pressure(weights: Array) -> Array:
+    """Pressure (150, 150) over its mean under the CMU triangle, one value per square millimetre, rows along x.
+
+    A bed of springs of stiffness in proportion to the weights, pressed by a plane so that the load stands under the
+    centre of mass: what the cell makes of weights. Springs do not pull.
+
+    Args:
+        weights: (n, m) of the cells of a regular grid over the triangle's box, rows along x.
+    """
+    x, y, inside = _raster()
+    cells = (x / _LEG * weights.shape[0]).astype(int), (y / _LEG * weights.shape[1]).astype(int)
+    stiffness = weights[cells] * inside
+    plane = np.column_stack([np.ones_like(x), x - _CORNER, y - _CORNER])
+    pressed = stiffness > 0.0
+    for _ in range(_ROUNDS):
+        loaded = plane * (stiffness * pressed)[:, None]
+        depth = plane @ np.linalg.lstsq(plane.T @ loaded, np.array([1.0, 0.0, 0.0]), rcond=None)[0]
+        if np.array_equal(depth > 0.0, pressed):
+            break
+        pressed = depth > 0.0
+    pressure = stiffness * np.maximum(depth, 0.0)
+    over_mean: Array = pressure / pressure[inside].mean()
+    return over_mean.reshape(round(_LEG / _GRID), -1)
+
+
+def weight_near(pressure: Array, points: Array) -> tuple[float, float]:
     """Share of the weight within `NEAR` of points under the CMU triangle, and what it would be if even.
 
     Args:
-        weights: (n, m) relative pressure of the cells of a regular grid over the triangle's box, rows along x.
+        pressure: (150, 150) as of `balanced_pressure`.
         points: (k, 2) in B [m].
     """
-    ticks = np.arange(0.5 * _GRID, _LEG, _GRID)
-    x, y = (axis.ravel() for axis in np.meshgrid(ticks, ticks, indexing="ij"))
-    inside = x + y <= _LEG
-    cells = weights[(x / _LEG * weights.shape[0]).astype(int), (y / _LEG * weights.shape[1]).astype(int)] * inside
+    x, y, inside = _raster()
     places = np.column_stack([x, y]) - _CORNER
     near = (np.linalg.norm(places[:, None] - points[None], axis=2) <= NEAR).any(axis=1)
-    return float(cells[near].sum() / cells.sum()), float((inside & near).sum() / inside.sum())
+    load = pressure.ravel()
+    return float(load[near].sum() / load.sum()), float((inside & near).sum() / inside.sum())
+
+
+def _raster() -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Square millimetres of the box: x, y from the right angle [m], and which are in the triangle; (22500,) each."""
+    ticks = np.arange(0.5 * _GRID, _LEG, _GRID)
+    x, y = (axis.ravel() for axis in np.meshgrid(ticks, ticks, indexing="ij"))
+    return x, y, x + y <= _LEG
 
 
 def _pressure(case: RealCase, said: dict[str, Any]) -> Pressure | None:
@@ -165,14 +197,9 @@ def _pressure(case: RealCase, said: dict[str, Any]) -> Pressure | None:
     found = next((e for e in said["effects"] if e["name"] == "uneven_support"), None)
     if points is None or found is None:
         return None
-    weights = np.array(found["parameters"]["weights"]["value"], dtype=np.float64)
-    near, even = weight_near(weights, points)
-    return Pressure(
-        weights=tuple(tuple(row) for row in weights.tolist()),
-        points=tuple((x, y) for x, y in points.tolist()),
-        near=near,
-        even=even,
-    )
+    pressure = balanced_pressure(np.array(found["parameters"]["weights"]["value"], dtype=np.float64))
+    near, even = weight_near(pressure, points)
+    return Pressure(map=pressure, points=tuple((x, y) for x, y in points.tolist()), near=near, even=even)
 
 
 def _fresh(file: Path) -> tuple[float, float]:

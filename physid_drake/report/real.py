@@ -111,11 +111,9 @@ def pressure_picture(pressure: Pressure, title: str) -> Figure:
     """The pressure under the CMU triangle, seen from above, with the points that it stood on."""
     figure = Figure(figsize=(4.2, 3.6), layout="constrained")
     axes = figure.add_subplot()
-    weights = np.array(pressure.weights)
     ticks = np.arange(0.5, _LEG, 1.0)
     x, y = np.meshgrid(ticks, ticks, indexing="ij")
-    cells = weights[(x / _LEG * weights.shape[0]).astype(int), (y / _LEG * weights.shape[1]).astype(int)]
-    shown = np.ma.masked_where(x + y > _LEG, cells)
+    shown = np.ma.masked_where(x + y > _LEG, pressure.map)
     ends = (-_CORNER, _LEG - _CORNER)
     image = axes.imshow(shown.T, origin="lower", extent=(*ends, *ends), cmap="Blues", vmin=0.0)
     figure.colorbar(image, label="pressure over its mean")

@@ -12,7 +12,7 @@ from physid_drake import run_prove_real
 from physid_drake.cli import build_parser
 from physid_drake.errors import RecordingError
 from physid_drake.prove.real import chosen_cases, prepare, slides_of_squares
-from physid_drake.prove.real_score import points_of_support, published_errors, weight_near
+from physid_drake.prove.real_score import balanced_pressure, points_of_support, published_errors, weight_near
 from physid_drake.recording import read_recording
 from physid_drake.recording.adapters import convert_cube
 from physid_drake.recording.adapters.cube import RATE, SIDE
@@ -137,11 +137,21 @@ def test_points_of_support_and_the_weight_near_them():
     assert points_of_support("patch") is None
     points = points_of_support("30_90_30_30_30_90")
     assert points == pytest.approx(np.array([[-0.02, -0.02], [0.04, -0.02], [-0.02, 0.04]]))
-    near, even = weight_near(np.ones((1, 1)), points)
-    assert near == even == pytest.approx(3 * math.pi * 15**2 / (150**2 / 2), rel=0.02)
-    corner = np.zeros((5, 5))
-    corner[1, 1] = 1.0  # 30 to 60 mm from the corner
-    assert weight_near(corner, points)[0] == pytest.approx(math.pi / 4 * 15**2 / 30**2, rel=0.05)
+    near, even = weight_near(balanced_pressure(np.ones((1, 1))), points)
+    assert near == pytest.approx(even) and even == pytest.approx(3 * math.pi * 15**2 / (150**2 / 2), rel=0.02)
+
+
+def test_a_recovered_pressure_balances_the_weight():
+    # Cells of 10 mm: three feet at (35, 95), (35, 35) and (95, 35) mm from the right angle, unequally stiff.
+    weights = np.full((15, 15), 1e-9)
+    weights[3, 9], weights[3, 3], weights[9, 3] = 5.0, 1.0, 2.0
+    pressure = balanced_pressure(weights)
+    middles = np.arange(0.5, 150.0) - 50.0
+    np.testing.assert_allclose(pressure.sum(axis=1) @ middles, 0.0, atol=1e-6 * pressure.sum())
+    np.testing.assert_allclose(pressure.sum(axis=0) @ middles, 0.0, atol=1e-6 * pressure.sum())
+    # Three feet under a centre of mass at (50, 50) mm: the lever rule, however stiff they are.
+    loads = [pressure[a : a + 10, b : b + 10].sum() / pressure.sum() for a, b in ((30, 90), (30, 30), (90, 30))]
+    np.testing.assert_allclose(loads, [0.25, 0.5, 0.25], atol=0.02)
 
 
 ANSWER = {
