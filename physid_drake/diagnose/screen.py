@@ -222,6 +222,8 @@ def log_probability(gain: float, directions: int, pushes: int, spent: int) -> fl
 
 def screen(fitted: Fitted, found: Sequence[Signature], rng: np.random.Generator) -> Screening:
     """All score tests, and the distribution of the best of them where the fitted model is true."""
+    if not found:  # every effect that was to be looked at is in the model
+        return Screening(scores=(), p_value=1.0, looks=1.0)
     best: dict[str, Score] = {}
     for signature in found:
         one = score(fitted, signature)

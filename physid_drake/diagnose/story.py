@@ -72,37 +72,39 @@ def gather(
         memory: of the stages that are done.
     """
     search_rng, screen_rng = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2))
-    kinds = applicable(case.around, effects)
-    assumed = (case, coarse(case))
-    rough = assumed[1]
+    look = _Search(kinds=applicable(case.around, effects), alpha=alpha, rng=screen_rng, tick=tick)
+    rough = coarse(case)
     first = _first(rough, search_rng, tick, memory)
-    if not case.noise.known:
-        case, rough, first = as_loud_as_left(*assumed, first)
-    look = _Search(kinds=kinds, alpha=alpha, rng=screen_rng, tick=tick)
-    fitter, grown = look.grown(rough, first, memory)
-    share, detected = 1.0, None
-    if not case.noise.known and grown.steps:
-        model = Fitter(rough).linearise(grown.last.fitted.state)
-        again, rough_again, _ = as_loud_as_left(*assumed, model)
-        share, detected = quieter(case, again), grown.base.p_value
-        if share <= MOST_OF_UNKNOWN:
-            # What was noise so far was missing physics: with less noise the pushes tell more.
-            tick("plain fit with less noise", 0, 0)
-            first = Fitter(rough_again).fit(grown.base.fitted.state, renew=True)
-            case, rough = again, rough_again
-            fitter, grown = dc.replace(look, kinds=_in_question(grown)).grown(rough, first, Memory())
+    answer = (look.answer if case.noise.known else look.answer_by_ratios)(case, rough, first, memory)
+    return _on_short_ticks(answer, tick)
+
+
+def _on_short_ticks(answer: _Answer, tick: Tick) -> Evidence:
+    """The evidence of an answer, both models taken to the case's own ticks."""
+    case, grown, fitter = answer.case, answer.grown, answer.fitter
     plain = grown.base.fitted
     steps = [_reconsidered(fitter, plain, grown.last.fitted, k, step, tick) for k, step in enumerate(grown.steps)]
     fine = Fitter(case, fitter.extra, fitter.tolerances)
     tick("on short ticks", 0, 0)
     refined = fine.refine(plain)
     final = fine.refine(grown.last.fitted) if steps else refined
-    case.pool.count += rough.pool.count
+    case.pool.count += fitter.case.pool.count
     return Evidence(
         case=case, fitter=fine, plain=refined, screening=grown.base.screening, signatures=grown.base.signatures,
         steps=tuple(steps), rejected=grown.rejected, final=final, remaining=grown.last.screening,
-        noise_share=share, detected=detected,
+        noise_share=answer.noise_share, detected=answer.detected,
     )  # fmt: skip
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class _Answer:
+    """A grown model with the case it belongs to; ``fitter`` is on longer ticks. The rest as in ``Evidence``."""
+
+    case: Case
+    fitter: Fitter
+    grown: _Grown
+    noise_share: float = 1.0
+    detected: float | None = None
 
 
 def _in_question(grown: _Grown) -> list[type[Effect]]:
@@ -122,13 +124,29 @@ class _Search:
     rng: np.random.Generator
     tick: Tick
 
-    def grown(self, rough: Case, first: Fitted, memory: Memory) -> tuple[Fitter, _Grown]:
+    def answer(self, case: Case, rough: Case, first: Fitted, memory: Memory) -> _Answer:
         """Look at the whole catalogue, add effects, and take out what became superfluous."""
         guard, found = _looks(rough, first, self.kinds, self.tick, memory)
         fitter = Fitter(rough, guard, tolerances(rough, found))
         looked = _Looked.at(fitter.guard(first), found, self.rng)
         grown = _grown(fitter, looked, self.kinds, self.alpha, self.rng, self.tick)
-        return fitter, _pruned(fitter, grown, self.rng, self.tick)
+        return _Answer(case=case, fitter=fitter, grown=_pruned(fitter, grown, self.rng, self.tick))
+
+    def answer_by_ratios(self, case: Case, rough: Case, first: Fitted, memory: Memory) -> _Answer:
+        """The same where the noise is not known: as loud as the plain cell leaves, then as what was found leaves."""
+        loud = self.answer(*as_loud_as_left(case, rough, first), memory)
+        if not loud.grown.steps:
+            return loud
+        model = Fitter(loud.fitter.case).linearise(loud.grown.last.fitted.state)
+        quiet, rough, _ = as_loud_as_left(case, rough, model)
+        share, detected = quieter(loud.case, quiet), loud.grown.base.p_value
+        if share > MOST_OF_UNKNOWN:
+            return dc.replace(loud, noise_share=share, detected=detected)
+        # What was noise so far was missing physics: with less noise the pushes tell more.
+        self.tick("plain fit with less noise", 0, 0)
+        first = Fitter(rough).fit(loud.grown.base.fitted.state, renew=True)
+        again = dc.replace(self, kinds=_in_question(loud.grown)).answer(quiet, rough, first, Memory())
+        return dc.replace(again, noise_share=share, detected=detected)
 
 
 @dc.dataclass(frozen=True, kw_only=True)

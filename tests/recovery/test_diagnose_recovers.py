@@ -129,6 +129,19 @@ def test_a_noise_that_nothing_tells_is_what_the_plain_cell_leaves():
     assert any("what the plain cell leaves" in warning for warning in diagnosis.warnings)
 
 
+def test_where_no_noise_is_known_an_effect_is_found_by_the_quiet_that_it_leaves():
+    recording = endpoints(world(count=8, pull=(ERASER.mass * 9.81 * 0.03, 0.0)))
+    made = case(replace(recording, sensors=Sensors()))
+    diagnosis, evidence = diagnose(made, effects=("table_tilt", "com_offset"))
+    assert not made.noise.known
+    assert diagnosis.verdict in ("explained", "ambiguous")
+    (found,) = diagnosis.effects
+    assert "table_tilt" in (found.name, *found.indistinguishable_from)
+    assert evidence.noise_share < 0.5
+    # The p-value is that of a noise as loud as the plain cell leaves, not of the smaller one.
+    assert diagnosis.p_value == evidence.detected < 0.01
+
+
 def test_an_object_that_never_moves_is_refused():
     recording = world(count=1)
     push = recording.pushes[0]
