@@ -39,12 +39,15 @@ class Pressure:
         points: (3, 2) of support, in B [m].
         near: share of the weight within `NEAR` of the points.
         even: the same share if the pressure were even.
+        gyration: radius of gyration of the pressure [m]: found, of the points, and if it were even. Friction's torque
+            feels hardly more of a pressure than this.
     """
 
     map: Array
     points: tuple[tuple[float, float], ...]
     near: float
     even: float
+    gyration: tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,6 +188,17 @@ def weight_near(pressure: Array, points: Array) -> tuple[float, float]:
     return float(load[near].sum() / load.sum()), float((inside & near).sum() / inside.sum())
 
 
+def gyration_of(pressure: Array, points: Array) -> tuple[float, float, float]:
+    """Radii of gyration about the centroid [m]: of a pressure, of feet at points (3, 2) that balance, if even."""
+    x, y, inside = _raster()
+    squares = (x - _CORNER) ** 2 + (y - _CORNER) ** 2
+    load = pressure.ravel()
+    loads = np.linalg.solve(np.vstack([np.ones(3), points.T]), np.array([1.0, 0.0, 0.0]))
+    of_points = float(loads @ (points**2).sum(axis=1))
+    found, even = float(load @ squares / load.sum()), float(squares[inside].mean())
+    return math.sqrt(found), math.sqrt(max(0.0, of_points)), math.sqrt(even)
+
+
 def _raster() -> tuple[Array, Array, NDArray[np.bool_]]:
     """Square millimetres of the box: x, y from the right angle [m], and which are in the triangle; (22500,) each."""
     ticks = np.arange(0.5 * _GRID, _LEG, _GRID)
@@ -199,7 +213,10 @@ def _pressure(case: RealCase, said: dict[str, Any]) -> Pressure | None:
         return None
     pressure = balanced_pressure(np.array(found["parameters"]["weights"]["value"], dtype=np.float64))
     near, even = weight_near(pressure, points)
-    return Pressure(map=pressure, points=tuple((x, y) for x, y in points.tolist()), near=near, even=even)
+    return Pressure(
+        map=pressure, points=tuple((x, y) for x, y in points.tolist()), near=near, even=even,
+        gyration=gyration_of(pressure, points),
+    )  # fmt: skip
 
 
 def _fresh(file: Path) -> tuple[float, float]:

@@ -15,7 +15,8 @@ from physid_drake.prove.real_score import NEAR, Pressure, RealOutcome
 
 FORMAT = "physid-proof-real/1"
 COLUMNS = ("case", "pushes", "chi2 plain", "after", "verdict", "names", "held out mm", "deg", "fresh mm", "deg",
-           "ellipsoid mm", "deg", "4th order mm", "deg", "weight near the points")  # fmt: skip
+           "ellipsoid mm", "deg", "4th order mm", "deg", "weight near the points",
+           "radius of gyration mm")  # fmt: skip
 _LEG, _CORNER = 150.0, 50.0  # mm
 
 
@@ -35,7 +36,7 @@ def _row(outcome: RealOutcome) -> tuple[str, ...]:
         o.case.name, str(o.pushes), _fixed(o.chi2[0]), _fixed(o.chi2[1]), o.verdict,
         " + ".join(" or ".join(names) for names in o.classes) or "-",
         _change([1e3 * v for v in o.position]), _change([math.degrees(v) for v in o.rotation]),
-        *_errors(o.fresh), *models[0], *models[1], near,
+        *_errors(o.fresh), *models[0], *models[1], near, _gyration(o),
     )  # fmt: skip
 
 
@@ -55,8 +56,16 @@ NOTES = (
     "Held out: pushes of the diagnosis, each predicted while left out of the fit, plain cell to model with what was"
     " found. Fresh: end points of pushes that the diagnosis did not get. Ellipsoid, 4th order: the publishers' models"
     f" on the diagnosed pushes. Weight near the points: share of the pressure found within {1e3 * NEAR:g} mm of the"
-    " points that the object stood on. All errors are root mean squares."
+    " points that the object stood on. Radius of gyration of the pressure: what friction's torque feels of it."
+    " All errors are root mean squares."
 )
+
+
+def _gyration(outcome: RealOutcome) -> str:
+    if outcome.pressure is None:
+        return "-"
+    found, points, even = (f"{1e3 * r:.0f}" for r in outcome.pressure.gyration)
+    return f"{found} (points: {points}, even: {even})"
 
 
 def real_markdown(outcomes: Sequence[RealOutcome]) -> str:
@@ -99,6 +108,9 @@ def _case(outcome: RealOutcome) -> dict[str, Any]:
         "fresh": _numbers(o.fresh),
         "published": None if o.published is None else {name: _numbers(e) for name, e in o.published.items()},
         "weight_near_points": None if pressure is None else {"found": pressure.near, "even": pressure.even},
+        "gyration_m": None
+        if pressure is None
+        else dict(zip(("found", "points", "even"), pressure.gyration, strict=True)),
         "seconds": _numbers((o.seconds,))[0],
     }
 
