@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from physid_drake.prove.shapes import Array, Solid, gyration_squared, outline_of
+from physid_drake.prove.shapes import Array, Solid, gyration_squared, height_of, outline_of
 from physid_drake.prove.world_plan import Plan
 from physid_drake.recording import Box, Cylinder, Prism
 
@@ -35,6 +35,26 @@ def feet_of(shape: Solid) -> tuple[Array, Array]:
     if isinstance(shape, Cylinder):
         return _ring_feet(shape.radius)
     return _triangle_feet(shape)
+
+
+def friction_that_lifts(shape: Solid) -> float:
+    """Least friction that lifts an edge of a uniform object pushed at half its height, or sliding."""
+    feet, weights = feet_of(shape)
+    spread = np.linalg.inv((feet * weights[:, None]).T @ feet)
+    return 1.0 / (height_of(shape) / 2.0 * float(np.linalg.norm(feet @ spread, axis=1).max()))
+
+
+def stays_loaded(plan: Plan) -> bool:
+    """Whether every foot carries weight, at rest and sliding any way."""
+    feet, weights = weighted_feet(plan)
+    columns = np.column_stack([np.ones(len(feet)), feet])
+    moments = (columns * weights[:, None]).T @ columns
+    if np.linalg.cond(moments) > 1e12:
+        return False
+    shift = 1.05 * plan.support_friction * height_of(plan.shape) / 2.0
+    ways = [(math.cos(a), math.sin(a)) for a in np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False).tolist()]
+    centres = np.array([[1.0, plan.com[0] + shift * c, plan.com[1] + shift * s] for c, s in ways])
+    return bool((columns @ np.linalg.solve(moments, centres.T)).min() > 0.0)
 
 
 def _grid_feet(shape: Box) -> tuple[Array, Array]:

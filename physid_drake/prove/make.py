@@ -25,11 +25,12 @@ import numpy as np
 
 from physid_drake.errors import ParameterError, PhysidError
 from physid_drake.prove.contact import RESIDUAL_RESTITUTION
-from physid_drake.prove.drawing import TABLE_SIZE, Knob, Noise, Rng, Scene, draw_knob, draw_scene
 from physid_drake.prove.effects.catalogue import CATALOGUED, OTHERS
 from physid_drake.prove.effects.effect import Effect, parameters_of
 from physid_drake.prove.floor import floor_of
+from physid_drake.prove.knobs import Knob, draw_knob
 from physid_drake.prove.mujoco_world import PushWorld
+from physid_drake.prove.scene import TABLE_SIZE, Noise, Rng, Scene, draw_scene
 from physid_drake.prove.seal import write_seal
 from physid_drake.prove.shapes import Array, height_of
 from physid_drake.prove.world_plan import Motion

@@ -15,11 +15,12 @@ from reference import planar
 
 from physid_drake.errors import ProofError
 from physid_drake.prove import make, mujoco_world
-from physid_drake.prove.drawing import draw_knob, draw_scene
 from physid_drake.prove.effects import catalogue as fx
 from physid_drake.prove.effects.effect import parameters_of
 from physid_drake.prove.feet import feet_of, weighted_feet
+from physid_drake.prove.knobs import draw_knob
 from physid_drake.prove.mujoco_world import PushWorld
+from physid_drake.prove.scene import draw_scene
 from physid_drake.prove.shapes import distance_outside, gyration_squared, height_of, outline_of, plan_moments
 from physid_drake.prove.world_plan import GRAVITY, HandPath, Plan
 from physid_drake.recording import Box, Cylinder, Prism, read_recording
@@ -363,7 +364,7 @@ def test_a_larger_object_is_touched_earlier():
 def test_the_package_shares_nothing_with_the_diagnosis():
     forbidden = {"effects", "cell", "identify", "diagnose"}
     folder = Path(mujoco_world.__file__).parent
-    worlds = ("make", "drawing", "shapes", "feet", "world_plan", "contact", "mujoco_xml", "mujoco_world")
+    worlds = ("make", "scene", "knobs", "shapes", "feet", "world_plan", "contact", "mujoco_xml", "mujoco_world")
     for file in [*(folder / f"{name}.py" for name in worlds), *(folder / "effects").glob("*.py")]:
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []

@@ -1,0 +1,120 @@
+"""Effects of the object against closed forms. Measured errors stand beside the tolerances."""
+
+import math
+
+import numpy as np
+import pytest
+from motions import BOX, MASS, MU, POLAR, SIZE, G, at, built, end, make, push_along_x, slide, velocities
+from twin import body_of
+
+from physid_drake.cell import Start
+from physid_drake.cell.forces import Wrench
+from physid_drake.cell.support import PressureGrid
+from physid_drake.effects.rollout import Geometry
+from physid_drake.recording import Cylinder
+
+LYING = Geometry(shape=Cylinder(radius=0.033, length=0.1, axis="y"))
+
+
+def test_a_grain_of_the_object_turns_with_the_object():
+    angle = 0.7
+    R = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    grain = make("anisotropic_object", ratio=2.0, angle=0.3)
+    plain = slide(grain, velocity=(0.4, 0.2, 3.0))
+    turned = slide(grain, velocity=(*(R @ [0.4, 0.2]), 3.0), pose=(0.0, 0.0, angle))
+    np.testing.assert_allclose(end(turned)[:2], R @ end(plain)[:2], atol=1e-6)  # measured 5e-16
+    assert end(turned)[2] - angle == pytest.approx(end(plain)[2], abs=1e-5)
+
+
+def test_a_grain_of_the_object_and_the_same_of_the_table_are_one_while_it_does_not_turn():
+    table = slide(make("anisotropic_table", ratio=2.0, angle=0.9), pose=(0, 0, 0.5))
+    on_object = slide(make("anisotropic_object", ratio=2.0, angle=0.4), pose=(0, 0, 0.5))
+    # Until it turns: the box turns by little.
+    times = np.linspace(0.0, 0.05, 6)
+    np.testing.assert_allclose(at(table, times), at(on_object, times), atol=1e-6)
+
+
+def test_rolling_resistance_slows_a_rolling_cylinder_by_two_thirds_g_b_over_r():
+    b, r = 1e-3, 0.033
+    motion = slide(make("rolling_resistance", coefficient=b), velocity=(0.2, 0.0, 0.0), geometry=LYING)
+    want = 2.0 / 3.0 * G * b / r
+    rate = np.polyfit(motion.times[5:200], np.gradient(at(motion, motion.times)[5:200, 0], 2e-3), 1)[0]
+    assert -rate == pytest.approx(want, rel=1e-3)  # measured 2.4e-4
+
+
+def test_a_rolling_cylinder_stops_and_stays():
+    motion = slide(make("rolling_resistance", coefficient=0.004), velocity=(0.1, 0.0, 0.0), geometry=LYING)
+    want = 0.1**2 / (2 * (2.0 / 3.0 * G * 0.004 / 0.033))
+    assert end(motion)[0] == pytest.approx(want, abs=5e-5)  # measured 1.4e-5 m
+    assert np.abs(velocities(motion)[-20:, 0]).max() < 1e-3
+
+
+def test_rolling_resistance_leaves_a_slide_along_the_axis():
+    effect = make("rolling_resistance", coefficient=0.004)
+    assert end(slide(effect, velocity=(0.0, 0.3, 0.0), geometry=LYING))[1] == pytest.approx(
+        0.09 / 2 / MU / G, rel=0.01
+    )
+
+
+def spun(*effects, rate=10.0, **more):
+    return slide(*effects, velocity=(0.0, 0.0, rate), **more)
+
+
+@pytest.mark.parametrize(
+    "weights", [((3.0, 1.0, 3.0),) * 3, ((1.0,) * 3, (9.0,) * 3, (1.0,) * 3), ((5, 1, 5), (1, 1, 1), (5, 1, 5))]
+)
+def test_weights_at_the_rim_shorten_a_spin_by_their_mean_arm(weights):
+    grid = tuple(tuple(float(w) for w in row) for row in weights)
+    motion = spun(make("uneven_support", weights=grid), points=100)
+    support = built(Geometry(shape=BOX.shape, pressure=PressureGrid(weights=grid)), False, "point", 100).scene.support
+    arm = float(support.weights @ np.hypot(*support.points.T))
+    want = POLAR * 10.0**2 / (2 * MU * G * arm)
+    assert end(motion)[2] == pytest.approx(want, rel=1e-3)  # measured 6e-5
+    # The weights' own mean arm, by brute force over the cells of the grid.
+    x, y = np.meshgrid((np.arange(300) + 0.5) / 300, (np.arange(300) + 0.5) / 300, indexing="ij")
+    share = np.array(grid)[(3 * x).astype(int), (3 * y).astype(int)]
+    far = np.hypot((x - 0.5) * SIZE[0], (y - 0.5) * SIZE[1])
+    assert arm == pytest.approx(float((share * far).sum() / share.sum()), rel=1e-3)  # measured 3e-4
+
+
+def test_the_pressure_still_balances_an_offset_centre_of_mass():
+    grid = ((3.0, 1.0, 1.0), (1.0, 1.0, 1.0), (1.0, 1.0, 2.0))
+    effects = (make("uneven_support", weights=grid), make("com_offset", x=0.01, y=-0.005))
+    motion = slide(*effects, velocity=(0.0, 0.0, 0.0), seconds=0.5)
+    np.testing.assert_allclose(end(motion), 0.0, atol=1e-9)  # no motion without a push
+    cell = built(Geometry(shape=BOX.shape, pressure=PressureGrid(weights=grid)), False)
+    seen = []
+
+    class Watch:
+        def wrench(self, state):
+            seen.append(state)
+            return Wrench(fx=0.0, fy=0.0, torque=0.0)
+
+    cell.rollout(body_of(MASS, MU, com=(0.01, -0.005)), start=Start(pose=(0, 0, 0)), path=None, begin=0.0, end=0.01,
+                 laws=(Watch(),))  # fmt: skip
+    loads = seen[0].loads
+    assert loads.sum() == pytest.approx(MASS * G, rel=1e-9)
+    np.testing.assert_allclose(loads @ (seen[0].p_WQ - seen[0].p_WBcm), 0.0, atol=1e-8)  # measured 4e-11 N m
+
+
+def test_a_push_beside_the_centre_of_mass_turns_away_from_it():
+    plain, _ = push_along_x()
+    for y in (0.01, -0.01):
+        motion, _ = push_along_x(make("com_offset", y=y))
+        # The mass lags behind on its side: at y > 0 the object turns to +, counter-clockwise.
+        assert math.copysign(1.0, y) * end(motion)[2] > 0.05
+    assert abs(end(plain)[2]) < 1e-6
+
+
+@pytest.mark.parametrize("ratio", [0.5, 2.0])
+def test_a_spin_lasts_in_proportion_to_the_inertia(ratio):
+    assert end(spun(make("rotational_inertia", ratio=ratio)))[2] == pytest.approx(
+        ratio * end(spun())[2], rel=1e-3
+    )  # measured 2e-4
+
+
+def test_a_larger_object_is_touched_earlier_by_half_its_growth():
+    plain, path = push_along_x()
+    larger, _ = push_along_x(make("size_error", ratio=1.04))
+    earlier = path.positions(np.array([plain.impacts[0]])) - path.positions(np.array([larger.impacts[0]]))
+    assert earlier[0, 0] == pytest.approx(0.5 * 0.04 * SIZE[0], abs=1e-6)  # measured 3e-7 m

@@ -1,0 +1,34 @@
+"""Effects of the world around against closed forms. Measured errors stand beside the tolerances."""
+
+import numpy as np
+import pytest
+from motions import MASS, MU, G, distance, end, make, slide
+
+
+@pytest.mark.parametrize(("c", "most"), [(0.3, 1e-3), (3.0, 8e-3), (30.0, 0.05)])
+def test_quadratic_drag_stops_the_object_where_the_equation_says(c, most):
+    want = distance(lambda v: MU * G + c * v * v / MASS)
+    # Measured: 5e-4, 4.7e-3 and 2.9e-2 (of 12 mm), for the same reason.
+    assert end(slide(make("quadratic_drag", coefficient=c)))[0] == pytest.approx(want, rel=most)
+
+
+@pytest.mark.parametrize("rest_length", [0.0, 0.06])
+def test_a_tether_pulls_with_its_stretch(rest_length):
+    tether = make("tether", stiffness=2.0, x=0.06, y=0.08, rest_length=rest_length)
+    motion = slide(tether, velocity=(0.0, 0.0, 0.0), friction=1e-6, seconds=0.1)
+    pull = 2.0 * (0.1 - rest_length) / MASS
+    # Half a t^2, less the little by which the pull has fallen.
+    want = 0.5 * pull * 0.1**2 * np.array([0.6, 0.8])
+    np.testing.assert_allclose(end(motion)[:2], want, rtol=0.01)  # measured 4.6e-3
+
+
+def test_a_slack_cable_does_not_pull():
+    tether = make("tether", stiffness=2.0, x=0.06, y=0.08, rest_length=0.2)
+    assert np.array_equal(slide(tether).poses[-1], slide().poses[-1])
+
+
+def test_a_magnet_attracts_with_its_strength_over_the_square():
+    magnet = make("magnet", strength=1e-3, x=0.06, y=-0.08, core=0.03)
+    motion = slide(magnet, velocity=(0.0, 0.0, 0.0), friction=1e-6, seconds=0.1)
+    want = 0.5 * 1e-3 / (0.1**2 + 0.03**2) / MASS * 0.1**2 * np.array([0.6, -0.8])
+    np.testing.assert_allclose(end(motion)[:2], want, rtol=0.01)  # measured 3.9e-3
