@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -123,6 +122,6 @@ def watched(setting: Setting) -> tuple[CellEngine, Watch]:
     stepper = cell._stepper
     exchange = dict.fromkeys(("SetPositionsAndVelocities", "GetPositionsAndVelocities"), "state")
     stepper._simulator = _Watched(stepper._simulator, watch, {"AdvanceTo": "advance", "Initialize": "state"})
-    stepper._scene = dataclasses.replace(stepper._scene, plant=_Watched(stepper._scene.plant, watch, exchange))
+    stepper._state._plant = _Watched(stepper._state._plant, watch, exchange)
     cell.set_body = watch.wrap("theta", cell.set_body)
     return engine, watch

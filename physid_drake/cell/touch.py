@@ -27,6 +27,14 @@ class Touch(NamedTuple):
     rate: float
 
 
+class HandMove(NamedTuple):
+    """The tip's way over a step: ``start`` and ``goal`` of its centre (2,) [m], and velocity [m/s]."""
+
+    start: list[float]
+    goal: list[float]
+    velocity: tuple[float, float]
+
+
 class Tip:
     """The hand's round tip beside the object's outline. Plain floats throughout, since a rollout asks every tick."""
 

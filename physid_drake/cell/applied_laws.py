@@ -1,0 +1,41 @@
+"""Force and friction laws at work on the object over a rollout: their impulses, and whether friction holds them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from physid_drake.cell.forces import ForceLaw, FrictionLaw, Swinging, total_wrenches
+from physid_drake.cell.plant_state import PlantState
+
+SURELY_HELD = 0.5  # of the friction: a resting object under less does not slide
+
+
+class AppliedLaws:
+    """The laws of one rollout."""
+
+    def __init__(self, laws: Sequence[ForceLaw], frictions: Sequence[FrictionLaw]) -> None:
+        """``frictions`` give back what the contact, which holds their largest friction, has too much."""
+        self._laws, self._frictions = laws, frictions
+
+    def act(self, state: PlantState, time: float, span: float) -> None:
+        """Add the laws' impulses over a tick [s] to the object's velocities."""
+        if not self._laws and not self._frictions:
+            return
+        seen = state.object_state(time)
+        for wrench in total_wrenches(seen, self._laws, self._frictions):
+            state.kick(seen.yaw, span * wrench.fx, span * wrench.fy, span * wrench.torque)
+            if wrench.tip_x or wrench.tip_y:
+                state.rock(seen.yaw, span * wrench.tip_x, span * wrench.tip_y)
+
+    def are_held(self, state: PlantState, time: float) -> bool:
+        """Whether friction surely holds a resting object against the laws' forces."""
+        if not self._laws:
+            return True
+        seen = state.object_state(time)
+        limit = float(seen.holding.sum())
+        reach = math.sqrt(seen.inertia / seen.mass)
+        wrenches = total_wrenches(seen, self._laws, self._frictions)
+        pull = sum(math.hypot(w.fx, w.fy) + abs(w.torque) / reach for w in wrenches)
+        pull += sum(law.strongest() for law in self._laws if isinstance(law, Swinging))
+        return pull < SURELY_HELD * limit
