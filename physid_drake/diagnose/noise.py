@@ -86,6 +86,8 @@ def tracker_noise(recording: Recording) -> tuple[TrackerNoise, Noise]:
     warnings: list[str] = []
     position, tau_xy = _chosen("position", plain.position, plain.source["position"], seen_xy, warnings)
     rotation, tau_yaw = _chosen("rotation", plain.rotation, plain.source["rotation"], seen_yaw, warnings)
+    if seen_yaw is None:  # too little rest for one stream, enough for two: it is the same tracker's filter
+        tau_yaw = tau_xy
     noise = TrackerNoise(
         position=position,
         rotation=rotation,

@@ -7,9 +7,11 @@ import pytest
 from recovery.worlds import POSITION_STD, endpoints, pushes_of, recorded
 from reference.scenes import OBJECTS, Theta
 
+from physid_drake.diagnose import noise as noise_module
 from physid_drake.diagnose.features import features_of
 from physid_drake.diagnose.noise import _reml, tracker_noise
 from physid_drake.identify.problem import problems_of
+from physid_drake.recording import rest_segments
 
 ERASER = OBJECTS["eraser"]
 
@@ -49,6 +51,18 @@ def test_a_stated_noise_that_the_rests_contradict_is_not_believed(recording):
     noise, _ = tracker_noise(wrong)
     assert noise.position == pytest.approx(POSITION_STD, rel=0.15)
     assert "position" in noise.warnings[0]
+
+
+def test_a_rest_too_short_for_one_stream_tells_yaw_what_it_tells_of_the_place(recording, monkeypatch):
+    # As many samples as two streams (x and y) need together.
+    seen = {2: (POSITION_STD, 0.02), 1: None}
+    monkeypatch.setattr(noise_module, "_reml", lambda pieces: seen[len(pieces) // rests_of(recording)])
+    noise, _ = tracker_noise(recording)
+    assert noise.correlation_time == (0.02, 0.02)
+
+
+def rests_of(recording):
+    return sum(len(rest_segments(push)) for push in recording.pushes)
 
 
 def test_a_noise_that_is_neither_stated_nor_seen_is_not_known(recording):
