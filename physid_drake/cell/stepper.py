@@ -106,15 +106,17 @@ class Stepper:
     def _begin_at(self, start: Start, rest: Array) -> None:
         """Place object and hand; a sprung tip is no body of Drake's, whose hand stays parked then."""
         self._drift.forget()
-        self._soft = None
-        if self._hand is not None and self._mount is None:
-            start = dc.replace(start, pose=self._clear_of_hand(start.pose, self._hand[0]))
-        self._state.begin(self._body, start, rest)
-        if self._hand is not None and self._mount is None:
-            self._state.set_hand(self._hand[0], self._height, (0.0, 0.0))
-        elif self._hand is not None and self._mount is not None:
-            self._soft = SoftTip(self._mount, self._tip, self._body, self._state.inertia)
-            self._soft.begin(self._state.section(self._height)[0], self._hand[0], self._move(0, 1).velocity)
+        self._soft, state = None, self._state
+        if self._hand is None:
+            state.begin(self._body, start, rest)
+        elif self._mount is None:
+            pose = self._clear_of_hand(start.pose, self._hand[0])
+            state.begin(self._body, dc.replace(start, pose=pose), rest)
+            state.set_hand(self._hand[0], self._height, (0.0, 0.0))
+        else:
+            state.begin(self._body, start, rest)
+            self._soft = SoftTip(self._mount, self._tip, self._body, state.inertia)
+            self._soft.begin(state.section(self._height)[0], self._hand[0], self._move(0, 1).velocity)
         self._restart(0.0)
 
     def _clear_of_hand(self, pose: Planar, hand: list[float]) -> Planar:
@@ -139,7 +141,7 @@ class Stepper:
         return self._tip.touch(pose, twist, hand, velocity)
 
     def _move(self, k: int, m: int) -> HandMove:
-        """Of the hand from tick ``k`` to tick ``m``."""
+        """The hand's way from tick ``k`` to tick ``m``."""
         assert self._hand is not None
         start, goal, span = self._hand[k], self._hand[m], (m - k) * self._solver.time_step_s
         return HandMove(start, goal, ((goal[0] - start[0]) / span, (goal[1] - start[1]) / span))
