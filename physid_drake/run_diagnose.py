@@ -33,7 +33,7 @@ from physid_drake.run_folder import RunFolder
 STATE = "stages.npz"
 SHOWN = 12  # pushes in the animation
 ALPHA = 0.01  # false-alarm rate
-LONGEST_TICK = 2e-2  # s, for slow pushes: at 2 mm/s within 3 micrometres and 0.02 mrad of ticks of 1 ms
+LONGEST_TICK = 2e-2  # s, for slow pushes: within 0.03 mm and 0.3 mrad of ticks of 1 ms (benchmarks/slow_pushes.py)
 
 
 def run(arguments: argparse.Namespace) -> int:

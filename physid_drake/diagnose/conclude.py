@@ -11,11 +11,17 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from physid_drake.diagnose.case import UNIT_SCATTER, Case
-from physid_drake.diagnose.confirm import EXPLAINED, Candidate, push_scores, rivals, standard_error
+from physid_drake.diagnose.confirm import (
+    EXPLAINED,
+    Candidate,
+    left_out_residuals,
+    push_scores,
+    rivals,
+    standard_error,
+)
 from physid_drake.diagnose.estimates import parameters_of, rms, smallest, theta_of
 from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, mismatch, unexplained
 from physid_drake.diagnose.fit import Fitted
-from physid_drake.diagnose.linear import left_out_scores
 from physid_drake.diagnose.localise import locate
 from physid_drake.diagnose.regimes import regime_gains
 from physid_drake.diagnose.screen import (
@@ -127,7 +133,8 @@ def _probability(step: Sequence[Candidate]) -> float:
         difference = best.gains - other.gains
         # Some error of the scores themselves, so that few pushes do not make sure.
         spread = math.hypot(standard_error(difference), 2.0)
-        worse = float(stats.norm.sf(difference.sum() / spread))
+        # What is more complicated and no better than a little is at most as likely.
+        worse = float(stats.norm.sf(max(0.0, difference.sum()) / spread))
         total += worse / max(1.0 - worse, 1e-9)
     return 1.0 / total
 
@@ -154,8 +161,7 @@ def _quality(case: Case, plain: Fitted, after: Fitted) -> FitQuality:
     figures = []
     per_push: list[list[float]] = []
     for fitted in (plain, after):
-        _, residuals = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std)
-        poses = [f.poses(r) for f, r in zip(case.features, residuals, strict=True)]
+        poses = [f.poses(r) for f, r in zip(case.features, left_out_residuals(fitted), strict=True)]
         sigmas = [p / f.sigmas for p, f in zip(poses, case.features, strict=True)]
         every, scaled = np.concatenate(poses), np.concatenate(sigmas)
         per_push.append([rms(s) for s in sigmas])

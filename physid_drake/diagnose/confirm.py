@@ -30,6 +30,8 @@ FELL_SHORT = 0.8  # of the gain that the score test promised: such a fit is trie
 PERSISTENT = 2  # candidates that are worth that, where none explains the pushes
 EXPLAINED = 1.5  # cost per degree of freedom above which something is still missing
 LEAST_SHARE = 0.25  # of the cost beyond noise that an effect must take away unless nothing is left
+A_COORDINATE = 2.0  # nats of held-out gain that one more coordinate must be worth
+A_LAW = 0.01  # of the gain: two honest implementations of one effect differ by more
 FAR_OFF = 3.0  # cost per degree of freedom from which the pushes' unknowns would imitate what is missing
 FAR = 0.3  # of theta's unit cube
 
@@ -54,6 +56,11 @@ class Candidate:
     def name(self) -> str:
         """The effect's."""
         return self.score.kind.name
+
+    @property
+    def coordinates(self) -> int:
+        """How many numbers the effect has."""
+        return len(self.fitted.state.effects[-1].point)
 
     @property
     def gain(self) -> float:
@@ -91,9 +98,23 @@ def standard_error(values: Array) -> float:
 
 
 def push_scores(fitted: Fitted) -> Array:
-    """Log predictive density (n,) of each push, fitted without it."""
+    """Log predictive density (n,) of each push, fitted without it; each bears its part of the tolerances' use.
+
+    A model may claim that all pushes share an error of the simulator or of a caliper. The others then predict the
+    push that is left out with that very error, at no cost: a centre of mass off by ten tolerances would be predicted
+    as well as by the effect.
+    """
     scores, _ = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std)
-    return scores
+    return scores - fitted.tolerance_cost / len(scores)
+
+
+def left_out_residuals(fitted: Fitted) -> tuple[Array, ...]:
+    """Recorded less predicted (m_i,) of each push, by the model as it leaves, fitted without that push."""
+    tolerances = len(fitted.prior_mean) - fitted.own_dimension
+    _, residuals = left_out_scores(
+        fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std, tolerances=tolerances
+    )
+    return residuals
 
 
 def confirm(
@@ -149,7 +170,19 @@ def rejudged(candidates: Sequence[Candidate], plain: Fitted) -> tuple[Candidate,
 
 
 def _ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
-    return sorted(candidates, key=lambda c: (c.degenerate, -c.gain))
+    """Best held-out gain first; before it the simplest that does as well: a far-off spring is a tilted table."""
+    ordered = sorted(candidates, key=lambda c: (c.degenerate, -c.gain))
+    if not ordered:
+        return []
+    best = ordered[0]
+    as_good = [c for c in ordered if c is best or (c.accepted and _does_as_well(c, best))]
+    first = min(as_good, key=lambda c: c.coordinates)
+    return [first, *(c for c in ordered if c is not first)]
+
+
+def _does_as_well(simple: Candidate, best: Candidate) -> bool:
+    spared = best.coordinates - simple.coordinates
+    return spared > 0 and best.gain - simple.gain < A_COORDINATE * spared + A_LAW * best.gain
 
 
 def _explained(candidates: Sequence[Candidate]) -> bool:

@@ -107,6 +107,11 @@ class Fitted:
         return len(self.state.u) + sum(len(e.free) for e in self.state.effects)
 
     @property
+    def tolerance_cost(self) -> float:
+        """How unlikely the use is that the model makes of its tolerances: half their squares, in deviations."""
+        return 0.5 * float(np.sum(self.solution.beta[self.own_dimension :] ** 2))
+
+    @property
     def degrees(self) -> int:
         """Residuals less shared parameters."""
         return sum(len(p.residual) for p in self.pushes) - self.own_dimension

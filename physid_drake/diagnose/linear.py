@@ -148,6 +148,7 @@ def left_out_scores(
     prior_mean: Array,
     prior_std: Array,
     folds: Sequence[Sequence[int]] | None = None,
+    tolerances: int = 0,
 ) -> tuple[Array, tuple[Array, ...]]:
     """Predict pushes by a fit to those of the other folds.
 
@@ -157,9 +158,11 @@ def left_out_scores(
         prior_mean: (d,) of beta.
         prior_std: (d,).
         folds: indices of pushes that are left out together; None leaves out one at a time.
+        tolerances: how many of beta's last entries are tolerances, which are not part of the model that leaves.
 
     Returns:
-        (n,) log predictive densities, and the residuals (m_i,) of the predictions with the push's unknowns at zero.
+        (n,) log predictive densities, and the residuals (m_i,) of the predictions with the push's unknowns and the
+        tolerances at zero.
     """
     pieces = [_information(push, scatter) for push in pushes]
     information = sum((p[0] for p in pieces), np.diag(1.0 / prior_std**2))
@@ -170,8 +173,10 @@ def left_out_scores(
     for fold in folds or [(i,) for i in range(len(pushes))]:
         others = information - sum(pieces[i][0] for i in fold) + ridge
         beta = np.linalg.solve(others, right - sum(pieces[i][1] for i in fold))
+        model = np.concatenate([beta[: len(beta) - tolerances], np.zeros(tolerances)])
         for i in fold:
-            scores[i], residuals[i] = _predicted(pushes[i], scatter, beta, others)
+            scores[i] = _log_density(pushes[i], scatter, beta, others)
+            residuals[i] = pushes[i].residual - pushes[i].shared @ model
     return scores, tuple(residuals)
 
 
@@ -181,11 +186,11 @@ def _information(push: LinearPush, scatter: float) -> tuple[Array, Array]:
     return push.shared.T @ solved, solved.T @ push.residual
 
 
-def _predicted(push: LinearPush, scatter: float, beta: Array, precision: Array) -> tuple[float, Array]:
-    """Log density of a push under beta with its precision (d, d), and the residual (m,) of its mean."""
+def _log_density(push: LinearPush, scatter: float, beta: Array, precision: Array) -> float:
+    """Of a push under beta with its precision (d, d)."""
     spread = push.covariance(scatter) + push.shared @ np.linalg.solve(precision, push.shared.T)
     lower = np.linalg.cholesky(0.5 * (spread + spread.T))
     left = push.residual - push.shared @ beta
     white = solve_triangular(lower, left, lower=True)
     log_root = float(np.log(np.diag(lower)).sum())
-    return -0.5 * float(white @ white) - log_root - 0.5 * len(left) * np.log(2.0 * np.pi), left
+    return -0.5 * float(white @ white) - log_root - 0.5 * len(left) * float(np.log(2.0 * np.pi))

@@ -17,7 +17,7 @@ from scipy import stats
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import EffectPoint, Fitted, Fitter
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve
-from physid_drake.effects import Effect, Family
+from physid_drake.effects import Effect, Family, Surroundings
 from physid_drake.identify.rollouts import Task
 
 Array = NDArray[np.float64]
@@ -36,12 +36,14 @@ class Signature:
         family: where in its chart.
         columns: per push (m, p).
         one_sided: (p,) whether a direction may only be followed forwards.
+        stds: (p,) prior standard deviations; inf where nothing is known.
     """
 
     kind: type[Effect]
     family: Family
     columns: tuple[Array, ...]
     one_sided: tuple[bool, ...]
+    stds: tuple[float, ...]
 
     @property
     def steps(self) -> int:
@@ -139,15 +141,21 @@ def signatures(
 def empty_signatures(fitter: Fitter, kinds: Sequence[type[Effect]]) -> list[Signature]:
     """All families of the effects, their columns still to be found."""
     return [
-        Signature(kind=kind, family=family, columns=(), one_sided=_one_sided(fitter, kind, family))
+        _empty_signature(kind, family, fitter.case.around)
         for kind in kinds
         for family in kind.families(fitter.case.around)
     ]
 
 
-def _one_sided(fitter: Fitter, kind: type[Effect], family: Family) -> tuple[bool, ...]:
-    chart = kind.chart(fitter.case.around)
-    return tuple(chart[j].lower >= family.point[j] for j in family.free)
+def _empty_signature(kind: type[Effect], family: Family, around: Surroundings) -> Signature:
+    chart = kind.chart(around)
+    return Signature(
+        kind=kind,
+        family=family,
+        columns=(),
+        one_sided=tuple(chart[j].lower >= family.point[j] for j in family.free),
+        stds=tuple(chart[j].std / (chart[j].step * family.size) for j in family.free),
+    )
 
 
 def _reaches(fitter: Fitter, kind: type[Effect], family: Family, i: int) -> bool:
@@ -192,7 +200,7 @@ def score(fitted: Fitted, signature: Signature) -> Score:
     while kept:
         pushes = extended(fitted.pushes, [c[:, kept] for c in signature.columns])
         mean = np.concatenate([fitted.prior_mean, np.zeros(len(kept))])
-        std = np.concatenate([fitted.prior_std, np.full(len(kept), np.inf)])
+        std = np.concatenate([fitted.prior_std, np.array(signature.stds)[kept]])
         scatter, value = best_scatter(pushes, mean, std)
         everything = solve(Whitened.of(pushes, scatter), mean, std).beta
         theta, beta = everything[: len(fitted.state.u)], everything[len(fitted.prior_mean) :]

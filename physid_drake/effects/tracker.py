@@ -62,7 +62,8 @@ class TrackerBias(Effect):
         """Place and yaw."""
         most = 0.5 * around.radius
         places = tuple(Coordinate(name=name, step=4e-4, lower=-most, upper=most) for name in ("x", "y"))
-        return (*places, Coordinate(name="yaw", step=4e-3, lower=-0.8, upper=0.8))
+        # About a round object nothing tells the yaw; trackers are mounted about straight.
+        return (*places, Coordinate(name="yaw", step=4e-3, lower=-0.8, upper=0.8, std=0.2))
 
     def true_pose(self, pose: Pose) -> Pose:
         """The object's pose for a tracked one."""

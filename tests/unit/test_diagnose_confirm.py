@@ -6,12 +6,17 @@ import numpy as np
 import pytest
 
 from physid_drake.cell import HandPath, Start
-from physid_drake.diagnose.confirm import Candidate, rivals
+from physid_drake.diagnose.confirm import Candidate, _ranked, push_scores, rivals
+from physid_drake.diagnose.fit import EffectPoint, Fitted, State
+from physid_drake.diagnose.linear import LinearPush, Whitened, solve
 from physid_drake.diagnose.regimes import _by_heading, _by_speed
+from physid_drake.effects import Effect
 
 
-def candidate(gains, *, degenerate=False):
-    return Candidate(score=None, fitted=None, gains=np.asarray(gains, dtype=float), degenerate=degenerate)
+def candidate(gains, *, degenerate=False, coordinates=1):
+    effect = SimpleNamespace(point=np.zeros(coordinates))
+    fitted = SimpleNamespace(state=SimpleNamespace(effects=(effect,)))
+    return Candidate(score=None, fitted=fitted, gains=np.asarray(gains, dtype=float), degenerate=degenerate)
 
 
 @pytest.mark.parametrize(
@@ -44,6 +49,51 @@ def test_a_rival_is_one_whose_deficit_is_not_sure():
     near = candidate(best.gains + 2.0 * rng.standard_normal(10))
     far = candidate(best.gains - 5.0)
     assert rivals(best, (best, near, far)) == (near,)
+
+
+def test_the_simplest_of_those_that_do_as_well_comes_first():
+    far_spring = candidate(np.full(10, 10.0), coordinates=4)
+    tilt = candidate(np.full(10, 9.7), coordinates=2)  # 3 nats less with two coordinates fewer
+    nothing = candidate(np.full(10, 9.9), coordinates=1, degenerate=True)
+    assert _ranked((far_spring, nothing, tilt)) == [tilt, far_spring, nothing]
+
+
+def test_what_does_worse_is_not_preferred_for_being_simple():
+    spring, tilt = candidate(np.full(10, 10.0), coordinates=4), candidate(np.full(10, 9.0), coordinates=2)
+    assert _ranked((tilt, spring)) == [spring, tilt]
+
+
+def fitted_to_a_shared_error(error, *, with_effect):
+    """A linear model of pushes that all share ``error`` tolerances; the effect, if any, is free to explain it."""
+    rng = np.random.default_rng(0)
+    pushes = []
+    for _ in range(8):
+        column = rng.normal(size=(12, 1))
+        shared = np.hstack([column, column]) if with_effect else column
+        residual = error * column[:, 0] + rng.normal(size=12)
+        pushes.append(
+            LinearPush(residual=residual, shared=shared, own=np.zeros((12, 1)), noise=np.eye(12), friction=0)
+        )
+    std = np.array([np.inf, 1.0] if with_effect else [1.0])
+    mean = np.zeros(len(std))
+    return Fitted(
+        state=State(
+            u=np.zeros(0),
+            effects=(EffectPoint(kind=Effect, point=np.zeros(1), free=(0,), origin=np.zeros(1)),) * with_effect,
+            own=(np.zeros(1),) * 8,
+            scatter=1.0,
+        ),
+        pushes=tuple(pushes), prior_mean=mean, prior_std=std,
+        solution=solve(Whitened.of(pushes, 1.0), mean, std), predicted=(np.zeros(12),) * 8, score=0.0,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("error", "confirmed"), [(0.0, False), (1.0, False), (10.0, True)])
+def test_what_goes_far_beyond_a_tolerance_is_not_excused_by_it(error, confirmed):
+    plain, model = (fitted_to_a_shared_error(error, with_effect=w) for w in (False, True))
+    gains = push_scores(model) - push_scores(plain)
+    assert candidate(gains).accepted is confirmed
+    assert gains.sum() == pytest.approx(0.5 * error**2, abs=3.0)
 
 
 def pushes(speeds, headings):

@@ -112,3 +112,15 @@ def _left(design, y):
 def test_more_gain_is_less_probable_and_more_directions_need_more_of_it():
     assert log_probability(30.0, 1, 10, 3) < log_probability(10.0, 1, 10, 3) < 0.0
     assert log_probability(30.0, 3, 10, 3) > log_probability(30.0, 1, 10, 3)
+
+
+def test_residuals_are_those_of_the_model_that_leaves():
+    pushes = made(np.random.default_rng(13), shared=2, beta=np.array([0.3, 2.0]))
+    mean, std = np.zeros(2), np.array([np.inf, 1.0])
+    scores, with_it = left_out_scores(pushes, 1.0, mean, std)
+    same, without = left_out_scores(pushes, 1.0, mean, std, tolerances=1)
+    np.testing.assert_array_equal(scores, same)
+    for push, left, kept in zip(pushes, without, with_it, strict=True):
+        used = (left - kept) / push.shared[:, 1]  # of the tolerance, by the fit to the other pushes
+        np.testing.assert_allclose(used, used[0])
+        assert abs(used[0]) > 0.0
