@@ -11,7 +11,8 @@ from scipy import stats
 
 from physid_drake.diagnose.fit import EffectPoint, Fitted, Fitter
 from physid_drake.diagnose.linear import left_out_scores
-from physid_drake.diagnose.screen import Score, start_of
+from physid_drake.diagnose.screen import Score
+from physid_drake.diagnose.starts import scanned_start, start_of
 
 Array = NDArray[np.float64]
 Tick = Callable[[str, int, int], None]
@@ -190,9 +191,13 @@ def _explained(candidates: Sequence[Candidate]) -> bool:
 
 
 def _candidate(fitter: Fitter, one: Score, fitted: Fitted, plain: Array) -> Candidate:
-    point = fitted.state.effects[-1]
+    return candidate_of(fitter, one, fitted, fitted.state.effects[-1], plain)
+
+
+def candidate_of(fitter: Fitter, one: Score, fitted: Fitted, point: EffectPoint, before: Array) -> Candidate:
+    """An effect that is at ``point`` in a fitted model, over the scores (n,) of the pushes without it."""
     return Candidate(
-        score=one, fitted=fitted, gains=push_scores(fitted) - plain, degenerate=_degenerate(fitter, one, point)
+        score=one, fitted=fitted, gains=push_scores(fitted) - before, degenerate=_degenerate(fitter, one, point)
     )  # fmt: skip
 
 
@@ -205,10 +210,10 @@ def _fit(fitter: Fitter, before: Fitted, one: Score) -> Fitted:
 
 
 def _fit_from_afar(fitter: Fitter, before: Fitted, candidate: Candidate) -> Fitted:
-    """The same from the score test's theta too, all derivatives taken on the way: far off, the plain ones mislead."""
+    """The same from the best of a scan, all derivatives taken on the way: far off, the plain ones mislead."""
     one = candidate.score
     u = np.clip(before.state.u + np.clip(one.theta, -FAR, FAR), 1e-3, 1.0 - 1e-3)
-    effects = (*before.state.effects, start_of(fitter, one))
+    effects = (*before.state.effects, scanned_start(fitter, before, one))
     return fitter.fit(fitter.start(u, effects), rounds=4, careful=2, renew=True)
 
 

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 THETA_STEP = 0.006  # of the unit cube
 OWN_STEP = 0.5  # of the prior standard deviation
 MOST_OWN = 3.0  # standard deviations: unknowns are linearised no further out
+MOST_FRICTION = 8.0  # of the usual scatter: it is fitted along, up to as much
 FAILED = 1e4  # standard deviations: features of a rollout that diverged
 SETTLED = 0.5  # of the cost: a step that gained less is the last
 REFINEMENTS = 3  # steps on short ticks
@@ -139,6 +140,9 @@ class Fitter:
         self.extra = extra
         self.tolerances = tolerances
         self._places = {problem.name: i for i, problem in enumerate(case.problems)}
+        self._most = [
+            np.array([MOST_FRICTION if name == "friction" else MOST_OWN for name in n.names]) for n in case.nuisances
+        ]
 
     def start(self, u: Array, effects: tuple[EffectPoint, ...] = ()) -> State:
         """A model at theta ``u`` (d,), the pushes' unknowns at zero."""
@@ -156,9 +160,13 @@ class Fitter:
             problem=case.problems[i],
             theta=np.asarray(case.thetas.space.from_unit(state.u if u is None else u)),
             nuisance=case.nuisances[i],
-            values=np.clip(values, -MOST_OWN, MOST_OWN) * case.nuisances[i].stds,
+            values=self._within(i, values) * case.nuisances[i].stds,
             effects=tuple(e.effect(case) for e in state.effects) if effects is None else tuple(effects),
         )
+
+    def _within(self, i: int, own: Array) -> Array:
+        """Unknowns (k,) of push i, no further out than they are linearised."""
+        return np.clip(own, -self._most[i], self._most[i])
 
     def vectors(self, tasks: Sequence[Task]) -> list[Array]:
         """Features of rollouts; a large value in all where one diverged."""
@@ -208,7 +216,7 @@ class Fitter:
             predicted.append(mine_vectors[0])
         return self._fitted(state, tuple(pushes), tuple(predicted), learn_scatter)
 
-    def _seen_from(self, best: Fitted, state: State, *, learn_scatter: bool = True) -> Fitted:
+    def seen_from(self, best: Fitted, state: State, *, learn_scatter: bool = True) -> Fitted:
         """The model at another state with the derivatives of ``best``: one rollout per push."""
         predicted = self.vectors([self.task(state, i) for i in range(len(self.case.problems))])
         pushes = tuple(
@@ -219,7 +227,7 @@ class Fitter:
 
     def _residual(self, state: State, i: int, predicted: Array, own: Array) -> Array:
         """Recorded less predicted (m,), as if the push's unknowns were zero."""
-        values = np.clip(state.own[i], -MOST_OWN, MOST_OWN)
+        values = self._within(i, state.own[i])
         residual: Array = self.case.features[i].recorded - predicted + own[:, : len(values)] @ values
         return residual
 
@@ -257,7 +265,7 @@ class Fitter:
 
     def _own_steps(self, state: State, i: int) -> list[tuple[float, Array]]:
         """For each unknown of a push: the step and the unknowns with it taken."""
-        here = np.clip(state.own[i], -MOST_OWN, MOST_OWN)
+        here = self._within(i, state.own[i])
         steps = []
         for j in range(len(here)):
             step = OWN_STEP if here[j] <= 0.0 else -OWN_STEP
@@ -405,7 +413,7 @@ class Fitter:
             step = self.stepped(best, share)
             if cautious:
                 step = dc.replace(step, own=tuple(np.zeros_like(o) for o in step.own))
-            trial = self._seen_from(best, step, learn_scatter=released)
+            trial = self.seen_from(best, step, learn_scatter=released)
             if actual_cost(trial) < actual_cost(best) or (cautious and released):
                 break
         return trial
@@ -414,7 +422,7 @@ class Fitter:
         """What another cell's fit left, here: derivatives of theta and effects anew, then steps while they help."""
         best = self.linearise(rough.state, like=rough, fresh_theta=True)
         for _ in range(REFINEMENTS):
-            moved = self._seen_from(best, self.stepped(best))
+            moved = self.seen_from(best, self.stepped(best))
             gained = actual_cost(best) - actual_cost(moved)
             best = moved if gained > 0.0 else best
             if gained < SETTLED:
@@ -433,9 +441,9 @@ class Fitter:
             effects.append(e.moved(self.case, np.clip(beta[at : at + len(e.free)], -longest, longest)))
             at += len(e.free)
         own = []
-        for push, old in zip(fitted.pushes, state.own, strict=True):
+        for i, (push, old) in enumerate(zip(fitted.pushes, state.own, strict=True)):
             new = own_unknowns(push, state.scatter, fitted.solution.beta)[: len(old)]
-            own.append(np.clip(old + share * (new - old), -MOST_OWN, MOST_OWN))
+            own.append(self._within(i, old + share * (new - old)))
         return State(u=u, effects=tuple(effects), own=tuple(own), scatter=state.scatter)
 
 

@@ -8,22 +8,24 @@ fitted model and refitted, in the same linear algebra.
 from __future__ import annotations
 
 import dataclasses as dc
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.fit import EffectPoint, Fitted, Fitter
-from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve
-from physid_drake.effects import Effect, Family, Surroundings
+from physid_drake.diagnose.case import UNIT_SCATTER, Case
+from physid_drake.diagnose.fit import Fitted, Fitter
+from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, own_unknowns, solve
+from physid_drake.effects import Effect, Family
 from physid_drake.identify.rollouts import Task
 
 Array = NDArray[np.float64]
 Tick = Callable[[int, int], None]
 
 DRAWS = 1000
+FEWEST_FOR_A_TREND = 6  # pushes
 ALIKE = 0.95  # cosine of two projected signatures that these pushes cannot tell apart
 
 
@@ -37,6 +39,7 @@ class Signature:
         columns: per push (m, p).
         one_sided: (p,) whether a direction may only be followed forwards.
         stds: (p,) prior standard deviations; inf where nothing is known.
+        friction_changes: (n,) by which share the step changes the friction of each push, if that is all it does.
     """
 
     kind: type[Effect]
@@ -44,6 +47,7 @@ class Signature:
     columns: tuple[Array, ...]
     one_sided: tuple[bool, ...]
     stds: tuple[float, ...]
+    friction_changes: tuple[float, ...] = ()
 
     @property
     def steps(self) -> int:
@@ -62,6 +66,7 @@ class Score:
         theta: (d,) change of theta in the unit cube that goes with it.
         gain: twice the gain in log likelihood.
         log_p: of that gain, chi-square with as many degrees of freedom as directions.
+        others: the scores of the effect's other families.
     """
 
     signature: Signature
@@ -70,6 +75,7 @@ class Score:
     theta: Array
     gain: float
     log_p: float
+    others: tuple[Score, ...] = ()
 
     @property
     def kind(self) -> type[Effect]:
@@ -116,7 +122,7 @@ def signatures(
     for s, (kind, family) in enumerate((b.kind, b.family) for b in blank):
         chart = kind.chart(case.around)
         for i in range(len(case.problems)):
-            if not _reaches(fitter, kind, family, i):
+            if blank[s].friction_changes or not _reaches(fitter, kind, family, i):
                 continue
             for d, j in enumerate(family.free):
                 for sign in (1.0, -1.0) if family.central else (1.0,):
@@ -129,7 +135,7 @@ def signatures(
         vectors += fitter.vectors(tasks[k : k + 64])
         if tick is not None:
             tick(min(k + 64, len(tasks)), len(tasks))
-    columns = [[np.zeros((len(f.recorded), b.steps)) for f in case.features] for b in blank]
+    columns = [[_known_columns(fitted, b, i) for i in range(len(case.problems))] for b in blank]
     for (s, i, d, sign), vector in zip(plan, vectors, strict=True):
         if blank[s].family.central:
             columns[s][i][:, d] += 0.5 * sign * vector
@@ -138,23 +144,64 @@ def signatures(
     return [dc.replace(b, columns=tuple(c)) for b, c in zip(blank, columns, strict=True)]
 
 
+def _known_columns(fitted: Fitted, blank: Signature, i: int) -> Array:
+    """Columns (m, p) that need no rollout; zero for those that do.
+
+    An effect that only changes a push's friction is told from the push's own friction by how pushes compare, so that
+    its signature has to be the very same direction: where motion has a kink, two differences are not.
+    """
+    push = fitted.pushes[i]
+    if not blank.friction_changes:
+        return np.zeros((len(push.residual), blank.steps))
+    return push.own[:, [push.friction]] * (blank.friction_changes[i] / UNIT_SCATTER)
+
+
+def _friction_changes(fitter: Fitter, kind: type[Effect], family: Family) -> tuple[float, ...]:
+    """Shares by which an effect of one coordinate changes the frictions of pushes in a step; empty for others."""
+    around, point = fitter.case.around, np.array(family.point)
+    if len(point) != 1:
+        return ()
+    stepped = kind.at(point + family.size * kind.chart(around)[0].step, around)
+    changes = [stepped.friction_change(problem.order) for problem in fitter.case.problems]
+    return tuple(c for c in changes if c is not None)
+
+
+def _by_trend(fitted: Fitted, one: Score) -> Score:
+    """The score test, or the rank correlation of the pushes' own frictions with the effect's, for two looks.
+
+    Frictions that differ much from push to push are far from where the pushes were linearised; their order is not.
+    """
+    beta, scatter = fitted.solution.beta, fitted.state.scatter
+    frictions = np.array([own_unknowns(push, scatter, beta)[push.friction] for push in fitted.pushes])
+    changes = np.array(one.signature.friction_changes) / UNIT_SCATTER
+    if len(frictions) < FEWEST_FOR_A_TREND or np.ptp(frictions) == 0.0:
+        return one
+    log_p = math.log(max(1e-300, min(1.0, 2.0 * float(stats.spearmanr(frictions, changes).pvalue))))
+    if log_p >= one.log_p:
+        return one
+    slope = float(stats.theilslopes(frictions, changes).slope)
+    if one.signature.one_sided[0] and slope < 0.0:
+        return one
+    return dc.replace(
+        one, kept=(0,), coefficients=np.array([slope]), theta=np.zeros(len(fitted.state.u)), log_p=log_p,
+        gain=max(one.gain, float(stats.chi2.isf(math.exp(log_p), 1))),
+    )  # fmt: skip
+
+
 def empty_signatures(fitter: Fitter, kinds: Sequence[type[Effect]]) -> list[Signature]:
     """All families of the effects, their columns still to be found."""
-    return [
-        _empty_signature(kind, family, fitter.case.around)
-        for kind in kinds
-        for family in kind.families(fitter.case.around)
-    ]
+    return [_empty_signature(fitter, kind, family) for kind in kinds for family in kind.families(fitter.case.around)]
 
 
-def _empty_signature(kind: type[Effect], family: Family, around: Surroundings) -> Signature:
-    chart = kind.chart(around)
+def _empty_signature(fitter: Fitter, kind: type[Effect], family: Family) -> Signature:
+    chart = kind.chart(fitter.case.around)
     return Signature(
         kind=kind,
         family=family,
         columns=(),
         one_sided=tuple(chart[j].lower >= family.point[j] for j in family.free),
         stds=tuple(chart[j].std / (chart[j].step * family.size) for j in family.free),
+        friction_changes=_friction_changes(fitter, kind, family),
     )
 
 
@@ -232,19 +279,28 @@ def screen(fitted: Fitted, found: Sequence[Signature], rng: np.random.Generator)
     """All score tests, and the distribution of the best of them where the fitted model is true."""
     if not found:  # every effect that was to be looked at is in the model
         return Screening(scores=(), p_value=1.0, looks=1.0)
-    best: dict[str, Score] = {}
+    families: dict[str, list[Score]] = {}
     for signature in found:
         one = score(fitted, signature)
-        name = signature.kind.name
-        if name not in best or (one.log_p, -one.gain) < (best[name].log_p, -best[name].gain):
-            best[name] = one
-    scores = tuple(sorted(best.values(), key=lambda s: (s.log_p, -s.gain)))
+        if signature.friction_changes:
+            one = _by_trend(fitted, one)
+        families.setdefault(signature.kind.name, []).append(one)
+    scores = tuple(sorted((_best_family(every) for every in families.values()), key=_rank))
     null = _null_draws(fitted, found, rng)
     # As many independent looks as give the draws' median of the smallest p.
     looks = max(1.0, float(np.log(2.0) / np.exp(np.median(null))))
     seen = scores[0].log_p if scores else 0.0
     p_value = float(-np.expm1(looks * np.log1p(-np.exp(min(seen, -1e-12)))))
     return Screening(scores=scores, p_value=p_value, looks=looks)
+
+
+def _rank(one: Score) -> tuple[float, float]:
+    return one.log_p, -one.gain
+
+
+def _best_family(every: Sequence[Score]) -> Score:
+    best, *others = sorted(every, key=_rank)
+    return dc.replace(best, others=tuple(others))
 
 
 def _null_draws(fitted: Fitted, found: Sequence[Signature], rng: np.random.Generator) -> Array:
@@ -290,14 +346,3 @@ def cosine(fitted: Fitted, first: Score, second: Score) -> float:
     _, (a, b) = projected(fitted, columns)
     norms = float(np.linalg.norm(a) * np.linalg.norm(b))
     return float((a * b).sum()) / norms if norms > 0.0 else 0.0
-
-
-def start_of(fitter: Fitter, one: Score) -> EffectPoint:
-    """The chart point that a score test suggests; a fit may then move the leading coordinates."""
-    chart = one.kind.chart(fitter.case.around)
-    family = one.signature.family
-    origin = np.array(family.point)
-    point = origin.copy()
-    for j, c in zip(family.free, one.coefficients.tolist(), strict=True):
-        point[j] = float(np.clip(point[j] + c * family.size * chart[j].step, chart[j].lower, chart[j].upper))
-    return EffectPoint(kind=one.kind, point=point, free=one.kind.leading(fitter.case.around), origin=origin)

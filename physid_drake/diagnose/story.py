@@ -25,6 +25,7 @@ from physid_drake.diagnose.localise import missing_wrenches, with_phases
 from physid_drake.diagnose.loudness import as_loud_as_left, quieter
 from physid_drake.diagnose.memory import Memory
 from physid_drake.diagnose.next_push import next_push
+from physid_drake.diagnose.pairs import confirmed_pair
 from physid_drake.diagnose.plain import coarse, fit_plain, numerics
 from physid_drake.diagnose.screen import Screening, Signature, empty_signatures, screen, signatures, tolerances
 from physid_drake.diagnose.values import Diagnosis
@@ -37,6 +38,7 @@ MOST_EFFECTS = 3
 LONGEST = 600  # rollouts per push after which no further effect is looked for
 ANOTHER_BASIN = 10.0  # nats by which a plain fit must be better to be another one
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
+WIDE = 2.0  # times the usual scatter of friction: it may be what is missing in disguise
 HOPELESS = 6.0  # cost per degree of freedom with two effects: no third one of the catalogue will make up for that
 
 
@@ -200,7 +202,12 @@ def _grown(
                 base = last = _Looked.at(better, base.signatures, rng)
                 candidates = rejudged(candidates, better)
         if not candidates or not worthwhile(last.fitted, candidates[0]):
-            return _Grown(base=base, last=last, steps=tuple(steps), rejected=candidates)
+            pair = None if steps else confirmed_pair(fitter, last.fitted, last.screening.scores, tick)
+            if pair is None:
+                return _Grown(base=base, last=last, steps=tuple(steps), rejected=candidates)
+            steps = [(candidate,) for candidate in pair.candidates]
+            last = _what_is_left(fitter, pair.fitted, last.signatures, kinds, rng, tick, alpha)
+            continue
         steps.append(candidates)
         tick(f"model with {candidates[0].name}", 0, 0)
         model = _model_with(fitter, candidates[0])
@@ -311,7 +318,7 @@ def _model_with(fitter: Fitter, candidate: Candidate) -> Fitted:
     state = candidate.fitted.state
     effects = tuple(e.freed(fitter.case) for e in state.effects)
     near = fitter.fit(dc.replace(state, effects=effects), rounds=3, renew=True)
-    if near.reduced_chi2 <= EXPLAINED or near.reduced_chi2 > HOPELESS:
+    if near.reduced_chi2 > HOPELESS or (near.reduced_chi2 <= EXPLAINED and near.state.scatter <= WIDE):
         return near
     # The pushes' unknowns may have been imitating what is missing: once more, without them at first.
     far = fitter.fit(fitter.start(near.state.u, near.state.effects), rounds=4, careful=1, renew=True)

@@ -232,6 +232,11 @@ class Effect:
         del facts
         return ()
 
+    def friction_change(self, order: int) -> float | None:
+        """The share by which all support friction changes in a push, if the effect does nothing else; else None."""
+        del order
+        return None
+
     def hand(self, path: HandPath, facts: PushFacts) -> HandPath:
         """The path of the tip, or of its mount where it gives way."""
         del facts

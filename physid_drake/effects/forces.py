@@ -282,11 +282,11 @@ class Sloshing(Effect):
 
     @classmethod
     def families(cls, around: Surroundings) -> tuple[Family, ...]:
-        """A few frequencies."""
+        """Frequencies half an octave apart: at twice the right one a liquid looks like another effect."""
         del around
         return tuple(
             Family(point=(0.0, math.log(frequency), math.log(0.05)), free=(0,), size=3.0)
-            for frequency in (1.5, 3.0, 5.0, 9.0)
+            for frequency in (1.5, 2.1, 3.0, 4.2, 6.0, 9.0)
         )
 
     def heaviness(self) -> float:

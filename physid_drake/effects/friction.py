@@ -306,7 +306,10 @@ class FrictionDrift(Effect):
         count = max(1, around.pushes - 1)
         return (Coordinate(name="per_push", step=2.0 * SLIGHT_SHARE / count, lower=-0.95 / count, upper=3.0 / count),)
 
+    def friction_change(self, order: int) -> float:
+        """In proportion to the push's number."""
+        return max(-1.0, self.per_push * order)
+
     def body(self, body: Body, facts: PushFacts) -> Body:
         """The friction of this push."""
-        factor = max(0.0, 1.0 + self.per_push * facts.order)
-        return dc.replace(body, support_friction=factor * body.support_friction)
+        return dc.replace(body, support_friction=(1.0 + self.friction_change(facts.order)) * body.support_friction)

@@ -59,11 +59,19 @@ class TrackerBias(Effect):
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
-        """Place and yaw."""
+        """The object's place seen from the tracked frame, so that turning a round object moves nothing else; yaw."""
         most = 0.5 * around.radius
-        places = tuple(Coordinate(name=name, step=4e-4, lower=-most, upper=most) for name in ("x", "y"))
+        places = tuple(Coordinate(name=name, step=4e-4, lower=-most, upper=most) for name in ("seen_x", "seen_y"))
         # About a round object nothing tells the yaw; trackers are mounted about straight.
         return (*places, Coordinate(name="yaw", step=4e-3, lower=-0.8, upper=0.8, std=0.2))
+
+    @classmethod
+    def at(cls, point: Array, around: Surroundings) -> TrackerBias:
+        """Places in the object's frame."""
+        del around
+        seen_x, seen_y, yaw = point.tolist()
+        c, s = math.cos(yaw), math.sin(yaw)
+        return cls(x=c * seen_x - s * seen_y, y=s * seen_x + c * seen_y, yaw=yaw)
 
     def true_pose(self, pose: Pose) -> Pose:
         """The object's pose for a tracked one."""

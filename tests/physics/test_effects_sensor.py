@@ -8,6 +8,7 @@ from motions import BOX, MASS, MU, built, make, push_along_x
 from twin import body_of
 
 from physid_drake.cell import Start
+from physid_drake.effects import effect_named
 from physid_drake.effects.rollout import Rollout, roll, tracked
 
 
@@ -26,6 +27,15 @@ def test_a_biased_tracker_follows_a_point_of_the_object():
     for (x, y, yaw), got in zip(poses, seen, strict=True):
         R = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
         np.testing.assert_allclose(got, [*([x, y] + R @ [0.01, -0.02]), yaw + 0.1], atol=1e-15)
+
+
+def test_a_trackers_yaw_alone_does_not_move_a_round_object():
+    poses = [
+        effect_named("tracker_bias").at(np.array([0.01, -0.02, yaw]), None).true_pose((0.3, 0.2, 0.7))
+        for yaw in (-0.3, 0.0, 0.4)
+    ]
+    np.testing.assert_allclose([p[:2] for p in poses], [poses[1][:2]] * 3, atol=1e-15)
+    np.testing.assert_allclose([p[2] for p in poses], [1.0, 0.7, 0.3], atol=1e-15)
 
 
 def test_a_scaled_tracker_multiplies_places_and_not_yaw():

@@ -1,0 +1,57 @@
+"""Where the fit of an effect starts: from its score test, or from a coarse scan where that is too far off.
+
+A score test knows small versions of an effect. Those of a strong one may be the best at the wrong frequency, speed or
+place, from which a fit does not find out; a few rollouts of strong versions tell.
+"""
+
+from __future__ import annotations
+
+import dataclasses as dc
+
+import numpy as np
+
+from physid_drake.diagnose.fit import EffectPoint, Fitted, Fitter
+from physid_drake.diagnose.screen import Score
+
+FAMILIES = 4  # of an effect, the best by their score tests
+MULTIPLES = (1.0, 2.5, 5.0)  # of what the score test says
+
+
+def start_of(fitter: Fitter, one: Score) -> EffectPoint:
+    """The chart point that a score test suggests; a fit may then move the leading coordinates."""
+    return _started(fitter, one, 1.0)
+
+
+def scanned_start(fitter: Fitter, before: Fitted, one: Score, beside: tuple[EffectPoint, ...] = ()) -> EffectPoint:
+    """The best of an effect's families at several strengths, one rollout per push each.
+
+    Args:
+        fitter: makes the rollouts.
+        before: the model to which the effect is added; theta and the pushes' unknowns follow by its derivatives.
+        one: the effect's score test.
+        beside: other effects that are in the model meanwhile.
+    """
+    points = [_started(fitter, family, multiple) for family in _families(one) for multiple in MULTIPLES]
+    held = tuple(dc.replace(other, free=()) for other in beside)
+    scores = []
+    for point in points:
+        effects = (*before.state.effects, *held, dc.replace(point, free=()))
+        scores.append(fitter.seen_from(before, dc.replace(before.state, effects=effects)).score)
+    return points[int(np.argmax(scores))]
+
+
+def _families(one: Score) -> list[Score]:
+    """Families of an effect, best first, each as strong as the best one where it would act the other way round."""
+    every = sorted((one, *one.others), key=lambda s: -s.gain)[:FAMILIES]
+    return [s if s.kept else dc.replace(s, kept=one.kept, coefficients=one.coefficients) for s in every]
+
+
+def _started(fitter: Fitter, one: Score, multiple: float) -> EffectPoint:
+    chart = one.kind.chart(fitter.case.around)
+    family = one.signature.family
+    origin = np.array(family.point)
+    point = origin.copy()
+    for j, c in zip(family.free, one.coefficients.tolist(), strict=True):
+        moved = point[j] + multiple * c * family.size * chart[j].step
+        point[j] = float(np.clip(moved, chart[j].lower, chart[j].upper))
+    return EffectPoint(kind=one.kind, point=point, free=one.kind.leading(fitter.case.around), origin=origin)

@@ -1,0 +1,95 @@
+"""Score tests in linear algebra: pairs of effects, and frictions that follow the order of the pushes."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from physid_drake.diagnose.fit import Fitted, State
+from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve
+from physid_drake.diagnose.pairs import promising
+from physid_drake.diagnose.screen import Signature, _by_trend, score
+from physid_drake.effects import Family
+
+PUSHES, NUMBERS = 12, 20
+
+
+def fitted_to(residuals, own):
+    """A model with one unknown of its own a push, its friction, and one that all share."""
+    rng = np.random.default_rng(1)
+    pushes = tuple(
+        LinearPush(
+            residual=r, shared=rng.normal(size=(NUMBERS, 1)), own=column[:, None], noise=np.eye(NUMBERS), friction=0
+        )
+        for r, column in zip(residuals, own, strict=True)
+    )
+    mean, std = np.zeros(1), np.ones(1)
+    scatter, value = best_scatter(pushes, mean, std)
+    return Fitted(
+        state=State(u=np.zeros(1), effects=(), own=(np.zeros(1),) * PUSHES, scatter=scatter),
+        pushes=pushes, prior_mean=mean, prior_std=std, solution=solve(Whitened.of(pushes, scatter), mean, std),
+        predicted=tuple(np.zeros(NUMBERS) for _ in pushes), score=value,
+    )  # fmt: skip
+
+
+def signature_of(name, columns, *, one_sided=False, friction_changes=()):
+    return Signature(
+        kind=SimpleNamespace(name=name), family=Family(point=(0.0,), free=(0,)),
+        columns=tuple(c[:, None] for c in columns), one_sided=(one_sided,), stds=(np.inf,),
+        friction_changes=tuple(friction_changes),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def columns():
+    rng = np.random.default_rng(0)
+    return {name: rng.normal(size=(PUSHES, NUMBERS)) for name in ("one", "two", "noise", "own", "third")}
+
+
+def test_two_effects_outrank_a_third_that_mimics_their_sum(columns):
+    both = 3.0 * columns["one"] + 3.0 * columns["two"]
+    mimic = both + 2.0 * columns["third"]
+    fitted = fitted_to(both + columns["noise"], columns["own"])
+    shapes = {"one": columns["one"], "two": columns["two"], "mimic": mimic}
+    scores = [score(fitted, signature_of(name, shape)) for name, shape in shapes.items()]
+    assert max(scores, key=lambda s: s.gain).kind.name == "mimic"
+    best = promising(fitted, scores)[0]
+    assert [s.kind.name for s in best] in (["one", "two"], ["two", "one"])
+    # Each with its coefficient beside the other's.
+    assert [float(s.coefficients[0]) for s in best] == pytest.approx([3.0, 3.0], abs=0.3)
+
+
+def test_a_pair_of_which_one_acts_the_other_way_round_is_none(columns):
+    fitted = fitted_to(3.0 * columns["one"] - 3.0 * columns["two"] + columns["noise"], columns["own"])
+    one = score(fitted, signature_of("one", columns["one"]))
+    two = score(fitted, signature_of("two", columns["two"]))
+    backwards = score(fitted, signature_of("two", -columns["two"], one_sided=True))
+    assert len(promising(fitted, [one, two])) == 1
+    assert len(promising(fitted, [one, backwards])) == 1
+    wrong = signature_of("two", columns["two"], one_sided=True)
+    kept = SimpleNamespace(kind=wrong.kind, signature=wrong, kept=(0,), gain=1.0, coefficients=np.zeros(1))
+    assert promising(fitted, [one, kept]) == []
+
+
+ORDER = np.arange(PUSHES)
+
+
+def drift_score(frictions, columns):
+    """The score of "friction follows the pushes' order" where linearised frictions say nothing of it."""
+    residuals = frictions[:, None] * columns["own"] + columns["noise"]
+    fitted = fitted_to(residuals, columns["own"])
+    changes = 0.001 * ORDER
+    silent = signature_of("friction_drift", 1e-6 * columns["own"], friction_changes=changes)
+    return score(fitted, silent), _by_trend(fitted, score(fitted, silent))
+
+
+def test_frictions_in_order_are_seen_by_their_ranks(columns):
+    plain, by_trend = drift_score(-3.0 + 0.5 * ORDER, columns)
+    assert by_trend.log_p < np.log(1e-4) < plain.log_p
+    # 0.5 scatters of 2.5 % a push, in steps of 0.1 % a push.
+    assert by_trend.coefficients[0] == pytest.approx(12.5, rel=0.15)
+
+
+def test_frictions_in_no_order_are_not(columns):
+    plain, by_trend = drift_score(np.random.default_rng(3).permutation(-3.0 + 0.5 * ORDER), columns)
+    assert by_trend == plain
