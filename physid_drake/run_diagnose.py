@@ -15,8 +15,8 @@ from rich.console import Console
 from physid_drake.cell import CellConfig
 from physid_drake.diagnose import Case, Diagnosis, Evidence, case_of, diagnose
 from physid_drake.diagnose.estimates import correlation_of
-from physid_drake.diagnose.fit import Fitted
 from physid_drake.diagnose.memory import Memory
+from physid_drake.diagnose.model import Fitted
 from physid_drake.effects import effect_named
 from physid_drake.errors import ConfigError
 from physid_drake.identify.config import ThetaConfig

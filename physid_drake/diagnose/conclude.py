@@ -21,8 +21,8 @@ from physid_drake.diagnose.confirm import (
 )
 from physid_drake.diagnose.estimates import parameters_of, rms, smallest, theta_of
 from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, mismatch, unexplained
-from physid_drake.diagnose.fit import Fitted
 from physid_drake.diagnose.localise import locate
+from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import regime_gains
 from physid_drake.diagnose.screen import (
     cosine,

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.fit import EffectPoint, Fitted, Fitter
+from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.linear import left_out_scores
+from physid_drake.diagnose.model import EffectPoint, Fitted
 from physid_drake.diagnose.screen import Score
 from physid_drake.diagnose.starts import scanned_start, start_of
 

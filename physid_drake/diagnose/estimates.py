@@ -12,7 +12,7 @@ from scipy import stats
 
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.evidence import Evidence
-from physid_drake.diagnose.fit import Fitted
+from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.screen import (
     log_probability,
     projected,

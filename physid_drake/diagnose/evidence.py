@@ -11,8 +11,9 @@ from scipy import stats
 
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.confirm import Candidate
-from physid_drake.diagnose.fit import Fitted, Fitter
+from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.localise import MissingWrench
+from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.screen import Screening, Signature
 from physid_drake.diagnose.values import NextPush
 

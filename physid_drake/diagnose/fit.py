@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.linear import LinearPush, Solution, Whitened, best_scatter, own_unknowns, solve
-from physid_drake.effects import Coordinate, Effect
+from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, own_unknowns, solve
+from physid_drake.diagnose.model import EffectPoint, Fitted, State
+from physid_drake.effects import Effect
 from physid_drake.identify.rollouts import Prediction, Task
 
 Array = NDArray[np.float64]
@@ -25,102 +26,6 @@ REFINEMENTS = 3  # steps on short ticks
 RENEWED = 5.0  # of the cost, per push: a step that gained as much has left the place of its derivatives
 MOST_THETA_MOVE = 0.25  # of the unit cube in one iteration
 Say = Callable[[str], None]
-
-
-@dc.dataclass(frozen=True, kw_only=True)
-class EffectPoint:
-    """An effect in a model.
-
-    Attributes:
-        kind: its class.
-        point: (k,) where in its chart it is.
-        free: which coordinates a fit may move.
-        origin: (k,) where the fit started: the middle of the shape coordinates' prior.
-    """
-
-    kind: type[Effect]
-    point: Array
-    free: tuple[int, ...]
-    origin: Array
-
-    def effect(self, case: Case) -> Effect:
-        """The effect itself."""
-        return self.kind.at(self.point, case.around)
-
-    def chart(self, case: Case) -> tuple[Coordinate, ...]:
-        """All coordinates."""
-        return self.kind.chart(case.around)
-
-    def moved(self, case: Case, change: Array) -> EffectPoint:
-        """Free coordinates moved by ``change``, within their bounds."""
-        point = self.point.copy()
-        chart = self.chart(case)
-        for j, step in zip(self.free, change.tolist(), strict=True):
-            point[j] = float(np.clip(point[j] + step, chart[j].lower, chart[j].upper))
-        return dc.replace(self, point=point)
-
-    def freed(self, case: Case) -> EffectPoint:
-        """All coordinates free."""
-        return dc.replace(self, free=tuple(range(len(self.chart(case)))))
-
-
-@dc.dataclass(frozen=True, kw_only=True)
-class State:
-    """Where a fit is.
-
-    Attributes:
-        u: (d,) theta in the unit cube.
-        effects: the effects of the model.
-        own: per push (k,), the unknowns in units of their priors.
-        scatter: of friction, in units of ``UNIT_SCATTER``.
-    """
-
-    u: Array
-    effects: tuple[EffectPoint, ...]
-    own: tuple[Array, ...]
-    scatter: float
-
-
-@dc.dataclass(frozen=True, kw_only=True)
-class Fitted:
-    """A model fitted to all pushes.
-
-    Attributes:
-        state: where.
-        pushes: linearised there; columns of ``shared``: theta, then the effects' free coordinates.
-        prior_mean, prior_std: (d,) of a change of the shared parameters.
-        solution: of the linear problem at the state; its beta is what was left to move.
-        predicted: per push (m,), features at the state, unknowns included.
-        scores: log likelihood with the scatter's prior.
-    """
-
-    state: State
-    pushes: tuple[LinearPush, ...]
-    prior_mean: Array
-    prior_std: Array
-    solution: Solution
-    predicted: tuple[Array, ...]
-    score: float
-
-    @property
-    def own_dimension(self) -> int:
-        """Shared parameters that the model has: theta and the effects' coordinates."""
-        return len(self.state.u) + sum(len(e.free) for e in self.state.effects)
-
-    @property
-    def tolerance_cost(self) -> float:
-        """How unlikely the use is that the model makes of its tolerances: half their squares, in deviations."""
-        return 0.5 * float(np.sum(self.solution.beta[self.own_dimension :] ** 2))
-
-    @property
-    def degrees(self) -> int:
-        """Residuals less shared parameters."""
-        return sum(len(p.residual) for p in self.pushes) - self.own_dimension
-
-    @property
-    def reduced_chi2(self) -> float:
-        """Cost per degree of freedom; 1 where the model explains the pushes."""
-        return self.solution.chi2 / max(1, self.degrees)
 
 
 class Fitter:

@@ -19,7 +19,8 @@ from scipy.linalg import cho_factor, cho_solve
 from physid_drake.cell.forces import ForceLaw, ObjectState, Wrench
 from physid_drake.cell.solid import solid_of
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.fit import Fitted, Fitter
+from physid_drake.diagnose.fit import Fitter
+from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import Location, Window
 from physid_drake.effects import Effect, PushFacts
 

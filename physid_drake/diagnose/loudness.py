@@ -13,8 +13,9 @@ from scipy import stats
 
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.estimates import rms
-from physid_drake.diagnose.fit import Fitted, Fitter
+from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.linear import own_unknowns
+from physid_drake.diagnose.model import Fitted
 
 Array = NDArray[np.float64]
 

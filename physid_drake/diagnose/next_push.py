@@ -14,7 +14,8 @@ from scipy import stats
 from physid_drake.cell import HandPath, Start
 from physid_drake.cell.solid import solid_of
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.fit import Fitter, State
+from physid_drake.diagnose.fit import Fitter
+from physid_drake.diagnose.model import State
 from physid_drake.diagnose.values import NextPush
 from physid_drake.identify.problem import PushProblem
 from physid_drake.identify.rollouts import Task

@@ -13,8 +13,9 @@ from itertools import combinations
 import numpy as np
 
 from physid_drake.diagnose.confirm import EXPLAINED, Candidate, candidate_of, push_scores
-from physid_drake.diagnose.fit import Fitted, Fitter
+from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.linear import Whitened, best_scatter, solve
+from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.screen import Score, extended
 from physid_drake.diagnose.starts import scanned_start, start_of
 

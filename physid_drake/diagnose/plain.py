@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from physid_drake.cell import CellConfig
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.confirm import FAR_OFF
-from physid_drake.diagnose.fit import Fitted, Fitter, State
+from physid_drake.diagnose.fit import Fitter
+from physid_drake.diagnose.model import Fitted, State
 from physid_drake.identify.problem import spec_of
 from physid_drake.identify.rollouts import RolloutPool
 from physid_drake.search import GreedyEntropySearch, search_minimum

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.confirm import standard_error
-from physid_drake.diagnose.fit import Fitted
 from physid_drake.diagnose.linear import left_out_scores
+from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import RegimeGain
 
 Array = NDArray[np.float64]

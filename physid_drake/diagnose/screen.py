@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from physid_drake.diagnose.case import UNIT_SCATTER, Case
-from physid_drake.diagnose.fit import Fitted, Fitter
+from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, own_unknowns, solve
+from physid_drake.diagnose.model import Fitted
 from physid_drake.effects import Effect, Family
 from physid_drake.identify.rollouts import Task
 

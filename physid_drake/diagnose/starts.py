@@ -10,7 +10,8 @@ import dataclasses as dc
 
 import numpy as np
 
-from physid_drake.diagnose.fit import EffectPoint, Fitted, Fitter
+from physid_drake.diagnose.fit import Fitter
+from physid_drake.diagnose.model import EffectPoint, Fitted
 from physid_drake.diagnose.screen import Score
 
 FAMILIES = 4  # of an effect, the best by their score tests

@@ -20,10 +20,11 @@ from physid_drake.diagnose.confirm import (
     worthwhile,
 )
 from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, mismatch
-from physid_drake.diagnose.fit import Fitted, Fitter, State
+from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
 from physid_drake.diagnose.loudness import as_loud_as_left, quieter
 from physid_drake.diagnose.memory import Memory
+from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.next_push import next_push
 from physid_drake.diagnose.pairs import confirmed_pair
 from physid_drake.diagnose.plain import coarse, fit_plain, numerics

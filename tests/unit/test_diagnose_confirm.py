@@ -7,8 +7,8 @@ import pytest
 
 from physid_drake.cell import HandPath, Start
 from physid_drake.diagnose.confirm import Candidate, _ranked, push_scores, rivals
-from physid_drake.diagnose.fit import EffectPoint, Fitted, State
 from physid_drake.diagnose.linear import LinearPush, Whitened, solve
+from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.regimes import _by_heading, _by_speed
 from physid_drake.effects import Effect
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from physid_drake.diagnose.estimates import correlation_of
-from physid_drake.diagnose.fit import EffectPoint
+from physid_drake.diagnose.model import EffectPoint
 from physid_drake.effects import Surroundings
 from physid_drake.effects.body import UnevenSupport
 from physid_drake.effects.forces import TableTilt

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from physid_drake.diagnose.fit import Fitted, State
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve
+from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.pairs import promising
 from physid_drake.diagnose.screen import Signature, _by_trend, score
 from physid_drake.effects import Family

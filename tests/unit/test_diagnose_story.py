@@ -8,7 +8,7 @@ import pytest
 from physid_drake.diagnose import story
 from physid_drake.diagnose.confirm import Candidate
 from physid_drake.diagnose.evidence import unexplained
-from physid_drake.diagnose.fit import State
+from physid_drake.diagnose.model import State
 
 PUSHES = 8
 
