@@ -62,7 +62,7 @@ class Candidate:
     @property
     def coordinates(self) -> int:
         """How many numbers the effect has."""
-        return len(self.fitted.state.effects[-1].point)
+        return len(self.score.signature.family.point)
 
     @property
     def gain(self) -> float:

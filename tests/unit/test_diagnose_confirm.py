@@ -14,9 +14,8 @@ from physid_drake.effects import Effect
 
 
 def candidate(gains, *, degenerate=False, coordinates=1):
-    effect = SimpleNamespace(point=np.zeros(coordinates))
-    fitted = SimpleNamespace(state=SimpleNamespace(effects=(effect,)))
-    return Candidate(score=None, fitted=fitted, gains=np.asarray(gains, dtype=float), degenerate=degenerate)
+    score = SimpleNamespace(signature=SimpleNamespace(family=SimpleNamespace(point=(0.0,) * coordinates)))
+    return Candidate(score=score, fitted=None, gains=np.asarray(gains, dtype=float), degenerate=degenerate)
 
 
 @pytest.mark.parametrize(

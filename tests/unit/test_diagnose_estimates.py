@@ -5,11 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from physid_drake.diagnose.estimates import correlation_of
+from physid_drake.diagnose.estimates import correlation_of, theta_of
 from physid_drake.diagnose.model import EffectPoint
 from physid_drake.effects import Surroundings
 from physid_drake.effects.body import UnevenSupport
 from physid_drake.effects.forces import TableTilt
+from physid_drake.space import Parameter, ParameterSpace
 
 AROUND = Surroundings(
     mass=0.2, friction=0.3, size=np.array([0.12, 0.05]), height=0.03, region=np.array([[-0.5, -0.5], [0.5, 0.5]]),
@@ -43,6 +44,21 @@ def test_theta_and_an_effect_whose_chart_is_its_parameters_vary_as_the_fit_says(
     assert names == ("theta.support_friction", "table_tilt.x", "table_tilt.y")
     np.testing.assert_allclose(found, wanted, atol=3.0 / np.sqrt(2000))
     assert found[0, 1] == pytest.approx(0.9, abs=0.015)
+
+
+def test_no_interval_of_theta_is_narrower_than_the_cells_own_error():
+    friction = Parameter(name="support_friction", unit="-", lower=0.05, upper=1.0, scale="log", prior_mean=0.3)
+    case = SimpleNamespace(thetas=SimpleNamespace(space=ParameterSpace(parameters=(friction,))))
+    for spread, widths in ((1e-6, (0.005, 0.02)), (0.05, (0.1, 0.3))):
+        fit = fitted(covariance=np.array([[spread**2]]))
+        evidence = SimpleNamespace(
+            case=case, plain=fit, fitter=SimpleNamespace(priors=lambda state: (np.zeros(1), np.full(1, 0.3)))
+        )
+        estimate = theta_of(evidence, fit)["support_friction"]
+        assert estimate.identifiable
+        # At the middle of its range; a deviation is 1 %, or 0.05 of three times log(20).
+        reach = np.log(estimate.ci90[1] / estimate.value)
+        assert widths[0] < reach < widths[1]
 
 
 def test_what_does_not_vary_or_is_no_single_number_is_left_out():
