@@ -127,6 +127,7 @@ class Figures:
         pairs: of two effects: ``both``, ``one``, ``wrong``.
         parameter_error: relative, of clear effects that were named rightly.
         coverage: 90 % intervals that hold the truth.
+        theta_error, theta_coverage: the same of friction and mass, in worlds of which the right thing was said.
         held_out: per kind of world; ``effect`` where it is clear and named rightly.
         reliability: stated probabilities against what came true.
         brier: mean square of probability minus what came true; nan without names.
@@ -145,6 +146,8 @@ class Figures:
     pairs: dict[str, Share]
     parameter_error: Quantiles
     coverage: Share
+    theta_error: Quantiles
+    theta_coverage: Share
     held_out: dict[str, Errors]
     reliability: tuple[Reliability, ...]
     brier: float
@@ -157,6 +160,7 @@ def figures_of(outcomes: Sequence[Outcome]) -> Figures:
     kinds = {kind: [o for o in outcomes if o.kind == kind] for kind in KINDS}
     single = kinds["effect"]
     clear = [o for o in single if o.size >= CLEAR]
+    right = [o for o in outcomes if o.fault is None and o.kind != "other"]
     bins, brier = calibration(outcomes)
     times = [o.seconds for o in outcomes if math.isfinite(o.seconds)]
     return Figures(
@@ -175,6 +179,8 @@ def figures_of(outcomes: Sequence[Outcome]) -> Figures:
         },
         parameter_error=_quantiles([e for o in clear for e in o.errors]),
         coverage=_count(c for o in single for c in o.covered),
+        theta_error=_quantiles([e for o in right for e in o.theta_errors]),
+        theta_coverage=_count(c for o in right for c in o.theta_covered),
         held_out={
             "none": _errors(kinds["none"]),
             "effect": _errors([o for o in clear if o.right]),
@@ -223,6 +229,9 @@ def table(figures: Figures) -> list[tuple[str, str, str, str]]:
         ("  error of its parameters, 90th percentile", _percent(error, tail=True), "", ""),
         _row("90 % intervals that hold the truth", figures.coverage, "85 to 95 %"),
         *_naming_rows(f"effect below {CLEAR:g} sigma", figures.faint, ("", "")),
+        ("error of friction and mass, median", _percent(figures.theta_error), "", ""),
+        ("  90th percentile", _percent(figures.theta_error, tail=True), "", ""),
+        _row("  90 % intervals that hold the truth", figures.theta_coverage, "85 to 95 %"),
         _row("not in the catalogue: unexplained", figures.abstained, "90 %"),
         _row("  a wrong name", figures.others_named, "at most 3 %"),
         _row("two effects: both named", figures.pairs["both"], "70 %"),
@@ -282,6 +291,7 @@ def json_of(figures: Figures) -> dict[str, Any]:
         "pairs": {name: _plain(share) for name, share in figures.pairs.items()},
         "parameter_error": _plain(figures.parameter_error),
         "coverage_90": _plain(figures.coverage),
+        "theta": {"error": _plain(figures.theta_error), "coverage_90": _plain(figures.theta_coverage)},
         "held_out": {kind: _plain(errors) for kind, errors in figures.held_out.items()},
         "calibration": {"brier": _plain(figures.brier), "bins": [_plain(b) for b in figures.reliability]},
         "confusion": [{"true": t, "said": s, "worlds": n} for (t, s), n in figures.confusion.items()],

@@ -50,6 +50,7 @@ class Outcome:
         probabilities: stated for the first name of each finding.
         errors: relative error of each parameter that was found.
         covered: whether each 90 % interval holds the truth.
+        theta_errors, theta_covered: the same of friction and mass, where these pushes tell them.
         chi2: cost per degree of freedom after; nan where the diagnosis failed.
         held_out: errors before and after, and those of the true world.
         seconds: that the diagnosis took on this machine; nan where unknown.
@@ -65,6 +66,8 @@ class Outcome:
     probabilities: tuple[float, ...] = ()
     errors: tuple[float, ...] = ()
     covered: tuple[bool, ...] = ()
+    theta_errors: tuple[float, ...] = ()
+    theta_covered: tuple[bool, ...] = ()
     chi2: float = math.nan
     held_out: HeldOut = HeldOut()
     seconds: float = math.nan
@@ -140,6 +143,7 @@ def outcome(truth: dict[str, Any], diagnosis: dict[str, Any], seconds: float = m
     """
     named = diagnosis["effects"] if diagnosis["verdict"] in NAMED else []
     compared = [pair for effect in named for pair in _parameters(truth["effects"], effect)]
+    theta = _theta(truth["theta"], diagnosis["theta"])
     return Outcome(
         id=truth["id"],
         kind=truth["kind"],
@@ -150,6 +154,8 @@ def outcome(truth: dict[str, Any], diagnosis: dict[str, Any], seconds: float = m
         probabilities=tuple(e["probability"] for e in named),
         errors=tuple(error for error, _ in compared),
         covered=tuple(covered for _, covered in compared),
+        theta_errors=tuple(error for error, _ in theta),
+        theta_covered=tuple(covered for _, covered in theta),
         chi2=_number(diagnosis["reduced_chi2_after"]),
         held_out=_held_out(diagnosis["fit"], truth.get("held_out_floor", {})),
         seconds=seconds,
@@ -207,6 +213,15 @@ def _parameters(true: Sequence[dict[str, Any]], effect: dict[str, Any]) -> list[
                 (abs(found["value"] - value) / scale, bool(found["ci90"][0] <= value <= found["ci90"][1]))
             )
     return compared
+
+
+def _theta(true: dict[str, float], found: dict[str, Any]) -> list[tuple[float, bool]]:
+    """Relative error of each parameter of theta that the pushes tell, and whether its interval holds the truth."""
+    return [
+        (abs(one["value"] / true[name] - 1.0), bool(one["ci90"][0] <= true[name] <= one["ci90"][1]))
+        for name, one in found.items()
+        if one["value"] is not None and true.get(name)
+    ]
 
 
 def _leaves(true: dict[str, Any] | None, effect: dict[str, Any], name: str) -> float:

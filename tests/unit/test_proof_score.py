@@ -10,7 +10,8 @@ from physid_drake.prove.score import outcome, read_outcomes
 
 def truth(kind="effect", names=("viscous_drag",), size=8.0, value=0.4):
     effects = [{"name": n, "parameters": {"coefficient": value}} for n in names]
-    return {"id": "0a", "kind": kind, "effects": effects, "size_sigma": size}
+    theta = {"support_friction": 0.3, "hand_friction": 0.2, "mass": 0.25}
+    return {"id": "0a", "kind": kind, "effects": effects, "size_sigma": size, "theta": theta}
 
 
 def said(verdict="explained", names=("viscous_drag",), alike=(), value=0.42, ci90=(0.38, 0.46)):
@@ -25,13 +26,24 @@ def said(verdict="explained", names=("viscous_drag",), alike=(), value=0.42, ci9
         for n in names
     ]
     fit = {"held_out_rms_before": 5.0, "held_out_rms_after": 1.1}
-    return {"verdict": verdict, "effects": effects, "fit": fit, "reduced_chi2_after": 1.0}
+    theta = {
+        "support_friction": {"value": 0.303, "ci90": [0.298, 0.308]},
+        "hand_friction": {"value": 0.21, "ci90": [0.205, 0.215]},
+        "mass": {"value": None, "ci90": None},
+    }
+    return {"verdict": verdict, "effects": effects, "fit": fit, "reduced_chi2_after": 1.0, "theta": theta}
 
 
 def test_a_right_name_is_right_and_its_parameter_is_compared():
     o = outcome(truth(), said())
     assert o.found and o.right and o.both and not o.wrong_name
     assert o.errors == (pytest.approx(0.05),) and o.covered == (True,)
+
+
+def test_what_the_pushes_tell_of_theta_is_compared_too():
+    o = outcome(truth(), said())
+    assert o.theta_errors == (pytest.approx(0.01), pytest.approx(0.05))
+    assert o.theta_covered == (True, False)
 
 
 @pytest.mark.parametrize(
