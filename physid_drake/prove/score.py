@@ -143,7 +143,7 @@ def outcome(truth: dict[str, Any], diagnosis: dict[str, Any], seconds: float = m
     """
     named = diagnosis["effects"] if diagnosis["verdict"] in NAMED else []
     compared = [pair for effect in named for pair in _parameters(truth["effects"], effect)]
-    theta = _theta(truth["theta"], diagnosis["theta"])
+    theta = _theta(truth.get("theta", {}), diagnosis.get("theta", {}))
     return Outcome(
         id=truth["id"],
         kind=truth["kind"],
