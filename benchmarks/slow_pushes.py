@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from reference.scenes import OBJECTS, Theta, draw_push, simulate
 from twin import parting, rms, twin
 
-TICKS = (1e-3, 4e-3, 1e-2, 2e-2)
+TICKS = (1e-3, 4e-3, 1e-2, 2e-2, 4e-2)
 
 
 def main() -> None:

@@ -33,7 +33,7 @@ from physid_drake.run_folder import RunFolder
 STATE = "stages.npz"
 SHOWN = 12  # pushes in the animation
 ALPHA = 0.01  # false-alarm rate
-LONGEST_TICK = 2e-2  # s, for slow pushes: within 0.03 mm and 0.3 mrad of ticks of 1 ms (benchmarks/slow_pushes.py)
+LONGEST_TICK = 2e-2  # s, for slow pushes: within 0.08 mm and 0.6 mrad of ticks of 1 ms (benchmarks/slow_pushes.py)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -200,9 +200,9 @@ def shown_pushes(diagnosis: Diagnosis, evidence: Evidence) -> list[ShownPush]:
 
 
 def _predicted(fitted: Fitted, i: int, recorded: np.ndarray) -> np.ndarray:
-    """Features that a model predicts with the push's own unknowns at zero: the residual is linear in them."""
-    push = fitted.pushes[i]
-    return np.asarray(recorded - push.residual + push.shared @ fitted.solution.beta)
+    """Features that a model predicts with the push's own unknowns at zero, and without the diagnosis' tolerances."""
+    push, own = fitted.pushes[i], fitted.own_dimension
+    return np.asarray(recorded - push.residual + push.shared[:, :own] @ fitted.solution.beta[:own])
 
 
 def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:

@@ -133,8 +133,10 @@ def _probability(step: Sequence[Candidate]) -> float:
         difference = best.gains - other.gains
         # Some error of the scores themselves, so that few pushes do not make sure.
         spread = math.hypot(standard_error(difference), 2.0)
-        # What is more complicated and no better than a little is at most as likely.
-        worse = float(stats.norm.sf(max(0.0, difference.sum()) / spread))
+        deficit = float(difference.sum())
+        if other.coordinates > best.coordinates:  # a little better for being more complicated is not likelier
+            deficit = max(0.0, deficit)
+        worse = float(stats.norm.sf(deficit / spread))
         total += worse / max(1.0 - worse, 1e-9)
     return 1.0 / total
 
@@ -246,7 +248,3 @@ def _sentence(
         for f in findings
     ]
     return "What is missing: " + "; and ".join(names) + "."
-
-
-def _or(names: Sequence[str]) -> str:
-    return f", or {' or '.join(names)}, which these pushes cannot tell from it" if names else ""

@@ -47,22 +47,19 @@ class Candidate:
         fitted: the model with it.
         gains: (n,) log predictive density of each push, left out, over that without the effect.
         degenerate: whether an amplitude ran to its null, so that it is another effect or none.
+        coordinates: how many numbers of the effect were fitted.
     """
 
     score: Score
     fitted: Fitted
     gains: Array
     degenerate: bool
+    coordinates: int = 1
 
     @property
     def name(self) -> str:
         """The effect's."""
         return self.score.kind.name
-
-    @property
-    def coordinates(self) -> int:
-        """How many numbers the effect has."""
-        return len(self.score.signature.family.point)
 
     @property
     def gain(self) -> float:
@@ -99,14 +96,18 @@ def standard_error(values: Array) -> float:
     return float(np.std(values, ddof=1) * np.sqrt(len(values))) if len(values) > 1 else np.inf
 
 
-def push_scores(fitted: Fitted) -> Array:
+def push_scores(fitted: Fitted, folds: Sequence[Sequence[int]] | None = None) -> Array:
     """Log predictive density (n,) of each push, fitted without it; each bears its part of the tolerances' use.
+
+    Args:
+        fitted: the model.
+        folds: indices of pushes that are left out together; None leaves out one at a time.
 
     A model may claim that all pushes share an error of the simulator or of a caliper. The others then predict the
     push that is left out with that very error, at no cost: a centre of mass off by ten tolerances would be predicted
     as well as by the effect.
     """
-    scores, _ = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std)
+    scores, _ = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std, folds)
     return scores - fitted.tolerance_cost / len(scores)
 
 
@@ -198,7 +199,8 @@ def _candidate(fitter: Fitter, one: Score, fitted: Fitted, plain: Array) -> Cand
 def candidate_of(fitter: Fitter, one: Score, fitted: Fitted, point: EffectPoint, before: Array) -> Candidate:
     """An effect that is at ``point`` in a fitted model, over the scores (n,) of the pushes without it."""
     return Candidate(
-        score=one, fitted=fitted, gains=push_scores(fitted) - before, degenerate=_degenerate(fitter, one, point)
+        score=one, fitted=fitted, gains=push_scores(fitted) - before, degenerate=_degenerate(fitter, one, point),
+        coordinates=len(one.kind.leading(fitter.case.around)),
     )  # fmt: skip
 
 
@@ -212,10 +214,9 @@ def _fit(fitter: Fitter, before: Fitted, one: Score) -> Fitted:
 
 def _fit_from_afar(fitter: Fitter, before: Fitted, candidate: Candidate) -> Fitted:
     """The same from the best of a scan, all derivatives taken on the way: far off, the plain ones mislead."""
-    one = candidate.score
-    u = np.clip(before.state.u + np.clip(one.theta, -FAR, FAR), 1e-3, 1.0 - 1e-3)
-    effects = (*before.state.effects, scanned_start(fitter, before, one))
-    return fitter.fit(fitter.start(u, effects), rounds=4, careful=2, renew=True)
+    point, theta = scanned_start(fitter, before, candidate.score)
+    u = np.clip(before.state.u + np.clip(theta, -FAR, FAR), 1e-3, 1.0 - 1e-3)
+    return fitter.fit(fitter.start(u, (*before.state.effects, point)), rounds=4, careful=2, renew=True)
 
 
 def _degenerate(fitter: Fitter, one: Score, point: EffectPoint) -> bool:

@@ -74,11 +74,11 @@ class Fitted:
 
     Attributes:
         state: where.
-        pushes: linearised there; columns of ``shared``: theta, then the effects' free coordinates.
+        pushes: linearised there; columns of ``shared``: theta, the effects' free coordinates, tolerances.
         prior_mean, prior_std: (d,) of a change of the shared parameters.
         solution: of the linear problem at the state; its beta is what was left to move.
         predicted: per push (m,), features at the state, unknowns included.
-        scores: log likelihood with the scatter's prior.
+        score: log likelihood with the scatter's prior.
     """
 
     state: State

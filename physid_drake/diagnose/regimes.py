@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.confirm import standard_error
-from physid_drake.diagnose.linear import left_out_scores
+from physid_drake.diagnose.confirm import push_scores, standard_error
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import RegimeGain
 
@@ -32,7 +29,7 @@ def regime_gains(case: Case, before: Fitted, after: Fitted) -> tuple[RegimeGain,
     for names, halves in ((("slow", "fast"), _by_speed(case)), (("one heading", "the other"), _by_heading(case))):
         if halves is None:
             continue
-        gains = _scores(after, halves) - _scores(before, halves)
+        gains = push_scores(after, halves) - push_scores(before, halves)
         for tested, fitted in ((1, 0), (0, 1)):
             own = gains[list(halves[tested])]
             found.append(
@@ -45,11 +42,6 @@ def regime_gains(case: Case, before: Fitted, after: Fitted) -> tuple[RegimeGain,
 
 
 Halves = tuple[tuple[int, ...], tuple[int, ...]]
-
-
-def _scores(fitted: Fitted, halves: Sequence[Sequence[int]]) -> Array:
-    scores, _ = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std, halves)
-    return scores
 
 
 def _by_speed(case: Case) -> Halves | None:

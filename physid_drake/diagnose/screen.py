@@ -27,7 +27,6 @@ Tick = Callable[[int, int], None]
 
 DRAWS = 1000
 FEWEST_FOR_A_TREND = 6  # pushes
-ALIKE = 0.95  # cosine of two projected signatures that these pushes cannot tell apart
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -65,8 +64,8 @@ class Score:
         kept: indices of its directions that may be used (one-sided ones only if their sign is right).
         coefficients: (p,) best steps; 0 in directions not kept.
         theta: (d,) change of theta in the unit cube that goes with it.
-        gain: twice the gain in log likelihood.
-        log_p: of that gain, chi-square with as many degrees of freedom as directions.
+        gain: twice the gain in log likelihood, or what is as unlikely as the rank correlation that was found.
+        log_p: of that gain, by an F distribution with the push as the unit (``log_probability``).
         others: the scores of the effect's other families.
     """
 
@@ -136,25 +135,28 @@ def signatures(
         vectors += fitter.vectors(tasks[k : k + 64])
         if tick is not None:
             tick(min(k + 64, len(tasks)), len(tasks))
-    columns = [[_known_columns(fitted, b, i) for i in range(len(case.problems))] for b in blank]
+    columns = [[np.zeros((len(f.recorded), b.steps)) for f in case.features] for b in blank]
     for (s, i, d, sign), vector in zip(plan, vectors, strict=True):
         if blank[s].family.central:
             columns[s][i][:, d] += 0.5 * sign * vector
         else:
             columns[s][i][:, d] = vector - base[i]
-    return [dc.replace(b, columns=tuple(c)) for b, c in zip(blank, columns, strict=True)]
+    return [with_frictions(fitted, dc.replace(b, columns=tuple(c))) for b, c in zip(blank, columns, strict=True)]
 
 
-def _known_columns(fitted: Fitted, blank: Signature, i: int) -> Array:
-    """Columns (m, p) that need no rollout; zero for those that do.
+def with_frictions(fitted: Fitted, signature: Signature) -> Signature:
+    """The signature of an effect that only changes the friction of whole pushes, from the pushes' own frictions.
 
-    An effect that only changes a push's friction is told from the push's own friction by how pushes compare, so that
-    its signature has to be the very same direction: where motion has a kink, two differences are not.
+    Such an effect is told from a push's own friction by how pushes compare, so that it has to be the very same
+    direction: where motion has a kink, two differences are not.
     """
-    push = fitted.pushes[i]
-    if not blank.friction_changes:
-        return np.zeros((len(push.residual), blank.steps))
-    return push.own[:, [push.friction]] * (blank.friction_changes[i] / UNIT_SCATTER)
+    if not signature.friction_changes:
+        return signature
+    columns = tuple(
+        push.own[:, [push.friction]] * (change / UNIT_SCATTER)
+        for push, change in zip(fitted.pushes, signature.friction_changes, strict=True)
+    )
+    return dc.replace(signature, columns=columns)
 
 
 def _friction_changes(fitter: Fitter, kind: type[Effect], family: Family) -> tuple[float, ...]:
@@ -167,26 +169,34 @@ def _friction_changes(fitter: Fitter, kind: type[Effect], family: Family) -> tup
     return tuple(c for c in changes if c is not None)
 
 
-def _by_trend(fitted: Fitted, one: Score) -> Score:
-    """The score test, or the rank correlation of the pushes' own frictions with the effect's, for two looks.
+def by_trend(fitted: Fitted, one: Score) -> Score:
+    """The score test or the rank correlation of the pushes' own frictions with the effect's, two looks.
 
     Frictions that differ much from push to push are far from where the pushes were linearised; their order is not.
+    The p-value of Kendall's correlation is exact for few pushes.
     """
     beta, scatter = fitted.solution.beta, fitted.state.scatter
     frictions = np.array([own_unknowns(push, scatter, beta)[push.friction] for push in fitted.pushes])
     changes = np.array(one.signature.friction_changes) / UNIT_SCATTER
     if len(frictions) < FEWEST_FOR_A_TREND or np.ptp(frictions) == 0.0:
         return one
-    log_p = math.log(max(1e-300, min(1.0, 2.0 * float(stats.spearmanr(frictions, changes).pvalue))))
-    if log_p >= one.log_p:
-        return one
+    by_rank = math.log(max(1e-300, float(stats.kendalltau(frictions, changes).pvalue)))
     slope = float(stats.theilslopes(frictions, changes).slope)
-    if one.signature.one_sided[0] and slope < 0.0:
-        return one
+    two_looks = math.log(2.0)
+    if by_rank >= one.log_p or (one.signature.one_sided[0] and slope < 0.0):
+        return dc.replace(one, log_p=min(0.0, one.log_p + two_looks))
+    log_p = min(0.0, by_rank + two_looks)
     return dc.replace(
         one, kept=(0,), coefficients=np.array([slope]), theta=np.zeros(len(fitted.state.u)), log_p=log_p,
-        gain=max(one.gain, float(stats.chi2.isf(math.exp(log_p), 1))),
+        gain=max(one.gain, _gain_at(log_p, 1, len(fitted.pushes), fitted.own_dimension)),
     )  # fmt: skip
+
+
+def _gain_at(log_p: float, directions: int, pushes: int, spent: int) -> float:
+    """The gain that has a p-value: the inverse of `log_probability`."""
+    free = max(1, pushes - spent - directions)
+    ratio = float(stats.f.isf(math.exp(log_p), directions, free))
+    return pushes * math.log1p(ratio * directions / free)
 
 
 def empty_signatures(fitter: Fitter, kinds: Sequence[type[Effect]]) -> list[Signature]:
@@ -284,7 +294,7 @@ def screen(fitted: Fitted, found: Sequence[Signature], rng: np.random.Generator)
     for signature in found:
         one = score(fitted, signature)
         if signature.friction_changes:
-            one = _by_trend(fitted, one)
+            one = by_trend(fitted, one)
         families.setdefault(signature.kind.name, []).append(one)
     scores = tuple(sorted((_best_family(every) for every in families.values()), key=_rank))
     null = _null_draws(fitted, found, rng)

@@ -9,10 +9,13 @@ from __future__ import annotations
 import dataclasses as dc
 
 import numpy as np
+from numpy.typing import NDArray
 
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint, Fitted
 from physid_drake.diagnose.screen import Score
+
+Array = NDArray[np.float64]
 
 FAMILIES = 4  # of an effect, the best by their score tests
 MULTIPLES = (1.0, 2.5, 5.0)  # of what the score test says
@@ -23,7 +26,9 @@ def start_of(fitter: Fitter, one: Score) -> EffectPoint:
     return _started(fitter, one, 1.0)
 
 
-def scanned_start(fitter: Fitter, before: Fitted, one: Score, beside: tuple[EffectPoint, ...] = ()) -> EffectPoint:
+def scanned_start(
+    fitter: Fitter, before: Fitted, one: Score, beside: tuple[EffectPoint, ...] = ()
+) -> tuple[EffectPoint, Array]:
     """The best of an effect's families at several strengths, one rollout per push each.
 
     Args:
@@ -31,20 +36,30 @@ def scanned_start(fitter: Fitter, before: Fitted, one: Score, beside: tuple[Effe
         before: the model to which the effect is added; theta and the pushes' unknowns follow by its derivatives.
         one: the effect's score test.
         beside: other effects that are in the model meanwhile.
+
+    Returns:
+        The chart point, and the change (d,) of theta that goes with it.
     """
     points = [_started(fitter, family, multiple) for family in _families(one) for multiple in MULTIPLES]
     held = tuple(dc.replace(other, free=()) for other in beside)
-    scores = []
+    seen = []
     for point in points:
         effects = (*before.state.effects, *held, dc.replace(point, free=()))
-        scores.append(fitter.seen_from(before, dc.replace(before.state, effects=effects)).score)
-    return points[int(np.argmax(scores))]
+        seen.append(fitter.seen_from(before, dc.replace(before.state, effects=effects)))
+    best = int(np.argmax([model.score for model in seen]))
+    return points[best], seen[best].solution.beta[: len(before.state.u)]
 
 
 def _families(one: Score) -> list[Score]:
     """Families of an effect, best first, each as strong as the best one where it would act the other way round."""
-    every = sorted((one, *one.others), key=lambda s: -s.gain)[:FAMILIES]
-    return [s if s.kept else dc.replace(s, kept=one.kept, coefficients=one.coefficients) for s in every]
+    alike = [s for s in (one, *one.others) if s.signature.steps == one.signature.steps]
+    every = sorted(alike, key=lambda s: -s.gain)[:FAMILIES]
+    return [s if s.kept else _as_strong_as(one, s) for s in every]
+
+
+def _as_strong_as(one: Score, other: Score) -> Score:
+    steps = one.signature.family.size / other.signature.family.size
+    return dc.replace(other, kept=one.kept, coefficients=steps * one.coefficients)
 
 
 def _started(fitter: Fitter, one: Score, multiple: float) -> EffectPoint:

@@ -26,9 +26,17 @@ from physid_drake.diagnose.loudness import as_loud_as_left, quieter
 from physid_drake.diagnose.memory import Memory
 from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.next_push import next_push
-from physid_drake.diagnose.pairs import confirmed_pair
+from physid_drake.diagnose.pairs import confirmed_pairs, steps_of
 from physid_drake.diagnose.plain import coarse, fit_plain, numerics
-from physid_drake.diagnose.screen import Screening, Signature, empty_signatures, screen, signatures, tolerances
+from physid_drake.diagnose.screen import (
+    Screening,
+    Signature,
+    empty_signatures,
+    screen,
+    signatures,
+    tolerances,
+    with_frictions,
+)
 from physid_drake.diagnose.values import Diagnosis
 from physid_drake.effects import Effect, applicable
 
@@ -36,7 +44,7 @@ Array = NDArray[np.float64]
 Tick = Callable[[str, int, int], None]
 
 MOST_EFFECTS = 3
-LONGEST = 600  # rollouts per push after which no further effect is looked for
+LONGEST = 450  # rollouts per push, after the first score tests, after which no further effect is looked for
 ANOTHER_BASIN = 10.0  # nats by which a plain fit must be better to be another one
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
 WIDE = 2.0  # times the usual scatter of friction: it may be what is missing in disguise
@@ -162,7 +170,9 @@ class _Looked:
 
     @classmethod
     def at(cls, fitted: Fitted, signatures: Sequence[Signature], rng: np.random.Generator) -> _Looked:
-        return cls(fitted=fitted, signatures=tuple(signatures), screening=screen(fitted, signatures, rng))
+        # Derivatives with respect to the pushes' own frictions may have been taken anew since.
+        fresh = tuple(with_frictions(fitted, s) for s in signatures)
+        return cls(fitted=fitted, signatures=fresh, screening=screen(fitted, fresh, rng))
 
     @property
     def p_value(self) -> float:
@@ -188,10 +198,11 @@ def _grown(
     rng: np.random.Generator,
     tick: Tick,
 ) -> _Grown:
-    """Add the effect that pushes left out confirm most, as long as something is missing."""
-    last, steps = base, list[tuple[Candidate, ...]]()
-    longest = LONGEST * len(fitter.case.problems)
-    while len(steps) < min(MOST_EFFECTS, len(kinds)) and fitter.case.pool.count < longest and last.p_value < alpha:
+    """Add the effect that pushes left out confirm most, as long as something is missing; or two at once."""
+    last, steps, rejected = base, list[tuple[Candidate, ...]](), tuple[Candidate, ...]()
+    pool = fitter.case.pool
+    longest = pool.count + LONGEST * len(fitter.case.problems)
+    while len(steps) < min(MOST_EFFECTS, len(kinds)) and pool.count < longest and last.p_value < alpha:
         candidates = confirm(fitter, last.fitted, last.screening.scores, tick, most=CANDIDATES - len(steps))
         if not steps and candidates:
             better = _plain_from(fitter, base.fitted, candidates[0], tick)
@@ -202,22 +213,37 @@ def _grown(
                     continue
                 base = last = _Looked.at(better, base.signatures, rng)
                 candidates = rejudged(candidates, better)
-        if not candidates or not worthwhile(last.fitted, candidates[0]):
-            pair = None if steps else confirmed_pair(fitter, last.fitted, last.screening.scores, tick)
-            if pair is None:
-                return _Grown(base=base, last=last, steps=tuple(steps), rejected=candidates)
-            steps = [(candidate,) for candidate in pair.candidates]
-            last = _what_is_left(fitter, pair.fitted, last.signatures, kinds, rng, tick, alpha)
-            continue
-        steps.append(candidates)
-        tick(f"model with {candidates[0].name}", 0, 0)
-        model = _model_with(fitter, candidates[0])
+        added = _worth_adding(last.fitted, candidates)
+        if added:
+            steps.append(added)
+            state = added[0].fitted.state
+        else:
+            scores = last.screening.scores
+            pairs = [] if steps else confirmed_pairs(fitter, last.fitted, scores, tick, most=longest)
+            rejected = candidates
+            if not pairs:
+                break
+            steps += steps_of(pairs)
+            state = pairs[0].fitted.state
+        tick(f"model with {' and '.join(step[0].name for step in steps)}", 0, 0)
+        model = _model_with(fitter, state)
         hopeless = len(steps) > 1 and model.reduced_chi2 > HOPELESS
-        more = not hopeless and len(steps) < MOST_EFFECTS and fitter.case.pool.count < longest
+        more = not hopeless and len(steps) < MOST_EFFECTS and pool.count < longest
         last = _what_is_left(fitter, model, last.signatures, kinds, rng, tick, alpha if more else 0.0)
         if hopeless:
             break
-    return _Grown(base=base, last=last, steps=tuple(steps), rejected=())
+    return _Grown(base=base, last=last, steps=tuple(steps), rejected=rejected)
+
+
+def _worth_adding(before: Fitted, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """The candidates, the one to add first: the simplest of the best, or the best; none where neither will do."""
+    if not candidates:
+        return ()
+    best = max((c for c in candidates if not c.degenerate), key=lambda c: c.gain, default=candidates[0])
+    for one in (candidates[0], best):
+        if worthwhile(before, one):
+            return (one, *(c for c in candidates if c is not one))
+    return ()
 
 
 def _pruned(fitter: Fitter, grown: _Grown, rng: np.random.Generator, tick: Tick) -> _Grown:
@@ -284,7 +310,7 @@ def _looks(
         memory.keep("guard", guard_kept)
     fitter = Fitter(case)
     blank = empty_signatures(fitter, kinds)
-    if kept is not None:
+    if kept is not None and len(kept) == len(blank) * len(case.problems):  # of a run of this version
         edges = iter(kept)
         return tuple(guard_kept), [dc.replace(s, columns=tuple(next(edges) for _ in case.problems)) for s in blank]
     found = signatures(fitter, first, kinds, lambda done, total: tick("score tests", done, total))
@@ -306,7 +332,7 @@ def _reconsidered(
         if other.name in alike and other.name not in {e.kind.name for e in final.state.effects}:
             tick(f"{other.name} in place of {step[0].name}", 0, 0)
             effects = list(final.state.effects)
-            effects[k] = other.fitted.state.effects[-1]
+            effects[k] = next(e for e in other.fitted.state.effects if e.kind.name == other.name)
             swapped = fitter.fit(dc.replace(final.state, effects=tuple(effects)), rounds=4, like=final)
             judged.append(dc.replace(other, gains=push_scores(swapped) - before))
         else:
@@ -314,9 +340,8 @@ def _reconsidered(
     return tuple(judged)
 
 
-def _model_with(fitter: Fitter, candidate: Candidate) -> Fitted:
-    """The model with an effect, all its coordinates free, all derivatives taken where it is."""
-    state = candidate.fitted.state
+def _model_with(fitter: Fitter, state: State) -> Fitted:
+    """A fitted model with all coordinates of its effects free, all derivatives taken where it is."""
     effects = tuple(e.freed(fitter.case) for e in state.effects)
     near = fitter.fit(dc.replace(state, effects=effects), rounds=3, renew=True)
     if near.reduced_chi2 > HOPELESS or (near.reduced_chi2 <= EXPLAINED and near.state.scatter <= WIDE):

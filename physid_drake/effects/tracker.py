@@ -59,19 +59,22 @@ class TrackerBias(Effect):
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
-        """The object's place seen from the tracked frame, so that turning a round object moves nothing else; yaw."""
+        """How far the tracked frame is from the object, along its own axes, and yaw.
+
+        Along its own axes, so that turning a round object moves nothing else.
+        """
         most = 0.5 * around.radius
-        places = tuple(Coordinate(name=name, step=4e-4, lower=-most, upper=most) for name in ("seen_x", "seen_y"))
+        places = tuple(Coordinate(name=name, step=4e-4, lower=-most, upper=most) for name in ("along_x", "along_y"))
         # About a round object nothing tells the yaw; trackers are mounted about straight.
         return (*places, Coordinate(name="yaw", step=4e-3, lower=-0.8, upper=0.8, std=0.2))
 
     @classmethod
     def at(cls, point: Array, around: Surroundings) -> TrackerBias:
-        """Places in the object's frame."""
+        """The offset along the object's axes."""
         del around
-        seen_x, seen_y, yaw = point.tolist()
+        along_x, along_y, yaw = point.tolist()
         c, s = math.cos(yaw), math.sin(yaw)
-        return cls(x=c * seen_x - s * seen_y, y=s * seen_x + c * seen_y, yaw=yaw)
+        return cls(x=c * along_x - s * along_y, y=s * along_x + c * along_y, yaw=yaw)
 
     def true_pose(self, pose: Pose) -> Pose:
         """The object's pose for a tracked one."""

@@ -10,7 +10,7 @@ import pytest
 from twin import SIGMA, body_of, config_of
 
 from physid_drake.cell import Cell, HandPath, Outcome, Start
-from physid_drake.effects import CATALOGUE, Surroundings, applicable, effect_named
+from physid_drake.effects import CATALOGUE, PushFacts, Surroundings, applicable, effect_named
 from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
 from physid_drake.errors import ConfigError
 from physid_drake.recording import Box, Cylinder
@@ -259,6 +259,22 @@ def test_each_direction_leaves_a_signature_that_grows_with_the_step(kind):
         curve = np.linalg.norm((twice - 2.0 * once) / SIGMA) / np.linalg.norm(2.0 * once / SIGMA)
         # Measured: at most 0.16 (rolling resistance).
         assert kind.name in CURVED or curve < 0.35, (family.point, coordinate.name, curve)
+
+
+@every_effect
+def test_an_effect_that_says_it_only_scales_friction_does_what_it_says(kind):
+    scene = around(rolls_for(kind))
+    effect = kind.at(np.array([2.0 * c.step for c in kind.chart(scene)]), scene)
+    change = effect.friction_change(2)
+    if change is None:
+        return
+    plain_body, changed = (
+        e.body(body_of(MASS, MU), PushFacts(order=2, mass=MASS, polar=1e-3)) for e in (kind(), effect)
+    )
+    assert change != 0.0
+    np.testing.assert_allclose(changed.support_friction, (1.0 + change) * np.asarray(plain_body.support_friction))
+    rest = [{k: v for k, v in vars(b).items() if k != "support_friction"} for b in (plain_body, changed)]
+    np.testing.assert_equal(*rest)
 
 
 def test_effects_apply_where_they_can():

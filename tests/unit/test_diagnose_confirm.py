@@ -14,8 +14,9 @@ from physid_drake.effects import Effect
 
 
 def candidate(gains, *, degenerate=False, coordinates=1):
-    score = SimpleNamespace(signature=SimpleNamespace(family=SimpleNamespace(point=(0.0,) * coordinates)))
-    return Candidate(score=score, fitted=None, gains=np.asarray(gains, dtype=float), degenerate=degenerate)
+    return Candidate(
+        score=None, fitted=None, gains=np.asarray(gains, dtype=float), degenerate=degenerate, coordinates=coordinates
+    )
 
 
 @pytest.mark.parametrize(
@@ -55,6 +56,11 @@ def test_the_simplest_of_those_that_do_as_well_comes_first():
     tilt = candidate(np.full(10, 9.7), coordinates=2)  # 3 nats less with two coordinates fewer
     nothing = candidate(np.full(10, 9.9), coordinates=1, degenerate=True)
     assert _ranked((far_spring, nothing, tilt)) == [tilt, far_spring, nothing]
+
+
+def test_where_much_is_explained_two_laws_may_differ_by_more():
+    spring, tilt = candidate(np.full(10, 100.0), coordinates=4), candidate(np.full(10, 98.8), coordinates=2)
+    assert _ranked((spring, tilt))[0] is tilt  # 12 nats less: 4 for two coordinates, 10 for a thousand explained
 
 
 def test_what_does_worse_is_not_preferred_for_being_simple():

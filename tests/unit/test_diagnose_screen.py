@@ -4,11 +4,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve
 from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.pairs import promising
-from physid_drake.diagnose.screen import Signature, _by_trend, score
+from physid_drake.diagnose.screen import Signature, by_trend, log_probability, score
 from physid_drake.effects import Family
 
 PUSHES, NUMBERS = 12, 20
@@ -26,7 +27,7 @@ def fitted_to(residuals, own):
     mean, std = np.zeros(1), np.ones(1)
     scatter, value = best_scatter(pushes, mean, std)
     return Fitted(
-        state=State(u=np.zeros(1), effects=(), own=(np.zeros(1),) * PUSHES, scatter=scatter),
+        state=State(u=np.zeros(1), effects=(), own=(np.zeros(1),) * len(pushes), scatter=scatter),
         pushes=pushes, prior_mean=mean, prior_std=std, solution=solve(Whitened.of(pushes, scatter), mean, std),
         predicted=tuple(np.zeros(NUMBERS) for _ in pushes), score=value,
     )  # fmt: skip
@@ -75,21 +76,33 @@ ORDER = np.arange(PUSHES)
 
 
 def drift_score(frictions, columns):
-    """The score of "friction follows the pushes' order" where linearised frictions say nothing of it."""
+    """The score of "friction follows the pushes' order", by its signature, which is silent here, and by ranks too."""
     residuals = frictions[:, None] * columns["own"] + columns["noise"]
     fitted = fitted_to(residuals, columns["own"])
-    changes = 0.001 * ORDER
+    changes = 0.001 * np.arange(len(frictions))
     silent = signature_of("friction_drift", 1e-6 * columns["own"], friction_changes=changes)
-    return score(fitted, silent), _by_trend(fitted, score(fitted, silent))
+    return score(fitted, silent), by_trend(fitted, score(fitted, silent))
 
 
 def test_frictions_in_order_are_seen_by_their_ranks(columns):
-    plain, by_trend = drift_score(-3.0 + 0.5 * ORDER, columns)
-    assert by_trend.log_p < np.log(1e-4) < plain.log_p
+    scattered = -3.0 + 0.5 * ORDER + np.random.default_rng(4).normal(size=PUSHES)
+    plain, trend = drift_score(scattered, columns)
+    expected = 2.0 * stats.kendalltau(scattered, ORDER).pvalue  # two looks
+    assert 1e-8 < expected < 1e-3 < np.exp(plain.log_p)
+    assert np.exp(trend.log_p) == pytest.approx(expected, rel=0.3)  # what noise swaps is near
     # 0.5 scatters of 2.5 % a push, in steps of 0.1 % a push.
-    assert by_trend.coefficients[0] == pytest.approx(12.5, rel=0.15)
+    assert trend.coefficients[0] == pytest.approx(12.5, rel=0.3)
+    # Its gain is that of a score test which is as unlikely.
+    assert log_probability(trend.gain, 1, PUSHES, 1) == pytest.approx(trend.log_p)
 
 
-def test_frictions_in_no_order_are_not(columns):
-    plain, by_trend = drift_score(np.random.default_rng(3).permutation(-3.0 + 0.5 * ORDER), columns)
-    assert by_trend == plain
+def test_a_perfect_order_of_few_pushes_is_no_certainty(columns):
+    few = {name: c[:6] for name, c in columns.items()}
+    _, trend = drift_score(np.arange(6.0), few)
+    assert np.exp(trend.log_p) == pytest.approx(2.0 * 2.0 / 720.0)  # two looks, up or down, of 6! orders
+
+
+def test_frictions_in_no_order_are_not_seen(columns):
+    plain, trend = drift_score(np.random.default_rng(3).permutation(-3.0 + 0.5 * ORDER), columns)
+    assert trend.gain == plain.gain
+    assert trend.log_p == pytest.approx(min(0.0, plain.log_p + np.log(2.0)))

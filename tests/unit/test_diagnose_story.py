@@ -48,6 +48,29 @@ def grown(monkeypatch):
     return story._Grown(base=base, last=last, steps=(step("magnet"), step("table_tilt")), rejected=())
 
 
+def tried(name, gains, *, coordinates=1, chi2=1.0, degenerate=False):
+    score = SimpleNamespace(kind=SimpleNamespace(name=name))
+    return Candidate(
+        score=score, fitted=SimpleNamespace(reduced_chi2=chi2), gains=np.asarray(gains, dtype=float),
+        degenerate=degenerate, coordinates=coordinates,
+    )  # fmt: skip
+
+
+def test_the_best_is_added_where_the_simpler_one_leaves_too_much():
+    before = SimpleNamespace(reduced_chi2=6.0)
+    simple, best = tried("table_tilt", [49.0] * 8, chi2=5.5), tried("tether", [50.0] * 8, coordinates=4, chi2=2.0)
+    assert [c.name for c in story._worth_adding(before, (simple, best))] == ["tether", "table_tilt"]
+    enough = tried("table_tilt", [49.0] * 8, chi2=2.2)
+    assert [c.name for c in story._worth_adding(before, (enough, best))] == ["table_tilt", "tether"]
+
+
+def test_nothing_is_added_that_pushes_do_not_confirm():
+    before = SimpleNamespace(reduced_chi2=6.0)
+    lost = tried("magnet", [50.0] * 8, degenerate=True)
+    assert story._worth_adding(before, (tried("table_tilt", [-1.0] * 8), lost)) == ()
+    assert story._worth_adding(before, ()) == ()
+
+
 def names_of(grown):
     return [candidates[0].name for candidates in grown.steps]
 
