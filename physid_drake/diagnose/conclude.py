@@ -15,6 +15,7 @@ from physid_drake.diagnose.confirm import (
     EXPLAINED,
     Candidate,
     left_out_residuals,
+    out_of_question,
     push_scores,
     rivals,
     standard_error,
@@ -117,7 +118,11 @@ def class_of(plain: Fitted, step: Sequence[Candidate]) -> tuple[str, ...]:
     best = step[0]
     close = {c.name for c in rivals(best, step)}
     for other in step[1:]:
-        if other.accepted and abs(cosine(plain, best.score, other.score)) > ALIKE:
+        if (
+            other.accepted
+            and not out_of_question(best, other)
+            and abs(cosine(plain, best.score, other.score)) > ALIKE
+        ):
             difference = best.gains - other.gains
             if difference.sum() < 3.0 * standard_error(difference):
                 close.add(other.name)
@@ -128,7 +133,7 @@ def _probability(step: Sequence[Candidate]) -> float:
     """That the best of a step is the right one: odds of each rival from its held-out deficit and standard error."""
     best, total = step[0], 1.0
     for other in step[1:]:
-        if other.degenerate:
+        if out_of_question(best, other):
             continue
         difference = best.gains - other.gains
         # Some error of the scores themselves, so that few pushes do not make sure.

@@ -229,11 +229,21 @@ def _degenerate(fitter: Fitter, one: Score, point: EffectPoint) -> bool:
     )
 
 
+def out_of_question(best: Candidate, other: Candidate) -> bool:
+    """Whether a candidate ran to nothing, or leaves pushes far from explained that the best one explains.
+
+    One push in which an effect shows a hundredfold makes the difference of two gains unsure, and yet tells them
+    apart.
+    """
+    explains = best.fitted.reduced_chi2 <= EXPLAINED
+    return other.degenerate or (explains and other.fitted.reduced_chi2 > FAR_OFF)
+
+
 def rivals(best: Candidate, others: Sequence[Candidate]) -> tuple[Candidate, ...]:
     """Accepted candidates whose held-out gain is not surely below the best one's."""
     close = []
     for other in others:
-        if other is best or not other.accepted:
+        if other is best or not other.accepted or out_of_question(best, other):
             continue
         difference = best.gains - other.gains
         if difference.sum() < max(SURE * standard_error(difference), 1.5):

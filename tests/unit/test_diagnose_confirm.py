@@ -13,9 +13,13 @@ from physid_drake.diagnose.regimes import _by_heading, _by_speed
 from physid_drake.effects import Effect
 
 
-def candidate(gains, *, degenerate=False, coordinates=1):
+def candidate(gains, *, degenerate=False, coordinates=1, left=1.0):
     return Candidate(
-        score=None, fitted=None, gains=np.asarray(gains, dtype=float), degenerate=degenerate, coordinates=coordinates
+        score=None,
+        fitted=SimpleNamespace(reduced_chi2=left),
+        gains=np.asarray(gains, dtype=float),
+        degenerate=degenerate,
+        coordinates=coordinates,
     )
 
 
@@ -49,6 +53,15 @@ def test_a_rival_is_one_whose_deficit_is_not_sure():
     near = candidate(best.gains + 2.0 * rng.standard_normal(10))
     far = candidate(best.gains - 5.0)
     assert rivals(best, (best, near, far)) == (near,)
+
+
+def test_what_leaves_the_pushes_unexplained_is_no_rival_of_what_explains_them():
+    gains = np.array([350.0, 370.0, 540.0, 1000.0, 1040.0, 1540.0, 1610.0, 20000.0])
+    best = candidate(gains)
+    for left, alike in ((1.2, True), (20.0, False)):
+        other = candidate(0.5 * gains, left=left)  # a deficit that one push makes unsure
+        assert rivals(best, (best, other)) == ((other,) if alike else ())
+    assert rivals(candidate(gains, left=9.0), (other,)) == (other,)  # where nothing explains them, it is one
 
 
 def test_the_simplest_of_those_that_do_as_well_comes_first():
