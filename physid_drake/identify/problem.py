@@ -169,10 +169,11 @@ def _problem(recording: Recording, order: int, noise: Noise, height: float) -> P
     compared = (
         np.arange(len(planar)) > first if push.endpoint_only or path is None else np.ones(len(planar), dtype=bool)
     )
-    force_times, forces, force_std = _force_windows(push, noise)
+    force_times, forces, white = _force_windows(push, noise)
     if path is not None:
-        told = ~_touching(path, force_times, forces, force_std, float(start_std[0]))
-        force_times, forces, force_std = force_times[told], forces[told], force_std[told]
+        told = ~_touching(path, force_times, forces, white, float(start_std[0]))
+        force_times, forces, white = force_times[told], forces[told], white[told]
+    largest = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
     return PushProblem(
         name=push.name,
         order=order,
@@ -186,7 +187,7 @@ def _problem(recording: Recording, order: int, noise: Noise, height: float) -> P
         poses=planar[compared].copy(),
         force_times=force_times,
         forces=forces,
-        force_std=force_std,
+        force_std=np.hypot(white, FORCE_SHARE * largest),
     )
 
 
@@ -248,6 +249,7 @@ def _vertical_reach(hand: Hand) -> float:
 
 
 def _force_windows(push: Push, noise: Noise) -> tuple[Array, Array, Array]:
+    """Middles (k,) [s], means (k, 2) and deviations (k,) by the sensor's noise [N]."""
     if push.force is None:
         return np.zeros(0), np.zeros((0, 2)), np.zeros(0)
     times, forces = push.force.times, push.force.forces[:, :2]
@@ -256,15 +258,15 @@ def _force_windows(push: Push, noise: Noise) -> tuple[Array, Array, Array]:
     middle = np.array([times[index == k].mean() for k in kept])
     mean = np.array([forces[index == k].mean(axis=0) for k in kept]).reshape(-1, 2)
     count = np.array([np.count_nonzero(index == k) for k in kept])
-    largest = float(np.linalg.norm(mean, axis=1).max(initial=0.0))
-    return middle, mean, np.sqrt(noise.force**2 / count + (FORCE_SHARE * largest) ** 2)
+    return middle, mean, noise.force / np.sqrt(count)
 
 
 def _touching(path: HandPath, middles: Array, forces: Array, stds: Array, start_std: float) -> NDArray[np.bool_]:
-    """Windows (k,) about the first touch in which nobody can say whether there is contact.
+    """Windows (k,) about the first touch, whose force tells nothing of the object.
 
     A slow hand meets an object whose place the tracker knows to ``start_std`` [m] that much earlier or later: there
-    the force jumps between nothing and all, and tells nothing but the gap.
+    the force jumps between nothing and all, and tells nothing but the gap. A fast one strikes it for a few
+    milliseconds, and how much of that peak a sensor's samples catch is chance.
     """
     sizes = np.linalg.norm(forces, axis=1)
     loaded: NDArray[np.bool_] = sizes > np.maximum(LOADED * sizes.max(initial=0.0), stds)
@@ -275,4 +277,4 @@ def _touching(path: HandPath, middles: Array, forces: Array, stds: Array, start_
     speed = float(np.linalg.norm(way[1] - way[0])) / (2.0 * FORCE_BIN)
     unsure = TOUCH_SIGMAS * start_std / max(speed, 1e-6)
     near: NDArray[np.bool_] = np.abs(middles - touch) < unsure + 0.5 * FORCE_BIN
-    return near if unsure > 0.5 * FORCE_BIN else np.zeros(len(middles), dtype=bool)
+    return near

@@ -222,12 +222,13 @@ def with_forces(recording, force_of, rate=100.0):
 
 
 def test_forces_are_means_over_windows(recording):
-    problem = first(with_forces(recording, lambda t: np.column_stack([10.0 * t, 0.0 * t + 2.0, 0.0 * t + 9.0])))
+    # Loaded from the start, so that no window is that of a touch.
+    problem = first(with_forces(recording, lambda t: np.column_stack([10.0 * t, 0.0 * t + 20.0, 0.0 * t + 9.0])))
     middles = problem.force_times
     np.testing.assert_allclose(middles - middles[0], 0.1 * np.arange(len(middles)), atol=0.006)
     start = with_forces(recording, lambda t: np.zeros((len(t), 3))).pushes[0].force.times[0]
     np.testing.assert_allclose(problem.forces[:, 0], 10.0 * (problem.force_times - start), atol=1e-9)
-    np.testing.assert_allclose(problem.forces[:, 1], 2.0)
+    np.testing.assert_allclose(problem.forces[:, 1], 20.0)
     largest = np.linalg.norm(problem.forces, axis=1).max()
     np.testing.assert_allclose(problem.force_std[0], np.hypot(0.02 / np.sqrt(10), FORCE_SHARE * largest), rtol=0.01)
 
@@ -250,9 +251,26 @@ def test_a_slow_touch_whose_time_the_tracker_does_not_tell_is_left_out():
     np.testing.assert_array_equal(unsure, np.abs(MIDDLES - 3.05) < 0.79)
 
 
-def test_a_touch_that_the_tracker_tells_is_kept():
-    assert not _touching(SLOW, MIDDLES, touched_after(3.0), np.full(90, 0.2), 1e-5).any()
+def test_of_a_touch_that_the_tracker_tells_only_its_own_window_is_left_out():
+    struck = _touching(SLOW, MIDDLES, touched_after(3.0), np.full(90, 0.2), 1e-5)
+    np.testing.assert_array_equal(np.flatnonzero(struck), [30])  # of the touch at 3.05 s
     assert not _touching(SLOW, MIDDLES, touched_after(0.0), np.full(90, 0.2), 5e-4).any()  # from the start
+
+
+def test_the_peak_of_a_strike_is_no_measure_of_the_force_that_follows(recording):
+    def struck(peak):
+        return first(
+            with_forces(
+                recording,
+                lambda t: np.column_stack(
+                    [2.0 * (t > t[0] + 0.2) + peak * (abs(t - t[0] - 0.25) < 0.03), 0 * t, 0 * t]
+                ),
+            )
+        )
+
+    plain, hard = struck(0.0), struck(50.0)
+    np.testing.assert_allclose(hard.force_std, plain.force_std)
+    np.testing.assert_allclose(hard.forces, plain.forces)
 
 
 def test_without_forces_there_are_no_windows(recording):
