@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses as dc
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -21,6 +22,7 @@ Tick = Callable[[str, int, int], None]
 WORTH_A_FIT = 0.35  # of the best score test's gain
 RIVAL = 0.5  # where one explains the pushes already
 WORTH_A_TRY = 0.1  # where none takes a good part of the mismatch away
+IN_ORDER = math.log(1e-4)  # of a p-value
 ENOUGH = 180  # rollouts per push in one step after which no further effect is tried
 SURE = 2.0  # standard errors
 LEAST = 4.0  # nats of held-out gain
@@ -135,7 +137,11 @@ def confirm(
     """
     ordered = sorted((s for s in scores if s.kept), key=lambda s: -s.gain)
     worth = [s for s in ordered if s.gain >= WORTH_A_FIT * ordered[0].gain][:most]
-    rest = [s for s in ordered[len(worth) :] if s.gain >= WORTH_A_TRY * ordered[0].gain]
+    taken = {s.kind for s in worth}
+    # Frictions that follow the pushes' order are seen by their ranks, whatever gains more in linearised pushes.
+    worth += [s for s in ordered if s.signature.friction_changes and s.log_p < IN_ORDER and s.kind not in taken]
+    taken = {s.kind for s in worth}
+    rest = [s for s in ordered if s.gain >= WORTH_A_TRY * ordered[0].gain and s.kind not in taken]
     more = rest[: 2 * most - len(worth)]
     plain = push_scores(before)
     spent = fitter.case.pool.count + ENOUGH * len(fitter.case.problems)
