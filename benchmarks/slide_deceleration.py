@@ -1,6 +1,7 @@
 """Deceleration of free slides against speed: python benchmarks/slide_deceleration.py RECORDING.
 
-Straight lines through stretches of recorded speed, no simulator: what a person can check of a diagnosis that says friction grows with speed.
+Straight lines through stretches of the recorded speed, no simulator: what a person can check of a diagnosis that says
+that friction grows with speed.
 """
 
 import argparse
