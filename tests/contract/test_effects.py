@@ -261,13 +261,18 @@ def test_each_direction_leaves_a_signature_that_grows_with_the_step(kind):
         assert kind.name in CURVED or curve < 0.35, (family.point, coordinate.name, curve)
 
 
-@every_effect
+SCALING = [kind for kind in CATALOGUE if kind().friction_change(1) is not None]
+
+
+def test_only_drift_says_that_it_does_nothing_but_scale_friction():
+    assert [kind.name for kind in SCALING] == ["friction_drift"]
+
+
+@pytest.mark.parametrize("kind", SCALING, ids=lambda kind: kind.name)
 def test_an_effect_that_says_it_only_scales_friction_does_what_it_says(kind):
     scene = around(rolls_for(kind))
     effect = kind.at(np.array([2.0 * c.step for c in kind.chart(scene)]), scene)
     change = effect.friction_change(2)
-    if change is None:
-        return
     plain_body, changed = (
         e.body(body_of(MASS, MU), PushFacts(order=2, mass=MASS, polar=1e-3)) for e in (kind(), effect)
     )
