@@ -187,7 +187,7 @@ def shown_pushes(diagnosis: Diagnosis, evidence: Evidence) -> list[ShownPush]:
                 name=problem.name,
                 times=features.middles,
                 recorded=features.poses(features.recorded),
-                before=features.poses(_predicted(evidence.plain, i, features.recorded)),
+                before=features.poses(_predicted(evidence.nearest, i, features.recorded)),
                 after=(
                     features.poses(_predicted(evidence.final, i, features.recorded)) if diagnosis.effects else None
                 ),
@@ -208,7 +208,7 @@ def _predicted(fitted: Fitted, i: int, recorded: np.ndarray) -> np.ndarray:
 def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
     """The model that leaves: with the effects if they were found, else plain."""
     case = evidence.case
-    fitted = evidence.final if diagnosis.effects else evidence.plain
+    fitted = evidence.final if diagnosis.effects else evidence.nearest
     state, spec = fitted.state, case.pool.spec
     intervals: dict[str, object] = {
         f"theta.{name}": list(t.ci90) for name, t in diagnosis.theta.items() if t.ci90 is not None

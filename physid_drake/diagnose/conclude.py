@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.case import UNIT_SCATTER, Case
+from physid_drake.diagnose.case import UNIT_SCATTER
 from physid_drake.diagnose.confirm import (
     EXPLAINED,
     Candidate,
@@ -54,7 +54,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
     detectable = smallest(evidence, alpha)
     verdict = _verdict(evidence, p_value, alpha, detectable)
     findings = _findings(evidence) if verdict in ("explained", "ambiguous") else ()
-    after = final if findings else plain
+    after, shown = (final, final) if findings else (plain, evidence.nearest)
     return Diagnosis(
         recording=case.recording.name,
         verdict=verdict,
@@ -63,8 +63,8 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
         alpha=alpha,
         effects=findings,
         location=_location(evidence, verdict, findings, seed),
-        fit=_quality(case, plain, after),
-        theta=theta_of(evidence, after),
+        fit=_quality(evidence, after),
+        theta=theta_of(evidence, shown),
         next_push=evidence.next_push if verdict in ("explained", "ambiguous", "unexplained") else None,
         seed=seed,
         ranking=_ranking(evidence, findings),
@@ -163,11 +163,12 @@ def _findings(evidence: Evidence) -> tuple[EffectFinding, ...]:
     return tuple(found)
 
 
-def _quality(case: Case, plain: Fitted, after: Fitted) -> FitQuality:
+def _quality(evidence: Evidence, after: Fitted) -> FitQuality:
+    case, plain = evidence.case, evidence.plain
     gains = push_scores(after) - push_scores(plain)
     figures = []
     per_push: list[list[float]] = []
-    for fitted in (plain, after):
+    for fitted in (evidence.nearest, evidence.nearest if after is plain else after):
         poses = [f.poses(r) for f, r in zip(case.features, left_out_residuals(fitted), strict=True)]
         sigmas = [p / f.sigmas for p, f in zip(poses, case.features, strict=True)]
         every, scaled = np.concatenate(poses), np.concatenate(sigmas)

@@ -94,7 +94,7 @@ def theta_of(evidence: Evidence, fitted: Fitted) -> dict[str, ThetaEstimate]:
     covariance = shared_covariance(fitted)
     _, prior = evidence.fitter.priors(fitted.state)
     reach = float(stats.norm.ppf(0.95)) * _t_factor(fitted)
-    before = np.asarray(space.from_unit(evidence.plain.state.u))
+    before = np.asarray(space.from_unit(evidence.nearest.state.u))
     here = np.asarray(space.from_unit(fitted.state.u))
     result = {}
     for j, parameter in enumerate(space.parameters):

@@ -39,6 +39,7 @@ class Evidence:
         case: the recording.
         fitter: with guard and tolerances.
         plain: the plain cell, fitted.
+        nearest: the plain cell where it predicts best; another one only where it is far from an explanation.
         screening: of the catalogue at the plain cell.
         signatures: of the catalogue at the plain cell.
         steps: one per accepted effect: all candidates of that step.
@@ -55,6 +56,7 @@ class Evidence:
     case: Case
     fitter: Fitter
     plain: Fitted
+    nearest: Fitted
     screening: Screening
     signatures: tuple[Signature, ...]
     steps: tuple[tuple[Candidate, ...], ...]

@@ -92,16 +92,33 @@ def coarse(case: Case) -> Case:
     return dc.replace(case, pool=RolloutPool(spec_of(case.recording, config), case.thetas, jobs=case.pool.jobs))
 
 
-def _with_loud_noise(case: Case, fitter: Fitter, u: Array) -> Fitted:
+def least_squares(case: Case, at: Fitted) -> Fitted:
     """The plain cell at the theta that fits best if all that is left over were noise.
 
     Far from an explanation the marginal cost is about shapes of motion that the plain cell cannot have: for a tenth
     of a millimetre of those it lets all distances go wrong, which the pushes' own frictions then take up.
+
+    Args:
+        case: the pushes.
+        at: a plain model that says where to start, and how much is left over.
     """
-    factor = math.sqrt(_squares_at_rest(fitter.linearise(fitter.start(u), learn_scatter=False)))
-    loud = Fitter(case.louder(max(1.0, factor), 1.0))
-    fitted = loud.fit(loud.start(u), rounds=CAREFUL, careful=CAREFUL + 1, renew=True)
-    return fitter.linearise(fitter.start(fitted.state.u), learn_scatter=False)
+    loud = Fitter(_blunted(case, math.sqrt(max(1.0, _squares_at_rest(at)))))
+    return loud.fit(loud.start(at.state.u), rounds=CAREFUL, careful=CAREFUL + 1, renew=True)
+
+
+def nearest(case: Case, plain: Fitted) -> Fitted:
+    """The plain cell where it predicts best: where it was fitted, or by least squares if that explains nothing."""
+    return plain if plain.reduced_chi2 <= FAR_OFF else least_squares(case, plain)
+
+
+def _blunted(case: Case, factor: float) -> Case:
+    """The case with so many times as much noise of poses, in the units of the old."""
+    features = []
+    for one in case.features:
+        times = np.ones(len(one.recorded))
+        times[: 3 * len(one.middles)] = factor
+        features.append(dc.replace(one, noise=one.noise * np.outer(times, times)))
+    return dc.replace(case, features=tuple(features))
 
 
 def _squares_at_rest(fitted: Fitted) -> float:
@@ -127,6 +144,7 @@ def fit_plain(case: Case, rng: np.random.Generator, tick: Tick) -> Fitted:
     )
     if first.reduced_chi2 > FAR_OFF:
         tick("plain fit with as much noise as it leaves", 0, 0)
-        blunt = _with_loud_noise(case, fitter, u)
+        sharp = fitter.linearise(fitter.start(u), learn_scatter=False)
+        blunt = fitter.linearise(fitter.start(least_squares(case, sharp).state.u), learn_scatter=False)
         return min((first, blunt), key=_squares_at_rest)
     return fitter.fit(first.state, rounds=4, renew=True, say=lambda text: tick(f"plain fit, {text}", 0, 0))

@@ -27,7 +27,7 @@ from physid_drake.diagnose.memory import Memory
 from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.next_push import next_push
 from physid_drake.diagnose.pairs import confirmed_pairs, steps_of
-from physid_drake.diagnose.plain import coarse, fit_plain, numerics
+from physid_drake.diagnose.plain import coarse, fit_plain, nearest, numerics
 from physid_drake.diagnose.screen import (
     Screening,
     Signature,
@@ -99,9 +99,11 @@ def _on_short_ticks(answer: _Answer, tick: Tick) -> Evidence:
     tick("on short ticks", 0, 0)
     refined = fine.refine(plain)
     final = fine.refine(grown.last.fitted) if steps else refined
+    closest = nearest(fitter.case, plain)
     case.pool.count += fitter.case.pool.count
     return Evidence(
-        case=case, fitter=fine, plain=refined, screening=grown.base.screening, signatures=grown.base.signatures,
+        case=case, fitter=fine, plain=refined, nearest=refined if closest is plain else closest,
+        screening=grown.base.screening, signatures=grown.base.signatures,
         steps=tuple(steps), rejected=grown.rejected, final=final, remaining=grown.last.screening,
         noise_share=answer.noise_share, detected=answer.detected,
     )  # fmt: skip

@@ -178,16 +178,21 @@ class Restitution(Effect):
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
-        """The coefficient."""
+        """The coefficient's square: a bounce is caught up by the hand, and what is seen of it grows with that."""
         del around
-        # A bounce is caught up by the hand, so that what is seen of it grows with the coefficient's square.
-        return (Coordinate(name="coefficient", step=0.1, lower=0.0, upper=0.95),)
+        return (Coordinate(name="square", step=0.01, lower=0.0, upper=0.9),)
+
+    @classmethod
+    def at(cls, point: Array, around: Surroundings) -> Restitution:
+        """From the square."""
+        del around
+        return cls(coefficient=math.sqrt(max(0.0, float(point[0]))))
 
     @classmethod
     def families(cls, around: Surroundings) -> tuple[Family, ...]:
-        """Small and large."""
+        """Small and large: coefficients of 0.1 and 0.4."""
         del around
-        return families_of_sizes(1.0, 4.0)
+        return families_of_sizes(1.0, 16.0)
 
     def body(self, body: Body, facts: PushFacts) -> Body:
         """The body with its bounce."""

@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import worlds
 from reference.scenes import OBJECTS, Theta
 from rich.console import Console
-from worlds import endpoints, pushes_of, recorded
+from worlds import endpoints, pushes_of, recorded, slides
 
 from physid_drake import load_model
 from physid_drake.cell import CellConfig
@@ -140,6 +141,24 @@ def test_where_no_noise_is_known_an_effect_is_found_by_the_quiet_that_it_leaves(
     assert evidence.noise_share < 0.5
     # The p-value is that of a noise as loud as the plain cell leaves, not of the smaller one.
     assert diagnosis.p_value == evidence.detected < 0.01
+
+
+def test_a_tracker_far_quieter_than_the_misfit_does_not_spoil_the_plain_cell(monkeypatch):
+    """Slides on a leaning table, seen to 0.02 mm: the plain cell predicts as least squares do."""
+    monkeypatch.setattr(worlds, "POSITION_STD", 2e-5)
+    monkeypatch.setattr(worlds, "ROTATION_STD", 2e-4)
+    heading = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+    speed = np.array([0.4, 0.7, 0.5, 0.6, 0.7, 0.4, 0.6, 0.5])
+    velocities = np.column_stack([speed * np.cos(heading), speed * np.sin(heading), np.linspace(-1.0, 1.0, 8)])
+    pull = (0.05 * 9.81 * ERASER.mass, 0.0)
+    recording = slides(ERASER, Theta(support_friction=0.25), velocities, seed=5, pull=pull)
+    diagnosis, _ = diagnose(case(recording), effects=("viscous_drag",))
+    assert diagnosis.verdict == "unexplained"
+    # Headings on all sides: what is gained downhill is lost uphill.
+    assert diagnosis.theta["support_friction"].value == pytest.approx(0.25, rel=0.05)
+    way = speed**2 / (2.0 * 9.81 * 0.25)
+    astray = way * np.hypot(0.2 * np.cos(heading), 0.1 * np.sin(heading))
+    assert diagnosis.fit.position_before < np.sqrt(np.mean(astray**2))
 
 
 def test_an_object_that_never_moves_is_refused():

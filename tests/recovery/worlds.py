@@ -76,13 +76,15 @@ def recorded(
     return _recording(body, made, Hand(tip="sphere", radius=pushes[0].tip_radius))
 
 
-def slides(body: PlanarObject, theta: Theta, velocities: np.ndarray, seed: int) -> Recording:
-    """Free slides with start velocities (k, 3) and no hand."""
+def slides(
+    body: PlanarObject, theta: Theta, velocities: np.ndarray, seed: int, *, pull: tuple[float, float] = (0.0, 0.0)
+) -> Recording:
+    """Free slides with start velocities (k, 3) and no hand; a constant force in W, N."""
     rng, made = np.random.default_rng(seed), []
     for number, velocity in enumerate(velocities):
         times = np.arange(0.0, 1.0, 0.01)
         motion = simulate_planar(
-            theta.applied_to(body), theta.support_friction, times, velocity=tuple(velocity),
+            theta.applied_to(body), theta.support_friction, times, velocity=tuple(velocity), force=pull,
             support=body.support(POINTS), time_step=TIME_STEP,
         )  # fmt: skip
         keep = times <= motion.rest_time + 0.2

@@ -52,7 +52,7 @@ def test_no_interval_of_theta_is_narrower_than_the_cells_own_error():
     for spread, widths in ((1e-6, (0.005, 0.02)), (0.05, (0.1, 0.3))):
         fit = fitted(covariance=np.array([[spread**2]]))
         evidence = SimpleNamespace(
-            case=case, plain=fit, fitter=SimpleNamespace(priors=lambda state: (np.zeros(1), np.full(1, 0.3)))
+            case=case, nearest=fit, fitter=SimpleNamespace(priors=lambda state: (np.zeros(1), np.full(1, 0.3)))
         )
         estimate = theta_of(evidence, fit)["support_friction"]
         assert estimate.identifiable
