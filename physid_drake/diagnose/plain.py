@@ -103,7 +103,7 @@ def least_squares(case: Case, at: Fitted) -> Fitted:
         at: a plain model that says where to start, and how much is left over.
     """
     loud = Fitter(_blunted(case, math.sqrt(max(1.0, _squares_at_rest(at)))))
-    return loud.fit(loud.start(at.state.u), rounds=CAREFUL, careful=CAREFUL + 1, renew=True)
+    return loud.fit(loud.start(at.state.u), rounds=CAREFUL, careful=CAREFUL + 1, like=at, renew=True)
 
 
 def nearest(case: Case, plain: Fitted) -> Fitted:
@@ -144,7 +144,7 @@ def fit_plain(case: Case, rng: np.random.Generator, tick: Tick) -> Fitted:
     )
     if first.reduced_chi2 > FAR_OFF:
         tick("plain fit with as much noise as it leaves", 0, 0)
-        sharp = fitter.linearise(fitter.start(u), learn_scatter=False)
-        blunt = fitter.linearise(fitter.start(least_squares(case, sharp).state.u), learn_scatter=False)
+        searched = fitter.linearise(fitter.start(u), learn_scatter=False)
+        blunt = fitter.seen_from(searched, fitter.start(least_squares(case, searched).state.u), learn_scatter=False)
         return min((first, blunt), key=_squares_at_rest)
     return fitter.fit(first.state, rounds=4, renew=True, say=lambda text: tick(f"plain fit, {text}", 0, 0))
