@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.case import UNIT_SCATTER
+from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.confirm import (
     EXPLAINED,
     Candidate,
@@ -34,6 +34,7 @@ from physid_drake.diagnose.values import (
     EffectFinding,
     FitQuality,
     Location,
+    Partly,
     Ranked,
 )
 
@@ -42,6 +43,8 @@ Tick = Callable[[str, int, int], None]
 
 ALIKE = 0.95  # cosine of two projected signatures that these pushes cannot tell apart
 FEWEST_PUSHES = 3
+GOOD_PART = 0.25  # of the squared error: less is not worth a word
+PART = "takes a part away, and leaves more than noise"
 VISIBLE = 10.0  # standard deviations of motion: pushes that would not show such an effect show nothing
 
 
@@ -55,10 +58,11 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
     verdict = _verdict(evidence, p_value, alpha, detectable)
     findings = _findings(evidence) if verdict in ("explained", "ambiguous") else ()
     after, shown = (final, final) if findings else (plain, evidence.nearest)
+    partly = _partly(evidence) if verdict == "unexplained" else None
     return Diagnosis(
         recording=case.recording.name,
         verdict=verdict,
-        sentence=_sentence(verdict, findings, evidence, detectable),
+        sentence=_sentence(verdict, findings, partly),
         p_value=p_value,
         alpha=alpha,
         effects=findings,
@@ -67,9 +71,10 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
         theta=theta_of(evidence, shown),
         next_push=evidence.next_push if verdict in ("explained", "ambiguous", "unexplained") else None,
         seed=seed,
-        ranking=_ranking(evidence, findings),
+        ranking=_ranking(evidence, findings, partly),
         detectable=detectable,
-        left=_left(evidence, after),
+        left=_left(evidence, after, partly),
+        partly=partly,
         reduced_chi2_before=plain.reduced_chi2,
         reduced_chi2_after=after.reduced_chi2,
         friction_scatter=UNIT_SCATTER * after.state.scatter,
@@ -163,20 +168,42 @@ def _findings(evidence: Evidence) -> tuple[EffectFinding, ...]:
     return tuple(found)
 
 
+def _partly(evidence: Evidence) -> Partly | None:
+    """The effects that were added, or the best one that left-out pushes confirm, if they take a good part away."""
+    confirmed = [c for c in evidence.rejected if c.accepted]
+    if evidence.steps:
+        model, names = evidence.final, tuple(step[0].name for step in evidence.steps)
+    elif confirmed:
+        model, names = confirmed[0].fitted, (confirmed[0].name,)
+    else:
+        return None
+    (before, _, _), (left, position, rotation) = (_left_out(evidence.case, m) for m in (evidence.nearest, model))
+    share = 1.0 - (rms(left) / rms(before)) ** 2
+    if share < GOOD_PART:
+        return None
+    return Partly(
+        effects=names, share=share, position=position, rotation=rotation, reduced_chi2=model.reduced_chi2
+    )  # fmt: skip
+
+
+def _left_out(case: Case, fitted: Fitted) -> tuple[Array, float, float]:
+    """Errors (w, 3) of pushes left out in standard deviations, and root mean squares of place and yaw [m, rad]."""
+    poses = [f.poses(r) for f, r in zip(case.features, left_out_residuals(fitted), strict=True)]
+    scaled = np.concatenate([p / f.sigmas for p, f in zip(poses, case.features, strict=True)])
+    every = np.concatenate(poses)
+    return scaled, math.sqrt(2.0) * rms(every[:, :2]), rms(every[:, 2])
+
+
 def _quality(evidence: Evidence, after: Fitted) -> FitQuality:
     case, plain = evidence.case, evidence.plain
     gains = push_scores(after) - push_scores(plain)
-    figures = []
-    per_push: list[list[float]] = []
-    for fitted in (evidence.nearest, evidence.nearest if after is plain else after):
-        poses = [f.poses(r) for f, r in zip(case.features, left_out_residuals(fitted), strict=True)]
-        sigmas = [p / f.sigmas for p, f in zip(poses, case.features, strict=True)]
-        every, scaled = np.concatenate(poses), np.concatenate(sigmas)
-        per_push.append([rms(s) for s in sigmas])
-        figures.append((rms(scaled), math.sqrt(2.0) * rms(every[:, :2]), rms(every[:, 2])))
-    (rms0, position0, rotation0), (rms1, position1, rotation1) = figures
+    (sigmas0, position0, rotation0), (sigmas1, position1, rotation1) = (
+        _left_out(case, fitted) for fitted in (evidence.nearest, evidence.nearest if after is plain else after)
+    )
+    ends = np.cumsum([len(f.middles) for f in case.features])[:-1]
+    per_push = [[rms(own) for own in np.split(sigmas, ends)] for sigmas in (sigmas0, sigmas1)]
     return FitQuality(
-        rms_before=rms0, rms_after=rms1, position_before=position0, position_after=position1,
+        rms_before=rms(sigmas0), rms_after=rms(sigmas1), position_before=position0, position_after=position1,
         rotation_before=rotation0, rotation_after=rotation1,
         log_score_gain=float(gains.sum()), log_score_gain_se=standard_error(gains) if len(gains) > 1 else 0.0,
         per_push=tuple((p.name, b, a) for p, b, a in zip(case.problems, *per_push, strict=True)),
@@ -184,8 +211,9 @@ def _quality(evidence: Evidence, after: Fitted) -> FitQuality:
     )  # fmt: skip
 
 
-def _ranking(evidence: Evidence, findings: Sequence[EffectFinding]) -> tuple[Ranked, ...]:
+def _ranking(evidence: Evidence, findings: Sequence[EffectFinding], partly: Partly | None) -> tuple[Ranked, ...]:
     named = {f.name for f in findings}
+    some = set() if partly is None else set(partly.effects)
     classes = {name for f in findings for name in f.indistinguishable_from}
     steps = (*evidence.steps, evidence.rejected)
     fitted = {c.name: c for step in reversed(steps) for c in step}
@@ -199,7 +227,7 @@ def _ranking(evidence: Evidence, findings: Sequence[EffectFinding]) -> tuple[Ran
                 p_value=float(min(1.0, evidence.screening.looks * math.exp(one.log_p))),
                 held_out_gain=None if candidate is None else candidate.gain,
                 held_out_se=None if candidate is None else candidate.standard_error,
-                why=_why(one.kind.name, candidate, named, classes, evidence),
+                why=PART if one.kind.name in some else _why(one.kind.name, candidate, named, classes, evidence),
             )
         )
     return tuple(rows)
@@ -227,25 +255,28 @@ def _why_not_fitted(name: str, evidence: Evidence) -> str:
     return "explains no more than chance would" if chance else "explains far less"
 
 
-def _left(evidence: Evidence, after: Fitted) -> str:
-    ratio = after.reduced_chi2
-    if ratio <= EXPLAINED:
+def _left(evidence: Evidence, after: Fitted, partly: Partly | None) -> str:
+    if after.reduced_chi2 <= EXPLAINED:
         return "nothing beyond noise, scatter and the simulator's own error"
-    best = evidence.remaining.scores[0].kind.name if evidence.remaining.scores else "none"
-    return (
-        f"{math.sqrt(ratio):.1f} times what noise and the simulator's own error would leave;"
-        f" the nearest of the catalogue is {best}, which does not account for it"
-    )
+    much = f"{math.sqrt(after.reduced_chi2):.1f} times what noise and the simulator's own error would leave"
+    if partly is not None:
+        return f"{much}; with {' and '.join(partly.effects)} {math.sqrt(partly.reduced_chi2):.1f} times"
+    scores = (evidence.screening if after is evidence.plain else evidence.remaining).scores
+    nearest = scores[0].kind.name if scores else "none"
+    return f"{much}; the nearest of the catalogue is {nearest}, which does not account for it"
 
 
-def _sentence(
-    verdict: str, findings: Sequence[EffectFinding], evidence: Evidence, detectable: Sequence[Detectable]
-) -> str:
+def _sentence(verdict: str, findings: Sequence[EffectFinding], partly: Partly | None) -> str:
     match verdict:
         case "consistent":
             return "The plain cell explains these pushes: nothing is missing that they could show."
         case "underpowered":
             return "These pushes cannot tell: an effect would have to be large to show in them."
+        case "unexplained" if partly is not None:
+            return (
+                "Simulation and recording differ, and nothing in the catalogue accounts for all of it:"
+                f" {' and '.join(partly.effects)} would take {100.0 * partly.share:.0f} % of the squared error away."
+            )
         case "unexplained":
             return "Simulation and recording differ, and nothing in the catalogue accounts for it."
     names = [

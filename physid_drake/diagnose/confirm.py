@@ -153,7 +153,7 @@ def confirm(
             break
         tick(f"fit with {one.kind.name}", k, len(worth))
         found.append(_candidate(fitter, one, _fit(fitter, before, one), plain))
-    found = _ranked(found)
+    found = ranked(found)
     for k, candidate in enumerate(found[:PERSISTENT]):
         short = candidate.fitted.score - before.score < FELL_SHORT * 0.5 * candidate.score.gain
         if (_explained(found) and not short) or fitter.case.pool.count > spent:
@@ -162,7 +162,7 @@ def confirm(
         again = _fit_from_afar(fitter, before, candidate)
         if again.score > candidate.fitted.score:
             found[k] = _candidate(fitter, candidate.score, again, plain)
-    return tuple(_ranked(found))
+    return tuple(ranked(found))
 
 
 def worthwhile(before: Fitted, candidate: Candidate) -> bool:
@@ -175,10 +175,10 @@ def worthwhile(before: Fitted, candidate: Candidate) -> bool:
 def rejudged(candidates: Sequence[Candidate], plain: Fitted) -> tuple[Candidate, ...]:
     """The candidates with their gains over another model."""
     before = push_scores(plain)
-    return tuple(_ranked([dc.replace(c, gains=push_scores(c.fitted) - before) for c in candidates]))
+    return tuple(ranked([dc.replace(c, gains=push_scores(c.fitted) - before) for c in candidates]))
 
 
-def _ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
+def ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
     """Best held-out gain first; before it the simplest that does as well: a far-off spring is a tilted table."""
     ordered = sorted(candidates, key=lambda c: (c.degenerate, -c.gain))
     if not ordered:

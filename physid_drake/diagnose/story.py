@@ -16,6 +16,7 @@ from physid_drake.diagnose.confirm import (
     Candidate,
     confirm,
     push_scores,
+    ranked,
     rejudged,
     worthwhile,
 )
@@ -93,12 +94,15 @@ def gather(
 def _on_short_ticks(answer: _Answer, tick: Tick) -> Evidence:
     """The evidence of an answer, both models taken to the case's own ticks."""
     case, grown, fitter = answer.case, answer.grown, answer.fitter
-    plain = grown.base.fitted
-    steps = [_reconsidered(fitter, plain, grown.last.fitted, k, step, tick) for k, step in enumerate(grown.steps)]
+    plain, model = grown.base.fitted, grown.last.fitted
+    steps = []
+    for k, step in enumerate(grown.steps):
+        judged, model = _reconsidered(fitter, plain, model, k, step, tick)
+        steps.append(judged)
     fine = Fitter(case, fitter.extra, fitter.tolerances)
     tick("on short ticks", 0, 0)
     refined = fine.refine(plain)
-    final = fine.refine(grown.last.fitted) if steps else refined
+    final = fine.refine(model) if steps else refined
     closest = nearest(fitter.case, plain)
     case.pool.count += fitter.case.pool.count
     return Evidence(
@@ -321,25 +325,29 @@ def _looks(
 
 
 def _reconsidered(
-    fitter: Fitter, plain: Fitted, final: Fitted, k: int, step: tuple[Candidate, ...], tick: Tick
-) -> tuple[Candidate, ...]:
-    """A step's rivals judged again beside the effects that came after it: what was missing then blurred them."""
-    count = len(final.state.effects)
+    fitter: Fitter, plain: Fitted, model: Fitted, k: int, step: tuple[Candidate, ...], tick: Tick
+) -> tuple[tuple[Candidate, ...], Fitted]:
+    """A step's rivals judged again beside the effects that came after it: what was missing then blurred them.
+
+    Returns:
+        The step, its best first, and the model with that one.
+    """
     alike = class_of(plain, step)
-    if k + 1 >= count or not alike:
-        return step
+    present = {e.kind.name for e in model.state.effects}
+    rivals = [c for c in step[1:] if c.name in alike and c.name not in present]
+    if k + 1 >= len(model.state.effects) or not rivals:
+        return step, model
     before = push_scores(plain)
-    judged = [dc.replace(step[0], gains=push_scores(final) - before)]
-    for other in step[1:]:
-        if other.name in alike and other.name not in {e.kind.name for e in final.state.effects}:
-            tick(f"{other.name} in place of {step[0].name}", 0, 0)
-            effects = list(final.state.effects)
-            effects[k] = next(e for e in other.fitted.state.effects if e.kind.name == other.name)
-            swapped = fitter.fit(dc.replace(final.state, effects=tuple(effects)), rounds=4, like=final)
-            judged.append(dc.replace(other, gains=push_scores(swapped) - before))
-        else:
-            judged.append(other)
-    return tuple(judged)
+    models = {step[0].name: model}
+    for other in rivals:
+        tick(f"{other.name} in place of {step[0].name}", 0, 0)
+        effects = list(model.state.effects)
+        effects[k] = next(e for e in other.fitted.state.effects if e.kind.name == other.name)
+        models[other.name] = fitter.fit(dc.replace(model.state, effects=tuple(effects)), rounds=4, like=model)
+    judged = [dc.replace(c, gains=push_scores(models[c.name]) - before) for c in (step[0], *rivals)]
+    ordered = ranked(judged)
+    rest = [c for c in step if c.name not in models]
+    return (*ordered, *rest), models[ordered[0].name]
 
 
 def _model_with(fitter: Fitter, state: State) -> Fitted:

@@ -37,6 +37,24 @@ class EffectFinding:
 
 
 @dc.dataclass(frozen=True, kw_only=True)
+class Partly:
+    """What takes a good part of an unexplained mismatch away, and leaves more than it may.
+
+    Attributes:
+        effects: names; confirmed by pushes that were left out.
+        share: of the mean square error of pushes left out that they take away, in standard deviations.
+        position, rotation: root mean square errors of pushes left out with them [m, rad].
+        reduced_chi2: cost per degree of freedom with them.
+    """
+
+    effects: tuple[str, ...]
+    share: float
+    position: float
+    rotation: float
+    reduced_chi2: float
+
+
+@dc.dataclass(frozen=True, kw_only=True)
 class Window:
     """A part of a push: file, start and end [s]."""
 
@@ -152,6 +170,7 @@ class Diagnosis:
     ranking: tuple[Ranked, ...]
     detectable: tuple[Detectable, ...]
     left: str
+    partly: Partly | None
     reduced_chi2_before: float
     reduced_chi2_after: float
     friction_scatter: float

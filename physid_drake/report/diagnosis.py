@@ -10,7 +10,7 @@ from typing import Any
 from rich.table import Table
 
 from physid_drake.diagnose import Diagnosis
-from physid_drake.diagnose.values import EffectFinding, Location
+from physid_drake.diagnose.values import EffectFinding, Location, Partly
 
 FORMAT = "physid-diagnosis/1"
 DIGITS = 6
@@ -51,6 +51,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> str:
         "ranking": [dc.asdict(r) for r in d.ranking],
         "detectable": [dc.asdict(x) for x in d.detectable],
         "left": d.left,
+        "partly": None if d.partly is None else _partly(d.partly),
         "reduced_chi2_before": d.reduced_chi2_before,
         "reduced_chi2_after": d.reduced_chi2_after,
         "friction_scatter": d.friction_scatter,
@@ -71,6 +72,16 @@ def _effect(effect: EffectFinding) -> dict[str, Any]:
             name: {"value": p.value, "unit": p.unit, "ci90": p.ci90, "null": p.null}
             for name, p in effect.parameters.items()
         },
+    }
+
+
+def _partly(partly: Partly) -> dict[str, Any]:
+    return {
+        "effects": list(partly.effects),
+        "share": partly.share,
+        "held_out_rms_m": partly.position,
+        "held_out_rms_rad": partly.rotation,
+        "reduced_chi2": partly.reduced_chi2,
     }
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from physid_drake.cell import HandPath, Start
-from physid_drake.diagnose.confirm import Candidate, _ranked, push_scores, rivals
+from physid_drake.diagnose.confirm import Candidate, push_scores, ranked, rivals
 from physid_drake.diagnose.linear import LinearPush, Whitened, solve
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.regimes import _by_heading, _by_speed
@@ -68,17 +68,17 @@ def test_the_simplest_of_those_that_do_as_well_comes_first():
     far_spring = candidate(np.full(10, 10.0), coordinates=4)
     tilt = candidate(np.full(10, 9.7), coordinates=2)  # 3 nats less with two coordinates fewer
     nothing = candidate(np.full(10, 9.9), coordinates=1, degenerate=True)
-    assert _ranked((far_spring, nothing, tilt)) == [tilt, far_spring, nothing]
+    assert ranked((far_spring, nothing, tilt)) == [tilt, far_spring, nothing]
 
 
 def test_where_much_is_explained_two_laws_may_differ_by_more():
     spring, tilt = candidate(np.full(10, 100.0), coordinates=4), candidate(np.full(10, 98.8), coordinates=2)
-    assert _ranked((spring, tilt))[0] is tilt  # 12 nats less: 4 for two coordinates, 10 for a thousand explained
+    assert ranked((spring, tilt))[0] is tilt  # 12 nats less: 4 for two coordinates, 10 for a thousand explained
 
 
 def test_what_does_worse_is_not_preferred_for_being_simple():
     spring, tilt = candidate(np.full(10, 10.0), coordinates=4), candidate(np.full(10, 9.0), coordinates=2)
-    assert _ranked((tilt, spring)) == [spring, tilt]
+    assert ranked((tilt, spring)) == [spring, tilt]
 
 
 def fitted_to_a_shared_error(error, *, with_effect):

@@ -1,5 +1,6 @@
 """Growing a model: effects that later ones make superfluous, and plain fits in a wrong basin."""
 
+import dataclasses as dc
 from types import SimpleNamespace
 
 import numpy as np
@@ -89,6 +90,19 @@ def test_two_effects_that_both_matter_stay(grown):
     pruned = story._pruned(Refits({("table_tilt",): -9.0}), grown, None, quiet)
     assert names_of(pruned) == ["magnet", "table_tilt"]
     assert pruned.last is grown.last
+
+
+@pytest.mark.parametrize(("beside", "first"), [(-1.0, "table_tilt"), (-9.0, "magnet")])
+def test_a_rival_that_does_better_beside_a_later_effect_takes_the_place(grown, monkeypatch, beside, first):
+    monkeypatch.setattr(story, "class_of", lambda plain, step: ("table_tilt",))
+    rival = dc.replace(step("table_tilt")[0], fitted=fitted(("table_tilt",), -6.0))
+    model = fitted(("magnet", "viscous_drag"), -5.0)
+    refits = Refits({("table_tilt", "viscous_drag"): beside})
+    plain = grown.base.fitted
+    judged, chosen = story._reconsidered(refits, plain, model, 0, (*step("magnet"), rival), quiet)
+    assert judged[0].name == first
+    assert [e.kind.name for e in chosen.state.effects] == [first, "viscous_drag"]
+    assert story._reconsidered(refits, plain, model, 1, step("viscous_drag"), quiet)[1] is model
 
 
 def test_a_plain_fit_in_a_wrong_basin_is_left_if_an_effect_leads_out_of_it():

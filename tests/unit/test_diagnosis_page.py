@@ -98,6 +98,7 @@ def diagnosis_with(**changes):
             Detectable(name="table_tilt", parameter="x", value=2e-3, unit="rad", sigmas=0.7),
         ),
         left="nothing beyond noise",
+        partly=None,
         reduced_chi2_before=4.0,
         reduced_chi2_after=1.1,
         friction_scatter=0.02,
