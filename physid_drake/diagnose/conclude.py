@@ -22,7 +22,7 @@ from physid_drake.diagnose.confirm import (
 )
 from physid_drake.diagnose.estimates import parameters_of, rms, smallest, theta_of
 from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, mismatch, unexplained
-from physid_drake.diagnose.localise import locate
+from physid_drake.diagnose.looks import locate
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import regime_gains
 from physid_drake.diagnose.screen import (
@@ -112,7 +112,7 @@ def _location(evidence: Evidence, verdict: str, findings: Sequence[EffectFinding
     """Where the mismatch is; the frame is that of the physics found, where some was found."""
     if verdict in ("consistent", "underpowered"):
         return None
-    found = locate(evidence.case, evidence.wrenches, np.random.default_rng(seed))
+    found = locate(evidence.case, evidence.plain, evidence.wrenches, np.random.default_rng(seed))
     if found is None or not findings:
         return found
     return dc.replace(found, frame=evidence.steps[0][0].score.kind.frame)

@@ -139,7 +139,8 @@ def shown_pushes(*, after=True):
 def missing(push, start, phase):
     return MissingWrench(
         push=push, start=start, end=start + 0.5, wrench=np.array([-0.1, 0.05, 1e-3]), std=np.array([0.02, 0.1, 2e-4]),
-        phase=phase, speed=0.2, heading=0.3, yaw=0.1, place=np.array([0.05, 0.01]),
+        phase=phase, speed=0.2, heading=0.3, yaw=0.1, place=np.array([0.05, 0.01]), spin=0.0,
+        columns=np.zeros((0, 3)),
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ def stage():
 def missing(along, across, std):
     return MissingWrench(
         push=0, start=0.1, end=0.2, wrench=np.array([along, across, 0.0]), std=np.full(3, std), phase="contact",
-        speed=0.1, heading=0.5, yaw=0.0, place=np.array([0.05, -0.02]),
+        speed=0.1, heading=0.5, yaw=0.0, place=np.array([0.05, -0.02]), spin=0.0, columns=np.zeros((0, 3)),
     )  # fmt: skip
 
 

@@ -1,0 +1,252 @@
+"""Where a missing wrench lives: in which frame it is constant, on what it depends, in which phase it acts.
+
+Every look is a pattern of a wrench over all windows of all pushes, and is judged like an effect: by what it explains
+of what the plain cell leaves, theta and the pushes' own unknowns projected out. Sign flips of whole pushes say how
+much the best of all looks explains by chance.
+"""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from physid_drake.diagnose.case import Case
+from physid_drake.diagnose.linear import LinearPush, Whitened
+from physid_drake.diagnose.localise import MissingWrench
+from physid_drake.diagnose.model import Fitted
+from physid_drake.diagnose.screen import projected
+from physid_drake.diagnose.values import Location, Window
+
+Array = NDArray[np.float64]
+
+FLIPS = 999
+CHANCE = 0.05  # of the best of all looks
+SURE = 2.5  # standard deviations of a window's wrench
+PHASES = ("contact", "free_slide")
+DOFS = ("along_motion", "across_motion", "rotation")
+LOUDEST = 3.0  # standard deviations that one push may speak with
+AS_GOOD = 0.8  # of the gain in one phase: the pattern holds in both
+A_PART = 0.25  # of the most that a phase or a degree of freedom has
+SAID = {"contact": "while it is pushed", "free_slide": "in its free slide"}
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Look:
+    """A pattern of a wrench.
+
+    Attributes:
+        frame: in which it is constant, as ``diagnosis.json`` has it.
+        dof: the degrees of freedom that it moves.
+        words: from its coefficients (k,).
+        weights: (n, 3, k) the wrench in every window, along and across the motion and as a torque, per coefficient.
+    """
+
+    frame: str
+    dof: tuple[str, ...]
+    words: Callable[[Array], str]
+    weights: Array
+
+    def within(self, mask: Array) -> Look:
+        """The same in some windows (n,) only."""
+        return dc.replace(self, weights=self.weights * mask[:, None, None])
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class _Seen:
+    """A look in a phase (None: in both), with what it explains and its coefficients."""
+
+    look: Look
+    phase: str | None
+    gain: float
+    coefficients: Array
+
+
+def locate(case: Case, plain: Fitted, wrenches: Sequence[MissingWrench], rng: np.random.Generator) -> Location | None:
+    """The look that explains most; in no direction where none explains more than the best would by chance.
+
+    Args:
+        case: for the pushes' names and order.
+        plain: the model that lacks something.
+        wrenches: what it lacks, window by window.
+        rng: of the sign flips.
+    """
+    if not wrenches:
+        return None
+    looks = looks_at(wrenches, np.array([case.problems[w.push].order for w in wrenches], dtype=np.float64))
+    parts: dict[str | None, Array] = {None: np.ones(len(wrenches))}
+    for phase in PHASES:
+        mask = np.array([w.phase == phase for w in wrenches], dtype=np.float64)
+        if 0 < mask.sum() < len(mask):
+            parts[phase] = mask
+    split = [(look, phase) for look in looks for phase in parts]
+    within = [look.within(parts[phase]) for look, phase in split]
+    gains, solutions, best_by_chance = _explained(plain, wrenches, within, rng)
+    seen = [
+        _Seen(look=look, phase=phase, gain=gain, coefficients=solution)
+        for (look, phase), gain, solution in zip(split, gains, solutions, strict=True)
+    ]
+    best = max(seen, key=lambda one: one.gain)
+    surely = (best_by_chance >= best.gain).mean() < CHANCE
+    return _location(case, wrenches, seen, best if surely else None)
+
+
+def looks_at(wrenches: Sequence[MissingWrench], order: Array) -> list[Look]:
+    """All looks, in words and as patterns (n, 3, k) over the windows; ``order`` (n,) is that of their pushes."""
+    n = len(wrenches)
+    heading, yaw, speed, spin = (np.array([getattr(w, name) for w in wrenches]) for name in
+                                 ("heading", "yaw", "speed", "spin"))  # fmt: skip
+    place = np.array([w.place for w in wrenches])
+    one = np.ones(n)
+
+    def pattern(component: int, *values: Array) -> Array:
+        weights = np.zeros((n, 3, len(values)))
+        for k, value in enumerate(values):
+            weights[:, component, k] = value
+        return weights
+
+    def fixed(angle: Array) -> Array:
+        """Forces along a direction that turns with ``angle`` (n,), and across it."""
+        weights = np.zeros((n, 3, 2))
+        for k, direction in enumerate((angle, angle + 0.5 * math.pi)):
+            weights[:, 0, k], weights[:, 1, k] = np.cos(direction - heading), np.sin(direction - heading)
+        return weights
+
+    def circle(times: float, angle: Array) -> tuple[Array, Array]:
+        return np.cos(times * angle), np.sin(times * angle)
+
+    along, across, torque = range(3)
+    force, motion, turn = DOFS[:2], DOFS[:1], DOFS[2:]
+    return [
+        Look(frame="object_velocity", dof=motion, weights=pattern(along, one),
+             words=lambda c: f"{_sense(c)} the motion, wherever the object heads"),
+        Look(frame="object_velocity", dof=motion, weights=pattern(along, speed - speed.mean()),
+             words=lambda c: f"{_sense(c)} the motion, more so the faster it is"),
+        Look(frame="object_velocity", dof=DOFS[1:2], weights=pattern(across, one),
+             words=lambda c: f"to the {'left' if c[0] > 0.0 else 'right'} of the motion, wherever the object heads"),
+        Look(frame="object_velocity", dof=turn, weights=pattern(torque, spin),
+             words=lambda c: f"{_sense(c)} its turning"),
+        Look(frame="world", dof=force, weights=fixed(np.zeros(n)),
+             words=lambda c: f"towards {_degrees(c)} degrees on the table"),
+        Look(frame="world", dof=motion, weights=pattern(along, *circle(2.0, heading)),
+             words=lambda c: f"along the motion, most against it along {_axis(-c)} degrees on the table"),
+        Look(frame="world", dof=motion, weights=pattern(along, *(place - place.mean(axis=0)).T),
+             words=lambda c: f"along the motion, changing towards {_degrees(c)} degrees on the table"),
+        Look(frame="object", dof=force, weights=fixed(yaw),
+             words=lambda c: f"towards {_degrees(c)} degrees of the object"),
+        Look(frame="object", dof=motion, weights=pattern(along, *circle(2.0, heading - yaw)),
+             words=lambda c: "along the motion, by which side of the object leads"),
+        Look(frame="object", dof=turn, weights=pattern(torque, one),
+             words=lambda c: f"as a torque to the {'left' if c[0] > 0.0 else 'right'}"),
+        Look(frame="object", dof=turn, weights=pattern(torque, *circle(1.0, heading - yaw)),
+             words=lambda c: "as a torque, by which side of the object leads"),
+        Look(frame="hand", dof=turn, weights=pattern(torque, *circle(1.0, heading)),
+             words=lambda c: "as a torque, by where the push heads"),
+        Look(frame="push_order", dof=motion, weights=pattern(along, order - order.mean()),
+             words=lambda c: "along the motion, changing from push to push"),
+    ]  # fmt: skip
+
+
+def _sense(coefficients: Array) -> str:
+    return "with" if coefficients[0] > 0.0 else "against"
+
+
+def _degrees(coefficients: Array) -> str:
+    """Of a direction, 0 to 360."""
+    return f"{math.degrees(math.atan2(coefficients[1], coefficients[0])) % 360.0:.0f}"
+
+
+def _axis(coefficients: Array) -> str:
+    """Of an axis, 0 to 180, from the coefficients of twice its angle."""
+    return f"{0.5 * math.degrees(math.atan2(coefficients[1], coefficients[0])) % 180.0:.0f}"
+
+
+def _explained(
+    plain: Fitted, wrenches: Sequence[MissingWrench], looks: Sequence[Look], rng: np.random.Generator
+) -> tuple[list[float], list[Array], Array]:
+    """Gains (minus logs of a chi-square's p) and coefficients of looks, and (f,) the best gain of flipped pushes."""
+    pushes = tuple(_sobered(push, len(plain.state.u)) for push in plain.pushes)
+    # What differs from push to push may be what is missing, and not friction that scatters.
+    bare = dc.replace(plain, pushes=pushes, state=dc.replace(plain.state, scatter=min(plain.state.scatter, 1.0)))
+    basis, blocks = projected(bare, [_signature(plain, wrenches, look.weights) for look in looks])
+    white = Whitened.of(bare.pushes, bare.state.scatter)
+    edges = np.cumsum([len(r) for r in white.residuals])[:-1]
+    left = np.split(white.y - basis @ (basis.T @ white.y), edges)
+    signs = np.vstack([np.ones(len(left)), rng.choice([-1.0, 1.0], size=(FLIPS, len(left)))])
+    gains, solutions = [], []
+    for block in blocks:
+        pieces = np.split(block, edges)
+        told = np.array([_bounded(x, r) for x, r in zip(pieces, left, strict=True)])  # (pushes, k)
+        inverse = np.linalg.pinv(block.T @ block)
+        sums = signs @ told
+        gains.append(-stats.chi2.logsf(np.einsum("fk,kl,fl->f", sums, inverse, sums), block.shape[1]))
+        solutions.append(np.asarray(inverse @ sums[0]))
+    every = np.array(gains)
+    return every[:, 0].tolist(), solutions, every[:, 1:].max(axis=0)
+
+
+def _bounded(x: Array, left: Array) -> Array:
+    """What a push says of the coefficients (k,), no louder than ``LOUDEST`` deviations."""
+    told = x.T @ left
+    loudness = math.sqrt(max(0.0, float(told @ np.linalg.pinv(x.T @ x) @ told)))
+    return np.asarray(told * min(1.0, LOUDEST / max(loudness, 1e-12)))
+
+
+def _sobered(push: LinearPush, theta: int) -> LinearPush:
+    """A push with the derivatives of theta only, and as noisy as it is far from explained: none speaks for all."""
+    white = np.linalg.solve(np.linalg.cholesky(push.covariance(1.0)), push.residual)
+    loudness = max(1.0, float(np.mean(white**2)))
+    own = math.sqrt(loudness) * push.own
+    return dc.replace(push, shared=push.shared[:, :theta], noise=loudness * push.noise, own=own)
+
+
+def _signature(plain: Fitted, wrenches: Sequence[MissingWrench], weights: Array) -> list[Array]:
+    """What a pattern (n, 3, k) of the wrench would change, per push (m, k)."""
+    columns = [np.zeros((len(push.residual), weights.shape[2])) for push in plain.pushes]
+    for wrench, here in zip(wrenches, weights, strict=True):
+        columns[wrench.push] += wrench.columns @ here
+    return columns
+
+
+def _location(case: Case, wrenches: Sequence[MissingWrench], seen: Sequence[_Seen], best: _Seen | None) -> Location:
+    """The statement: the best look if there is one, and the windows in which most is missing."""
+    values = np.array([w.wrench / w.std for w in wrenches])
+    size = np.sqrt((values**2).sum(axis=1))
+    windows = tuple(
+        Window(push=case.problems[wrenches[k].push].name, start=wrenches[k].start, end=wrenches[k].end)
+        for k in np.argsort(-size)[:6]
+    )
+    if best is not None:
+        phase, dof, frame = _phases(best, seen), best.look.dof, best.look.frame
+        detail = best.look.words(best.coefficients)
+    else:
+        energy = {p: float(np.mean([s**2 for s, w in zip(size, wrenches, strict=True) if w.phase == p] or [0.0]))
+                  for p in PHASES}  # fmt: skip
+        phase = tuple(p for p, e in energy.items() if e > A_PART * max(energy.values()))
+        power = (values**2).mean(axis=0)
+        dof = tuple(d for d, p in zip(DOFS, power.tolist(), strict=True) if p > A_PART * power.max())
+        frame, detail = "none", "in no one direction that stands out"
+    where = " and ".join(SAID[p] for p in phase)
+    statement = f"{where}{_amount(wrenches)}, {detail}"
+    return Location(statement=statement, phase=phase, dof=dof, frame=frame, windows=windows)
+
+
+def _phases(best: _Seen, seen: Sequence[_Seen]) -> tuple[str, ...]:
+    """Those in which the pattern explains a good part of what it explains; both if it is weak in each."""
+    gains = {one.phase: one.gain for one in seen if one.look is best.look}
+    if best.phase is not None and gains.get(None, 0.0) < AS_GOOD * best.gain:
+        return (best.phase,)
+    return tuple(p for p in PHASES if gains.get(p, 0.0) > A_PART * best.gain) or PHASES
+
+
+def _amount(wrenches: Sequence[MissingWrench]) -> str:
+    """How much is missing, where it stands out of its standard deviation."""
+    forces = [float(np.abs(w.wrench[:2]).max()) for w in wrenches if (np.abs(w.wrench[:2]) > SURE * w.std[:2]).any()]
+    torques = [abs(float(w.wrench[2])) for w in wrenches if abs(w.wrench[2]) > SURE * w.std[2]]
+    parts = [f"{np.median(forces):.2g} N"] if forces else []
+    parts += [f"{1e3 * np.median(torques):.2g} N mm"] if torques else []
+    return f": about {' and '.join(parts)} missing" if parts else ", too little in any one window to be seen there"

@@ -1,0 +1,119 @@
+"""Where a missing wrench lives: a planted one is found in its frame, and noise lives nowhere."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from physid_drake.diagnose.linear import LinearPush
+from physid_drake.diagnose.localise import MissingWrench
+from physid_drake.diagnose.looks import locate, looks_at
+from physid_drake.diagnose.model import Fitted, State
+
+PUSHES, WINDOWS = 12, 4
+STD = 0.02  # N, N, N m, of a window's wrench
+
+
+def case():
+    return SimpleNamespace(problems=[SimpleNamespace(name=f"pushes/{k:03d}.csv", order=k) for k in range(PUSHES)])
+
+
+def world(planted, seed=0, *, loud=1.0):
+    """Pushes whose windows each tell the wrench (3,) that ``planted`` gives, but for noise; the last is ``loud``."""
+    rng, wrenches, pushes = np.random.default_rng(seed), [], []
+    for push in range(PUSHES):
+        heading, yaw = rng.uniform(-np.pi, np.pi, size=2)
+        residual = rng.standard_normal(3 * WINDOWS)
+        for k in range(WINDOWS):
+            columns = np.zeros((3 * WINDOWS, 3))
+            columns[3 * k : 3 * k + 3] = np.eye(3) / STD
+            moment = SimpleNamespace(
+                push=push, heading=heading, yaw=yaw, speed=rng.uniform(0.05, 0.5), spin=rng.normal(),
+                place=rng.uniform(-0.2, 0.2, size=2), phase="contact" if k < 2 else "free_slide",
+            )  # fmt: skip
+            wrench = np.asarray(planted(moment)) * (loud if push == PUSHES - 1 else 1.0)
+            residual += columns @ wrench
+            wrenches.append(
+                MissingWrench(
+                    start=0.1 * k, end=0.1 * (k + 1), wrench=wrench, std=np.full(3, STD), columns=columns,
+                    **vars(moment),
+                )
+            )  # fmt: skip
+        # Theta is friction: a force along the motion in all windows.
+        friction = np.tile([1.0, 0.0, 0.0], WINDOWS)[:, None] / STD
+        pushes.append(
+            LinearPush(
+                residual=residual, shared=friction, own=friction * 0.01, noise=np.eye(3 * WINDOWS), friction=0
+            )
+        )  # fmt: skip
+    return plain_of(pushes), wrenches
+
+
+def plain_of(pushes):
+    state = State(u=np.zeros(1), effects=(), own=(), scatter=1.0)
+    return Fitted(
+        state=state, pushes=tuple(pushes), prior_mean=np.zeros(1), prior_std=np.ones(1), solution=None, predicted=(),
+        score=0.0,
+    )  # fmt: skip
+
+
+def force(size, angle, m):
+    return (size * np.cos(angle - m.heading), size * np.sin(angle - m.heading), 0.0)
+
+
+PLANTED = {
+    "a pull of the table": (lambda m: force(0.03, 2.0, m), "world", "towards 1"),
+    "a grain": (lambda m: (-0.05 * np.cos(2.0 * (m.heading - 0.5)), 0.0, 0.0), "world", "most against it along"),
+    "a slope of friction": (lambda m: (0.4 * m.place[0], 0.0, 0.0), "world", "changing towards"),
+    "a pull of the object": (lambda m: force(0.03, m.yaw, m), "object", "degrees of the object"),
+    "a grain of the underside": (lambda m: (0.05 * np.cos(2.0 * (m.heading - m.yaw)), 0.0, 0.0), "object", "leads"),
+    "a centre off": (lambda m: (0.0, 0.0, 0.05 * np.sin(m.heading - m.yaw)), "object", "as a torque"),
+    "a drag": (lambda m: (-0.3 * m.speed, 0.0, 0.0), "object_velocity", "against the motion, more so the faster"),
+    "a rudder": (lambda m: (0.0, 0.03, 0.0), "object_velocity", "to the left of the motion"),
+    "a drag of turning": (lambda m: (0.0, 0.0, -0.04 * m.spin), "object_velocity", "against its turning"),
+    "a drift": (lambda m: (-0.008 * m.push, 0.0, 0.0), "push_order", "from push to push"),
+    "a hand off": (lambda m: (0.0, 0.0, 0.05 * np.cos(m.heading)), "hand", "as a torque"),
+}
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_the_frame_of_what_is_planted_is_found(name):
+    planted, frame, words = PLANTED[name]
+    found = locate(case(), *world(planted), np.random.default_rng(0))
+    assert found.frame == frame
+    assert words in found.statement
+
+
+@pytest.mark.parametrize("phases", [("contact",), ("free_slide",), ("contact", "free_slide")])
+def test_the_phase_in_which_it_acts_is_said(phases):
+    found = locate(case(), *world(lambda m: force(0.06 * (m.phase in phases), 2.0, m)), np.random.default_rng(0))
+    assert found.frame == "world" and found.phase == phases
+
+
+def test_the_direction_is_the_planted_one():
+    plain, wrenches = world(lambda m: force(0.06, 2.0, m))
+    words = locate(case(), plain, wrenches, np.random.default_rng(0)).statement
+    said = float(words.split("towards ")[1].split(" degrees")[0])
+    assert said == pytest.approx(np.degrees(2.0), abs=5.0)
+
+
+def test_noise_lives_nowhere():
+    def frame(seed):
+        return locate(case(), *world(lambda m: (0.0, 0.0, 0.0), seed), np.random.default_rng(0)).frame
+
+    assert [frame(seed) for seed in range(20)].count("none") >= 16  # 19 are expected
+
+
+def test_one_loud_push_is_no_place():
+    """A hundred deviations in one push, and nothing in the others."""
+    plain, wrenches = world(lambda m: force(1e-3, 2.0, m), loud=2000.0)
+    found = locate(case(), plain, wrenches, np.random.default_rng(0))
+    assert found.frame == "none" and "no one direction" in found.statement
+    assert {w.push for w in found.windows[:WINDOWS]} == {"pushes/011.csv"}
+
+
+def test_every_look_has_words_and_a_pattern():
+    _, wrenches = world(lambda m: (0.0, 0.0, 0.0))
+    for look in looks_at(wrenches, np.arange(float(len(wrenches)))):
+        assert look.words(np.ones(look.weights.shape[2]))
+        assert np.abs(look.weights).max() > 0.0
