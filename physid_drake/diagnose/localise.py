@@ -26,6 +26,7 @@ from physid_drake.effects import Effect, PushFacts
 Array = NDArray[np.float64]
 
 WINDOWS = 6  # per push, over its motion
+STEP = 4.0  # standard deviations of the tracker: what the object moves in a window at least
 PULSE = 0.05  # of the friction force: the size of a pulse
 LARGEST = 1.0  # of the friction force: prior standard deviation of what is missing
 
@@ -138,18 +139,20 @@ class _Spell:
 
 
 def _windows(case: Case, i: int) -> list[_Spell]:
-    """Windows of equal length over the motion of a push."""
+    """Windows of equal length over the motion of a push, so long that the tracker tells where they head."""
     middles = case.features[i].middles
     poses = case.features[i].poses(case.features[i].recorded)
     if len(middles) < 4:
         return []
-    edges = np.linspace(middles[0], middles[-2], min(WINDOWS, len(middles) // 2) + 1)
+    least = STEP * case.noise.position
+    way = float(np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1).sum())
+    edges = np.linspace(middles[0], middles[-2], int(np.clip(way / least, 1, min(WINDOWS, len(middles) // 2))) + 1)
     spells = []
     for start, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         at = [np.interp(t, middles, poses[:, k]) for k in range(3) for t in (start, end)]
         dx, dy = at[1] - at[0], at[3] - at[2]
         distance = math.hypot(dx, dy)
-        if distance < 4.0 * case.noise.position:
+        if distance < least:
             continue
         place = np.array([0.5 * (at[0] + at[1]), 0.5 * (at[2] + at[3])])
         spells.append(
