@@ -160,12 +160,12 @@ def write(
     pushes = shown_pushes(diagnosis, evidence)
     folder.write(page, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches, scene=scene))
     folder.write("model.yaml", model_of(diagnosis, evidence).dump())
-    folder.write(scene, staged(evidence).StaticHtml())
+    folder.write(scene, staged(diagnosis, evidence).StaticHtml())
 
 
-def staged(evidence: Evidence, meshcat: Meshcat | None = None) -> Meshcat:
-    """The pushes in Meshcat: recorded, and simulated by the final model, with the force that the plain cell lacks."""
-    case, state = evidence.case, evidence.final.state
+def staged(diagnosis: Diagnosis, evidence: Evidence, meshcat: Meshcat | None = None) -> Meshcat:
+    """The pushes in Meshcat: recorded, and as the model that leaves has them, with what the plain cell lacks."""
+    case, state = evidence.case, model_that_leaves(diagnosis, evidence).state
     stage = Stage(case.recording, meshcat)
     scenes = []
     for i in range(min(SHOWN, len(case.problems))):
@@ -205,10 +205,15 @@ def _predicted(fitted: Fitted, i: int, recorded: np.ndarray) -> np.ndarray:
     return np.asarray(recorded - push.residual + push.shared[:, :own] @ fitted.solution.beta[:own])
 
 
+def model_that_leaves(diagnosis: Diagnosis, evidence: Evidence) -> Fitted:
+    """The fit with the effects if they were found, else the plain cell where it predicts best."""
+    return evidence.final if diagnosis.effects else evidence.nearest
+
+
 def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
     """The model that leaves: with the effects if they were found, else plain."""
     case = evidence.case
-    fitted = evidence.final if diagnosis.effects else evidence.nearest
+    fitted = model_that_leaves(diagnosis, evidence)
     state, spec = fitted.state, case.pool.spec
     intervals: dict[str, object] = {
         f"theta.{name}": list(t.ci90) for name, t in diagnosis.theta.items() if t.ci90 is not None

@@ -266,6 +266,10 @@ def _left(evidence: Evidence, after: Fitted, partly: Partly | None) -> str:
     return f"{much}; the nearest of the catalogue is {nearest}, which does not account for it"
 
 
+def _percent(share: float) -> str:
+    return "more than 99 %" if share > 0.99 else f"{100.0 * share:.0f} %"
+
+
 def _sentence(verdict: str, findings: Sequence[EffectFinding], partly: Partly | None) -> str:
     match verdict:
         case "consistent":
@@ -275,7 +279,7 @@ def _sentence(verdict: str, findings: Sequence[EffectFinding], partly: Partly | 
         case "unexplained" if partly is not None:
             return (
                 "Simulation and recording differ, and nothing in the catalogue accounts for all of it:"
-                f" {' and '.join(partly.effects)} would take {100.0 * partly.share:.0f} % of the squared error away."
+                f" {' and '.join(partly.effects)} would take {_percent(partly.share)} of the squared error away."
             )
         case "unexplained":
             return "Simulation and recording differ, and nothing in the catalogue accounts for it."

@@ -29,6 +29,7 @@ CHANCE = 0.05  # of the best of all looks
 SURE = 2.5  # standard deviations of a window's wrench
 PHASES = ("contact", "free_slide")
 DOFS = ("along_motion", "across_motion", "rotation")
+FEWEST_PUSHES = 6  # of which sign flips can tell anything: two of 2^5 patterns are 6 %
 LOUDEST = 3.0  # standard deviations that one push may speak with
 AS_GOOD = 0.8  # of the gain in one phase: the pattern holds in both
 A_PART = 0.25  # of the most that a phase or a degree of freedom has
@@ -51,17 +52,14 @@ class Look:
     words: Callable[[Array], str]
     weights: Array
 
-    def within(self, mask: Array) -> Look:
-        """The same in some windows (n,) only."""
-        return dc.replace(self, weights=self.weights * mask[:, None, None])
-
 
 @dc.dataclass(frozen=True, kw_only=True)
 class _Seen:
-    """A look in a phase (None: in both), with what it explains and its coefficients."""
+    """A look in some phases, with what it explains and its coefficients; its ``number`` is the same in all phases."""
 
+    number: int
     look: Look
-    phase: str | None
+    phases: tuple[str, ...]
     gain: float
     coefficients: Array
 
@@ -77,43 +75,56 @@ def locate(case: Case, plain: Fitted, wrenches: Sequence[MissingWrench], rng: np
     """
     if not wrenches:
         return None
-    looks = looks_at(wrenches, np.array([case.problems[w.push].order for w in wrenches], dtype=np.float64))
-    parts: dict[str | None, Array] = {None: np.ones(len(wrenches))}
-    for phase in PHASES:
-        mask = np.array([w.phase == phase for w in wrenches], dtype=np.float64)
-        if 0 < mask.sum() < len(mask):
-            parts[phase] = mask
-    split = [(look, phase) for look in looks for phase in parts]
-    within = [look.within(parts[phase]) for look, phase in split]
-    gains, solutions, best_by_chance = _explained(plain, wrenches, within, rng)
+    order = np.array([case.problems[w.push].order for w in wrenches], dtype=np.float64)
+    there = tuple(p for p in PHASES if any(w.phase == p for w in wrenches))
+    split = [
+        (number, look, phases)
+        for phases in {there: None} | {(p,): None for p in there}
+        for number, look in enumerate(looks_at(wrenches, order, phases))
+    ]
+    gains, solutions, best_by_chance = _explained(plain, wrenches, [look for _, look, _ in split], rng)
     seen = [
-        _Seen(look=look, phase=phase, gain=gain, coefficients=solution)
-        for (look, phase), gain, solution in zip(split, gains, solutions, strict=True)
+        _Seen(number=number, look=look, phases=phases, gain=gain, coefficients=solution)
+        for (number, look, phases), gain, solution in zip(split, gains, solutions, strict=True)
     ]
     best = max(seen, key=lambda one: one.gain)
     surely = (best_by_chance >= best.gain).mean() < CHANCE
     return _location(case, wrenches, seen, best if surely else None)
 
 
-def looks_at(wrenches: Sequence[MissingWrench], order: Array) -> list[Look]:
-    """All looks, in words and as patterns (n, 3, k) over the windows; ``order`` (n,) is that of their pushes."""
+def looks_at(wrenches: Sequence[MissingWrench], order: Array, phases: Sequence[str] = PHASES) -> list[Look]:
+    """All looks, in words and as patterns (n, 3, k) over the windows.
+
+    Args:
+        wrenches: n windows.
+        order: (n,) of their pushes.
+        phases: in which they act; elsewhere the patterns are zero.
+    """
     n = len(wrenches)
+    acting = np.array([w.phase in phases for w in wrenches])
     heading, yaw, speed, spin = (np.array([getattr(w, name) for w in wrenches]) for name in
                                  ("heading", "yaw", "speed", "spin"))  # fmt: skip
     place = np.array([w.place for w in wrenches])
     one = np.ones(n)
 
+    def centred(values: Array) -> Array:
+        """Less their mean where the pattern acts, so that it is no constant force."""
+        return np.asarray(values - values[acting].mean(axis=0))
+
     def pattern(component: int, *values: Array) -> Array:
         weights = np.zeros((n, 3, len(values)))
         for k, value in enumerate(values):
-            weights[:, component, k] = value
+            weights[:, component, k] = value * acting
         return weights
 
     def fixed(angle: Array) -> Array:
         """Forces along a direction that turns with ``angle`` (n,), and across it."""
         weights = np.zeros((n, 3, 2))
         for k, direction in enumerate((angle, angle + 0.5 * math.pi)):
-            weights[:, 0, k], weights[:, 1, k] = np.cos(direction - heading), np.sin(direction - heading)
+            weights[:, 0, k], weights[:, 1, k] = (
+                acting * np.cos(direction - heading),
+                acting * np.sin(direction - heading),
+            )
         return weights
 
     def circle(times: float, angle: Array) -> tuple[Array, Array]:
@@ -124,7 +135,7 @@ def looks_at(wrenches: Sequence[MissingWrench], order: Array) -> list[Look]:
     return [
         Look(frame="object_velocity", dof=motion, weights=pattern(along, one),
              words=lambda c: f"{_sense(c)} the motion, wherever the object heads"),
-        Look(frame="object_velocity", dof=motion, weights=pattern(along, speed - speed.mean()),
+        Look(frame="object_velocity", dof=motion, weights=pattern(along, centred(speed)),
              words=lambda c: f"{_sense(c)} the motion, more so the faster it is"),
         Look(frame="object_velocity", dof=DOFS[1:2], weights=pattern(across, one),
              words=lambda c: f"to the {'left' if c[0] > 0.0 else 'right'} of the motion, wherever the object heads"),
@@ -134,7 +145,7 @@ def looks_at(wrenches: Sequence[MissingWrench], order: Array) -> list[Look]:
              words=lambda c: f"towards {_degrees(c)} degrees on the table"),
         Look(frame="world", dof=motion, weights=pattern(along, *circle(2.0, heading)),
              words=lambda c: f"along the motion, most against it along {_axis(-c)} degrees on the table"),
-        Look(frame="world", dof=motion, weights=pattern(along, *(place - place.mean(axis=0)).T),
+        Look(frame="world", dof=motion, weights=pattern(along, *centred(place).T),
              words=lambda c: f"along the motion, changing towards {_degrees(c)} degrees on the table"),
         Look(frame="object", dof=force, weights=fixed(yaw),
              words=lambda c: f"towards {_degrees(c)} degrees of the object"),
@@ -146,7 +157,7 @@ def looks_at(wrenches: Sequence[MissingWrench], order: Array) -> list[Look]:
              words=lambda c: "as a torque, by which side of the object leads"),
         Look(frame="hand", dof=turn, weights=pattern(torque, *circle(1.0, heading)),
              words=lambda c: "as a torque, by where the push heads"),
-        Look(frame="push_order", dof=motion, weights=pattern(along, order - order.mean()),
+        Look(frame="push_order", dof=motion, weights=pattern(along, centred(order)),
              words=lambda c: "along the motion, changing from push to push"),
     ]  # fmt: skip
 
@@ -180,20 +191,22 @@ def _explained(
     gains, solutions = [], []
     for block in blocks:
         pieces = np.split(block, edges)
-        told = np.array([_bounded(x, r) for x, r in zip(pieces, left, strict=True)])  # (pushes, k)
+        shares = [_share(x, r) for x, r in zip(pieces, left, strict=True)]
+        told = np.array([share * (x.T @ r) for share, x, r in zip(shares, pieces, left, strict=True)])  # (pushes, k)
         inverse = np.linalg.pinv(block.T @ block)
         sums = signs @ told
         gains.append(-stats.chi2.logsf(np.einsum("fk,kl,fl->f", sums, inverse, sums), block.shape[1]))
-        solutions.append(np.asarray(inverse @ sums[0]))
+        heard = sum((share * (x.T @ x) for share, x in zip(shares, pieces, strict=True)), np.zeros_like(inverse))
+        solutions.append(np.asarray(np.linalg.pinv(heard) @ sums[0]))
     every = np.array(gains)
     return every[:, 0].tolist(), solutions, every[:, 1:].max(axis=0)
 
 
-def _bounded(x: Array, left: Array) -> Array:
-    """What a push says of the coefficients (k,), no louder than ``LOUDEST`` deviations."""
+def _share(x: Array, left: Array) -> float:
+    """Times what a push says of coefficients, so that it is no louder than ``LOUDEST`` deviations."""
     told = x.T @ left
     loudness = math.sqrt(max(0.0, float(told @ np.linalg.pinv(x.T @ x) @ told)))
-    return np.asarray(told * min(1.0, LOUDEST / max(loudness, 1e-12)))
+    return min(1.0, LOUDEST / max(loudness, 1e-12))
 
 
 def _sobered(push: LinearPush, theta: int) -> LinearPush:
@@ -226,27 +239,31 @@ def _location(case: Case, wrenches: Sequence[MissingWrench], seen: Sequence[_See
     else:
         energy = {p: float(np.mean([s**2 for s, w in zip(size, wrenches, strict=True) if w.phase == p] or [0.0]))
                   for p in PHASES}  # fmt: skip
-        phase = tuple(p for p, e in energy.items() if e > A_PART * max(energy.values()))
+        there = {w.phase for w in wrenches}
+        phase = tuple(p for p in PHASES if p in there and energy[p] >= A_PART * max(energy.values()))
         power = (values**2).mean(axis=0)
-        dof = tuple(d for d, p in zip(DOFS, power.tolist(), strict=True) if p > A_PART * power.max())
-        frame, detail = "none", "in no one direction that stands out"
+        dof = tuple(d for d, p in zip(DOFS, power.tolist(), strict=True) if p >= A_PART * power.max())
+        few = len({w.push for w in wrenches}) < FEWEST_PUSHES
+        frame, detail = "none", "in too few pushes to say where" if few else "in no one direction that stands out"
     where = " and ".join(SAID[p] for p in phase)
-    statement = f"{where}{_amount(wrenches)}, {detail}"
+    statement = f"{where}{_amount([w for w in wrenches if w.phase in phase], dof)}, {detail}"
     return Location(statement=statement, phase=phase, dof=dof, frame=frame, windows=windows)
 
 
 def _phases(best: _Seen, seen: Sequence[_Seen]) -> tuple[str, ...]:
-    """Those in which the pattern explains a good part of what it explains; both if it is weak in each."""
-    gains = {one.phase: one.gain for one in seen if one.look is best.look}
-    if best.phase is not None and gains.get(None, 0.0) < AS_GOOD * best.gain:
-        return (best.phase,)
-    return tuple(p for p in PHASES if gains.get(p, 0.0) > A_PART * best.gain) or PHASES
+    """Those in which the pattern explains a good part of what it explains; all if it is weak in each."""
+    gains = {one.phases: one.gain for one in seen if one.number == best.number}
+    every = max(gains, key=len)
+    if gains[every] < AS_GOOD * best.gain:
+        return best.phases
+    return tuple(p for p in every if gains.get((p,), 0.0) > A_PART * best.gain) or every
 
 
-def _amount(wrenches: Sequence[MissingWrench]) -> str:
-    """How much is missing, where it stands out of its standard deviation."""
-    forces = [float(np.abs(w.wrench[:2]).max()) for w in wrenches if (np.abs(w.wrench[:2]) > SURE * w.std[:2]).any()]
-    torques = [abs(float(w.wrench[2])) for w in wrenches if abs(w.wrench[2]) > SURE * w.std[2]]
-    parts = [f"{np.median(forces):.2g} N"] if forces else []
-    parts += [f"{1e3 * np.median(torques):.2g} N mm"] if torques else []
+def _amount(wrenches: Sequence[MissingWrench], dof: Sequence[str]) -> str:
+    """How much is missing in some degrees of freedom, where it stands out of its standard deviation."""
+    sure = [np.where(np.abs(w.wrench) > SURE * w.std, np.abs(w.wrench), 0.0) for w in wrenches]
+    amounts = np.array(sure) * [name in dof for name in DOFS]
+    forces, torques = amounts[:, :2].max(axis=1), amounts[:, 2]
+    parts = [f"{np.median(forces[forces > 0.0]):.2g} N"] if (forces > 0.0).any() else []
+    parts += [f"{1e3 * np.median(torques[torques > 0.0]):.2g} N mm"] if (torques > 0.0).any() else []
     return f": about {' and '.join(parts)} missing" if parts else ", too little in any one window to be seen there"

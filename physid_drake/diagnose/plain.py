@@ -102,23 +102,39 @@ def least_squares(case: Case, at: Fitted) -> Fitted:
         case: the pushes.
         at: a plain model that says where to start, and how much is left over.
     """
-    loud = Fitter(_blunted(case, math.sqrt(max(1.0, _squares_at_rest(at)))))
+    loud = Fitter(_blunted(case, at))
     return loud.fit(loud.start(at.state.u), rounds=CAREFUL, careful=CAREFUL + 1, like=at, renew=True)
 
 
-def nearest(case: Case, plain: Fitted) -> Fitted:
-    """The plain cell where it predicts best: where it was fitted, or by least squares if that explains nothing."""
-    return plain if plain.reduced_chi2 <= FAR_OFF else least_squares(case, plain)
+def nearest(rough: Case, case: Case, plain: Fitted) -> Fitted | None:
+    """The plain cell where it predicts best, by least squares; None where it was fitted well enough.
+
+    Args:
+        rough: the case on longer ticks, to which the plain fit belongs.
+        case: the case on its own ticks, to which the model that is returned belongs.
+        plain: the plain fit.
+    """
+    if plain.reduced_chi2 <= FAR_OFF:
+        return None
+    return Fitter(_blunted(case, plain)).refine(least_squares(rough, plain))
 
 
-def _blunted(case: Case, factor: float) -> Case:
-    """The case with so many times as much noise of poses, in the units of the old."""
+def _blunted(case: Case, at: Fitted) -> Case:
+    """The case with poses, and forces, as noisy as a model leaves them, in the units of the old."""
+    counts = [3 * len(one.middles) for one in case.features]
+    poses = np.concatenate([push.residual[:n] for push, n in zip(at.pushes, counts, strict=True)])
+    forces = np.concatenate([push.residual[n:] for push, n in zip(at.pushes, counts, strict=True)])
     features = []
-    for one in case.features:
-        times = np.ones(len(one.recorded))
-        times[: 3 * len(one.middles)] = factor
+    for one, n in zip(case.features, counts, strict=True):
+        times = np.full(len(one.recorded), _loudness(poses))
+        times[n:] = _loudness(forces)
         features.append(dc.replace(one, noise=one.noise * np.outer(times, times)))
     return dc.replace(case, features=tuple(features))
+
+
+def _loudness(left: Array) -> float:
+    """How many of its deviations something is off, at least 1."""
+    return max(1.0, math.sqrt(float(np.mean(left**2)))) if len(left) else 1.0
 
 
 def _squares_at_rest(fitted: Fitted) -> float:

@@ -25,7 +25,7 @@ from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
 from physid_drake.diagnose.loudness import as_loud_as_left, quieter
 from physid_drake.diagnose.memory import Memory
-from physid_drake.diagnose.model import Fitted, State
+from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.next_push import next_push
 from physid_drake.diagnose.pairs import confirmed_pairs, steps_of
 from physid_drake.diagnose.plain import coarse, fit_plain, nearest, numerics
@@ -95,20 +95,16 @@ def _on_short_ticks(answer: _Answer, tick: Tick) -> Evidence:
     """The evidence of an answer, both models taken to the case's own ticks."""
     case, grown, fitter = answer.case, answer.grown, answer.fitter
     plain, model = grown.base.fitted, grown.last.fitted
-    steps = []
-    for k, step in enumerate(grown.steps):
-        judged, model = _reconsidered(fitter, plain, model, k, step, tick)
-        steps.append(judged)
     fine = Fitter(case, fitter.extra, fitter.tolerances)
     tick("on short ticks", 0, 0)
     refined = fine.refine(plain)
-    final = fine.refine(model) if steps else refined
-    closest = nearest(fitter.case, plain)
+    final = fine.refine(model) if grown.steps else refined
+    closest = nearest(fitter.case, case, plain)
     case.pool.count += fitter.case.pool.count
     return Evidence(
-        case=case, fitter=fine, plain=refined, nearest=refined if closest is plain else closest,
+        case=case, fitter=fine, plain=refined, nearest=closest or refined,
         screening=grown.base.screening, signatures=grown.base.signatures,
-        steps=tuple(steps), rejected=grown.rejected, final=final, remaining=grown.last.screening,
+        steps=grown.steps, rejected=grown.rejected, final=final, remaining=grown.last.screening,
         noise_share=answer.noise_share, detected=answer.detected,
     )  # fmt: skip
 
@@ -147,7 +143,10 @@ class _Search:
         fitter = Fitter(rough, guard, tolerances(rough, found))
         looked = _Looked.at(fitter.guard(first), found, self.rng)
         grown = _grown(fitter, looked, self.kinds, self.alpha, self.rng, self.tick)
-        return _Answer(case=case, fitter=fitter, grown=_pruned(fitter, grown, self.rng, self.tick))
+        grown = _pruned(fitter, grown, self.rng, self.tick)
+        for k in range(len(grown.steps) - 1):
+            grown = _reconsidered(fitter, grown, k, self.rng, self.tick)
+        return _Answer(case=case, fitter=fitter, grown=grown)
 
     def answer_by_ratios(self, case: Case, rough: Case, first: Fitted, memory: Memory) -> _Answer:
         """The same where the noise is not known: as loud as the plain cell leaves, then as what was found leaves."""
@@ -324,30 +323,42 @@ def _looks(
     return tuple(guard_kept), found
 
 
-def _reconsidered(
-    fitter: Fitter, plain: Fitted, model: Fitted, k: int, step: tuple[Candidate, ...], tick: Tick
-) -> tuple[tuple[Candidate, ...], Fitted]:
-    """A step's rivals judged again beside the effects that came after it: what was missing then blurred them.
+def _reconsidered(fitter: Fitter, grown: _Grown, k: int, rng: np.random.Generator, tick: Tick) -> _Grown:
+    """The rivals of a step judged again beside the effects that came after it: what was missing then blurred them.
 
-    Returns:
-        The step, its best first, and the model with that one.
+    One that does better there takes the place of the step's effect.
     """
+    plain, model, step = grown.base.fitted, grown.last.fitted, grown.steps[k]
+    effects = model.state.effects
+    present = {e.kind.name for e in effects}
     alike = class_of(plain, step)
-    present = {e.kind.name for e in model.state.effects}
     rivals = [c for c in step[1:] if c.name in alike and c.name not in present]
-    if k + 1 >= len(model.state.effects) or not rivals:
-        return step, model
-    before = push_scores(plain)
+    if not rivals:
+        return grown
+
+    def with_kth(points: tuple[EffectPoint, ...]) -> State:
+        return dc.replace(model.state, effects=(*effects[:k], *points, *effects[k + 1 :]))
+
     models = {step[0].name: model}
     for other in rivals:
         tick(f"{other.name} in place of {step[0].name}", 0, 0)
-        effects = list(model.state.effects)
-        effects[k] = next(e for e in other.fitted.state.effects if e.kind.name == other.name)
-        models[other.name] = fitter.fit(dc.replace(model.state, effects=tuple(effects)), rounds=4, like=model)
-    judged = [dc.replace(c, gains=push_scores(models[c.name]) - before) for c in (step[0], *rivals)]
-    ordered = ranked(judged)
-    rest = [c for c in step if c.name not in models]
-    return (*ordered, *rest), models[ordered[0].name]
+        point = next(e for e in other.fitted.state.effects if e.kind.name == other.name)
+        models[other.name] = fitter.fit(with_kth((point,)), rounds=4, like=model)
+    tick(f"model without {step[0].name}", 0, 0)
+    without = push_scores(fitter.fit(with_kth(()), rounds=4, like=model))
+    scores = {name: push_scores(one) for name, one in models.items()}
+    best = ranked([dc.replace(c, gains=scores[c.name] - without) for c in (step[0], *rivals)])[0].name
+    before = push_scores(plain)
+    judged = [dc.replace(c, gains=scores[c.name] - before) if c.name in scores else c for c in step]
+    judged.sort(key=lambda c: c.name != best)
+    steps = (*grown.steps[:k], tuple(judged), *grown.steps[k + 1 :])
+    if best == step[0].name:
+        return dc.replace(grown, steps=steps)
+    tick(f"model with {best}", 0, 0)
+    swapped = _model_with(fitter, models[best].state)
+    missed = [s for s in grown.base.signatures if s.kind.name == step[0].name]
+    left = [s for s in grown.last.signatures if s.kind.name != best]
+    return dc.replace(grown, steps=steps, last=_Looked.at(swapped, (*left, *missed), rng))
 
 
 def _model_with(fitter: Fitter, state: State) -> Fitted:
@@ -376,7 +387,14 @@ def _rival_states(evidence: Evidence) -> list[State]:
     """The models that are still in question: the final one, and the rivals of its last effect."""
     if not evidence.steps:
         return []
-    last = evidence.steps[-1]
+    last, final = evidence.steps[-1], evidence.final.state
     alike = class_of(evidence.plain, last)
     others = [c for c in last[1:] if c.name in alike] or [c for c in last[1:] if not c.degenerate][:1]
-    return [evidence.final.state, *(c.fitted.state for c in others)]
+    points = [next(e for e in c.fitted.state.effects if e.kind.name == c.name) for c in others]
+    return [
+        final,
+        *(
+            dc.replace(c.fitted.state, effects=(*final.effects[:-1], point))
+            for c, point in zip(others, points, strict=True)
+        ),
+    ]

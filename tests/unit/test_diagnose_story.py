@@ -92,17 +92,33 @@ def test_two_effects_that_both_matter_stay(grown):
     assert pruned.last is grown.last
 
 
-@pytest.mark.parametrize(("beside", "first"), [(-1.0, "table_tilt"), (-9.0, "magnet")])
-def test_a_rival_that_does_better_beside_a_later_effect_takes_the_place(grown, monkeypatch, beside, first):
+@pytest.fixture
+def rivalled(grown, monkeypatch):
+    """A magnet that a tilted table is like, and a drag beside it; (without the first effect, -60 a push)."""
     monkeypatch.setattr(story, "class_of", lambda plain, step: ("table_tilt",))
-    rival = dc.replace(step("table_tilt")[0], fitted=fitted(("table_tilt",), -6.0))
-    model = fitted(("magnet", "viscous_drag"), -5.0)
-    refits = Refits({("table_tilt", "viscous_drag"): beside})
-    plain = grown.base.fitted
-    judged, chosen = story._reconsidered(refits, plain, model, 0, (*step("magnet"), rival), quiet)
-    assert judged[0].name == first
-    assert [e.kind.name for e in chosen.state.effects] == [first, "viscous_drag"]
-    assert story._reconsidered(refits, plain, model, 1, step("viscous_drag"), quiet)[1] is model
+    monkeypatch.setattr(story, "_model_with", lambda fitter, state: fitter.fit(state))
+    magnet = dc.replace(step("magnet")[0], coordinates=4)
+    rival = dc.replace(step("table_tilt")[0], fitted=fitted(("table_tilt",), -60.0), coordinates=1)
+    last = dc.replace(grown.last, fitted=fitted(("magnet", "viscous_drag"), -5.0))
+    return dc.replace(grown, last=last, steps=((magnet, rival, step("uneven_support")[0]), step("viscous_drag")))
+
+
+@pytest.mark.parametrize(("beside", "first"), [(-4.0, "table_tilt"), (-5.5, "table_tilt"), (-12.0, "magnet")])
+def test_a_rival_that_does_better_beside_a_later_effect_takes_the_place(rivalled, beside, first):
+    """Also one that does as well with fewer coordinates; not one that is 7 nats a push worse."""
+    refits = Refits({("table_tilt", "viscous_drag"): beside, ("viscous_drag",): -60.0})
+    judged = story._reconsidered(refits, rivalled, 0, None, quiet)
+    assert names_of(judged) == [first, "viscous_drag"]
+    assert {c.name for c in judged.steps[0]} == {"magnet", "table_tilt", "uneven_support"}
+    assert [e.kind.name for e in judged.last.fitted.state.effects] == [first, "viscous_drag"]
+    gains = {c.name: c.gain for c in judged.steps[0]}
+    assert gains["magnet"] == pytest.approx(PUSHES * 45.0)  # over the plain cell, as those of other candidates
+    assert gains["table_tilt"] == pytest.approx(PUSHES * (beside + 50.0))
+
+
+def test_a_step_without_rivals_stays(rivalled, monkeypatch):
+    monkeypatch.setattr(story, "class_of", lambda plain, step: ())
+    assert story._reconsidered(Refits({}), rivalled, 0, None, quiet) is rivalled
 
 
 def test_a_plain_fit_in_a_wrong_basin_is_left_if_an_effect_leads_out_of_it():
