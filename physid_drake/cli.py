@@ -148,6 +148,8 @@ def _register_prove(subparsers: Subparsers) -> None:
     parser.add_argument("--timeout", type=float, default=1800.0, metavar="S",
                         help="a diagnosis that takes longer has failed (default 1800)")  # fmt: skip
     parser.add_argument("--retry", action="store_true", help="diagnose again what failed before")
+    parser.add_argument("--open", action="store_true",
+                        help="score what has been diagnosed so far, and diagnose no more")  # fmt: skip
     parser.add_argument("--real", type=Path, metavar="FOLDER",
                         help="instead of worlds, recordings of robots that others published")  # fmt: skip
     parser.add_argument("--only", nargs="+", metavar="NAME", help="of --real: only cases whose names begin so")
@@ -159,6 +161,8 @@ def _register_prove(subparsers: Subparsers) -> None:
 def _run_prove(arguments: argparse.Namespace) -> int:
     # Matplotlib takes half a second to import and Drake a second, which the other commands need not wait for.
     if arguments.real is not None:
+        if arguments.open:
+            raise ConfigError("--open is of sealed worlds: leave it out with --real.")
         from physid_drake.run_prove_real import run_real  # noqa: PLC0415
 
         return run_real(arguments)

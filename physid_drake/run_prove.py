@@ -23,7 +23,7 @@ from physid_drake.prove.diagnosing import RESULT, Attempt, Task, attempt_of, dia
 from physid_drake.prove.figures import figures_of
 from physid_drake.prove.make import world_id
 from physid_drake.prove.score import read_outcomes
-from physid_drake.prove.seal import SEALED, check_seal, shut, unlock
+from physid_drake.prove.seal import SEALED, check_seal, read_seal, shut, unlock
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.proof import Proof, proof_json, proof_markdown, proof_tables
 from physid_drake.report.proof_page import proof_page
@@ -54,11 +54,16 @@ def run(arguments: argparse.Namespace, command: Commander = diagnose_command) ->
     folder = claim(out, {"seed": arguments.seed, "kind": arguments.kind})
     console = wide_console()
     names = [world_id(index, arguments.seed) for index in range(worlds)]
-    with ended_softly():
-        seal = _make(arguments, worlds, out, console)
-        console.print(f"seal of {worlds} worlds, before any is diagnosed: sha256 {seal}", soft_wrap=True)
-        diagnose_worlds(out, names, arguments, console, command)
+    if arguments.open:
+        seal = read_seal(out)
+    else:
+        with ended_softly():
+            seal = _make(arguments, worlds, out, console)
+            console.print(f"seal of {worlds} worlds, before any is diagnosed: sha256 {seal}", soft_wrap=True)
+            diagnose_worlds(out, names, arguments, console, command)
     proof = opened(out, names, seal, seed=arguments.seed, kind=arguments.kind)
+    if arguments.open:
+        console.print(f"{len(proof.outcomes)} of {worlds} worlds have been diagnosed")
     write(folder, proof)
     for table in proof_tables(proof):
         console.print(table)
@@ -203,22 +208,26 @@ def _verdict(folder: Path) -> str:
 
 
 def opened(out: Path, names: Sequence[str], seal: str, *, seed: int, kind: str | None) -> Proof:
-    """Check the seal and score.
+    """Check the seal and score the worlds whose diagnosis has ended.
 
     Args:
         out: folder of the proof.
-        names: of the worlds.
+        names: of all worlds.
         seal: hash that was written down before the diagnosis.
         seed: of the worlds.
         kind: of the worlds, None for the mix.
 
     Raises:
-        ProofError: if the truth is not the one that was sealed.
+        ProofError: if the truth is not the one that was sealed, or nothing is diagnosed yet.
     """
     check_seal(out, names, seal)
-    outcomes = tuple(read_outcomes(out / SEALED, out / "diagnoses", names))
+    ended = [name for name in names if attempt_of(out / "diagnoses" / name) is not None]
+    if not ended:
+        raise ProofError(f"'{out}': none of the {len(names)} sealed worlds has been diagnosed yet.")
+    outcomes = tuple(read_outcomes(out / SEALED, out / "diagnoses", ended))
     return Proof(
-        seed=seed, kind=kind, seal=seal, outcomes=outcomes, figures=figures_of(outcomes), versions=versions()
+        seed=seed, kind=kind, seal=seal, sealed=len(names), outcomes=outcomes, figures=figures_of(outcomes),
+        versions=versions(),
     )  # fmt: skip
 
 

@@ -60,6 +60,18 @@ def write_seal(out: Path, identities: Sequence[str]) -> str:
     return total
 
 
+def read_seal(out: Path) -> str:
+    """The hash over all that was written down.
+
+    Raises:
+        ProofError: if nothing was sealed here.
+    """
+    try:
+        return (out / TOTAL).read_text(encoding="utf-8").strip()
+    except OSError as error:
+        raise ProofError(f"'{out}' holds no sealed worlds: run the command without --open first.") from error
+
+
 def check_seal(out: Path, identities: Sequence[str], written: str) -> None:
     """Refuse a truth that is not the one that was sealed.
 

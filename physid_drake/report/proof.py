@@ -31,7 +31,8 @@ class Proof:
         seed: of the worlds.
         kind: of them, None for the mix.
         seal: SHA-256 that was written down before the diagnosis.
-        outcomes: of all worlds, by name.
+        sealed: how many worlds were sealed.
+        outcomes: of those that were diagnosed, by name.
         figures: of them.
         versions: of the packages that made it.
     """
@@ -39,6 +40,7 @@ class Proof:
     seed: int
     kind: str | None
     seal: str
+    sealed: int
     outcomes: tuple[Outcome, ...]
     figures: Figures
     versions: dict[str, str]
@@ -70,6 +72,7 @@ def proof_json(proof: Proof) -> str:
         "seed": proof.seed,
         "kind": proof.kind,
         "seal_sha256": proof.seal,
+        "sealed": proof.sealed,
         "versions": proof.versions,
         "figures": figures,
         "faults": [
@@ -135,8 +138,9 @@ def proof_markdown(proof: Proof) -> str:
 
 def _worlds(proof: Proof) -> str:
     kinds = proof.figures.worlds
+    some = f" of {proof.sealed} that were sealed" if len(proof.outcomes) < proof.sealed else ""
     return (
-        f"{len(proof.outcomes)} worlds: {kinds['none']} without an effect, {kinds['effect']} with one of the"
+        f"{len(proof.outcomes)} worlds{some}: {kinds['none']} without an effect, {kinds['effect']} with one of the"
         f" catalogue, {kinds['pair']} with two, {kinds['other']} with one that is in no catalogue"
     )
 

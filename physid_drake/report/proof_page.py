@@ -96,7 +96,9 @@ _PAGE = """<!DOCTYPE html>
 </table></div>
 {% endmacro %}
 <h1>What the diagnosis finds on worlds that it has not seen</h1>
-<p>{{ proof.outcomes | length }} worlds of another simulator: {{ worlds.none }} without an effect, {{ worlds.effect }}
+<p>{{ proof.outcomes | length }} worlds
+{{ "of " ~ proof.sealed ~ " that were sealed, " if (proof.outcomes | length) < proof.sealed }}of another simulator:
+{{ worlds.none }} without an effect, {{ worlds.effect }}
 with one of the catalogue, {{ worlds.pair }} with two, {{ worlds.other }} with one that is in no catalogue. Truth and
 recordings were made and sealed first; the diagnosis was given the recordings alone.</p>
 <p class="note">Seed {{ proof.seed }}. Seal, written down before the diagnosis: <code>sha256 {{ proof.seal }}</code>.

@@ -10,6 +10,7 @@ import pytest
 
 from physid_drake import run_prove
 from physid_drake.cli import build_parser, main
+from physid_drake.errors import ProofError
 from physid_drake.prove.diagnosing import Task, attempt_of, diagnose_all, diagnose_command
 from physid_drake.prove.make import world_id
 from physid_drake.prove.seal import write_seal
@@ -119,6 +120,11 @@ def test_an_interrupted_run_keeps_what_is_finished_and_opens_the_seal_again(worl
     assert not (worlds / "proof.json").exists()
     finished = [d.parent.name for d in (worlds / "diagnoses").glob("*/diagnosis.json")]
     assert len(finished) == 1
+    assert prove(worlds, "--open") == 0  # what is there so far is scored, and nothing else is diagnosed
+    content = json.loads((worlds / "proof.json").read_text())
+    assert (sum(content["figures"]["worlds"].values()), content["sealed"]) == (1, 3)
+    assert "1 worlds of 3 that were sealed" in (worlds / "proof.md").read_text()
+    assert calls(worlds) == finished
     monkeypatch.setattr(run_prove, "_tell", tell)
     assert prove(worlds) == 0
     assert calls(worlds).count(finished[0]) == 1
@@ -154,6 +160,14 @@ def test_a_broken_seal_is_refused(worlds, monkeypatch):
     # Nor does a second run take the new truth for the old one.
     with pytest.raises(run_prove.ProofError, match="has changed since it was sealed"):
         prove(worlds)
+
+
+def test_there_is_nothing_to_open_before_worlds_are_sealed_and_diagnosed(worlds, tmp_path):
+    with pytest.raises(ProofError, match="holds no sealed worlds"):
+        prove(tmp_path / "empty", "--open")
+    run_prove._make(build_parser().parse_args(["prove"]), 3, worlds, None)
+    with pytest.raises(ProofError, match="none of the 3 sealed worlds"):
+        prove(worlds, "--open")
 
 
 def test_another_proof_in_the_same_folder_is_refused(worlds):

@@ -127,14 +127,15 @@ def test_components_of_a_vector_are_compared_over_its_length():
 @pytest.fixture
 def proof():
     return Proof(
-        seed=3, kind=None, seal="ab" * 32, outcomes=OUTCOMES, figures=figures_of(OUTCOMES), versions={"drake": "1.0"}
+        seed=3, kind=None, seal="ab" * 32, sealed=len(OUTCOMES), outcomes=OUTCOMES, figures=figures_of(OUTCOMES),
+        versions={"drake": "1.0"},
     )  # fmt: skip
 
 
 def test_the_json_has_fixed_keys_and_seconds_stand_alone(proof):
     content = json.loads(proof_json(proof))
     assert set(content) == {
-        "format", "seed", "kind", "seal_sha256", "versions", "figures", "faults", "outcomes", "seconds",
+        "format", "seed", "kind", "seal_sha256", "sealed", "versions", "figures", "faults", "outcomes", "seconds",
     }  # fmt: skip
     assert content["figures"]["not_catalogued"]["abstained"]["share"] == 0.5
     assert content["seconds"] == {"median": 80.0, "max": 100.0, "worlds": {"04": 60.0, "05": 100.0}}
@@ -163,7 +164,7 @@ def test_tables_are_written_for_terminal_and_text(proof):
 
 def test_pictures_are_drawn_of_nothing_too(tmp_path, proof):
     nothing = figures_of(())
-    assert proof_page(Proof(seed=0, kind=None, seal="", outcomes=(), figures=nothing, versions={}))
+    assert proof_page(Proof(seed=0, kind=None, seal="", sealed=0, outcomes=(), figures=nothing, versions={}))
     with drawn():
         confusion_picture(proof.figures).savefig(tmp_path / "confusion.png")
     assert (tmp_path / "confusion.png").stat().st_size > 1000
