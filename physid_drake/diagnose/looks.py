@@ -127,8 +127,15 @@ def looks_at(wrenches: Sequence[MissingWrench], order: Array, phases: Sequence[s
             )
         return weights
 
-    def circle(times: float, angle: Array) -> tuple[Array, Array]:
-        return np.cos(times * angle), np.sin(times * angle)
+    def circle(angle: Array) -> tuple[Array, Array]:
+        return np.cos(angle), np.sin(angle)
+
+    def grain(angle: Array) -> Array:
+        """What a friction that is larger along one axis is more than its mean: it holds back, and draws aside."""
+        weights = np.zeros((n, 3, 2))
+        weights[:, 0, 0], weights[:, 1, 0] = acting * np.cos(2.0 * angle), acting * -np.sin(2.0 * angle)
+        weights[:, 0, 1], weights[:, 1, 1] = acting * np.sin(2.0 * angle), acting * np.cos(2.0 * angle)
+        return weights
 
     along, across, torque = range(3)
     force, motion, turn = DOFS[:2], DOFS[:1], DOFS[2:]
@@ -143,19 +150,19 @@ def looks_at(wrenches: Sequence[MissingWrench], order: Array, phases: Sequence[s
              words=lambda c: f"{_sense(c)} its turning"),
         Look(frame="world", dof=force, weights=fixed(np.zeros(n)),
              words=lambda c: f"towards {_degrees(c)} degrees on the table"),
-        Look(frame="world", dof=motion, weights=pattern(along, *circle(2.0, heading)),
-             words=lambda c: f"along the motion, most against it along {_axis(-c)} degrees on the table"),
+        Look(frame="world", dof=force, weights=grain(heading),
+             words=lambda c: f"against the motion, most along {_axis(-c)} degrees on the table, and aside"),
         Look(frame="world", dof=motion, weights=pattern(along, *centred(place).T),
              words=lambda c: f"along the motion, changing towards {_degrees(c)} degrees on the table"),
         Look(frame="object", dof=force, weights=fixed(yaw),
              words=lambda c: f"towards {_degrees(c)} degrees of the object"),
-        Look(frame="object", dof=motion, weights=pattern(along, *circle(2.0, heading - yaw)),
-             words=lambda c: "along the motion, by which side of the object leads"),
+        Look(frame="object", dof=force, weights=grain(heading - yaw),
+             words=lambda c: f"against the motion, most along {_axis(-c)} degrees of the object, and aside"),
         Look(frame="object", dof=turn, weights=pattern(torque, one),
              words=lambda c: f"as a torque to the {'left' if c[0] > 0.0 else 'right'}"),
-        Look(frame="object", dof=turn, weights=pattern(torque, *circle(1.0, heading - yaw)),
+        Look(frame="object", dof=turn, weights=pattern(torque, *circle(heading - yaw)),
              words=lambda c: "as a torque, by which side of the object leads"),
-        Look(frame="hand", dof=turn, weights=pattern(torque, *circle(1.0, heading)),
+        Look(frame="hand", dof=turn, weights=pattern(torque, *circle(heading)),
              words=lambda c: "as a torque, by where the push heads"),
         Look(frame="push_order", dof=motion, weights=pattern(along, centred(order)),
              words=lambda c: "along the motion, changing from push to push"),

@@ -62,12 +62,21 @@ def force(size, angle, m):
     return (size * np.cos(angle - m.heading), size * np.sin(angle - m.heading), 0.0)
 
 
+def grain(size, angle):
+    """The part of a friction that depends on the angle from its largest axis: -(1, 0) along it, (1, 0) across it."""
+    return (-size * np.cos(2.0 * angle), size * np.sin(2.0 * angle), 0.0)
+
+
 PLANTED = {
     "a pull of the table": (lambda m: force(0.03, 2.0, m), "world", "on the table"),
-    "a grain": (lambda m: (-0.05 * np.cos(2.0 * (m.heading - 0.5)), 0.0, 0.0), "world", "most against it along"),
+    "a grain": (lambda m: grain(0.05, m.heading - 0.5), "world", "degrees on the table, and aside"),
     "a slope of friction": (lambda m: (0.4 * m.place[0], 0.0, 0.0), "world", "changing towards"),
     "a pull of the object": (lambda m: force(0.03, m.yaw, m), "object", "degrees of the object"),
-    "a grain of the underside": (lambda m: (0.05 * np.cos(2.0 * (m.heading - m.yaw)), 0.0, 0.0), "object", "leads"),
+    "a grain of the underside": (
+        lambda m: grain(0.05, m.heading - m.yaw),
+        "object",
+        "degrees of the object, and aside",
+    ),
     "a centre off": (lambda m: (0.0, 0.0, 0.05 * np.sin(m.heading - m.yaw)), "object", "as a torque"),
     "a drag": (lambda m: (-0.3 * m.speed, 0.0, 0.0), "object_velocity", "against the motion, more so the faster"),
     "a rudder": (lambda m: (0.0, 0.03, 0.0), "object_velocity", "to the left of the motion"),
@@ -104,10 +113,17 @@ def test_the_direction_is_the_planted_one(size):
 
 
 def test_the_axis_of_a_grain_is_the_one_that_holds_back_most():
-    """Missing along the motion is -0.1 cos 2 (heading - 0.5) N: most against it at 0.5 rad."""
-    plain, wrenches = world(lambda m: (-0.1 * np.cos(2.0 * (m.heading - 0.5)), 0.0, 0.0))
-    words = locate(case(), plain, wrenches, np.random.default_rng(0)).statement
-    assert degrees_in(words, "against it along ") == pytest.approx(np.degrees(0.5), abs=8.0)
+    """Friction is (1 + d) m g along an axis at 0.5 rad and (1 - d) m g across it: a tensor times the heading."""
+    turn = np.array([[np.cos(0.5), -np.sin(0.5)], [np.sin(0.5), np.cos(0.5)]])
+    excess = -0.1 * turn @ np.diag([1.0, -1.0]) @ turn.T
+
+    def planted(m):
+        c, s = np.cos(m.heading), np.sin(m.heading)
+        fx, fy = excess @ (c, s)
+        return (c * fx + s * fy, c * fy - s * fx, 0.0)
+
+    words = locate(case(), *world(planted), np.random.default_rng(0)).statement
+    assert degrees_in(words, "most along ") == pytest.approx(np.degrees(0.5), abs=8.0)
 
 
 def test_the_slope_of_friction_is_the_planted_one():
