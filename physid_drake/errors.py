@@ -13,6 +13,10 @@ class ParameterError(PhysidError, ValueError):
     """A parameter or a point ``theta`` is outside its bounds, unknown, or of the wrong shape."""
 
 
+class TippedError(ParameterError):
+    """An object with such a centre of mass does not stand on its base."""
+
+
 class ConfigError(PhysidError, ValueError):
     """A configuration cannot be read; the message names the file and the key."""
 

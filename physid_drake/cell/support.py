@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
 from physid_drake.cell.outline import Disc, Outline, Polygon
-from physid_drake.errors import ParameterError
+from physid_drake.errors import TippedError
 
 Array = NDArray[np.float64]
 
@@ -290,7 +290,7 @@ def rest_depths(support: Support, p_BBcm: Array, mean_depth: float) -> tuple[Arr
         the weight. Points that would pull are let go; a centre of mass outside the base tips over and raises.
 
     Raises:
-        ParameterError: if the centre of mass is not above the base.
+        TippedError: if the centre of mass is not above the base.
     """
     basis = np.column_stack([np.ones(len(support.weights)), support.points])
     target = np.array([1.0, p_BBcm[0], p_BBcm[1]]) * mean_depth
@@ -304,6 +304,6 @@ def rest_depths(support: Support, p_BBcm: Array, mean_depth: float) -> tuple[Arr
         if np.array_equal(loaded, active):
             return plane, support.weights * active * (basis @ plane) / mean_depth
         active = loaded
-    raise ParameterError(
+    raise TippedError(
         f"the centre of mass must lie above the base, not at ({p_BBcm[0]:.4g}, {p_BBcm[1]:.4g}) m in B."
     )

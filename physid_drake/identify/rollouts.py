@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import Cell, Motion, Outcome
 from physid_drake.effects import Effect
 from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
+from physid_drake.errors import TippedError
 from physid_drake.identify.nuisance import Nuisance, apply_nuisance
 from physid_drake.identify.problem import CellSpec, PushProblem
 from physid_drake.identify.theta import ThetaMap
@@ -92,8 +93,11 @@ def _paced(spec: CellSpec, pace: float) -> CellSpec:
 
 
 def predict(spec: CellSpec, thetas: ThetaMap, task: Task) -> Prediction | None:
-    """What the rollout predicts at the recorded times; None if it diverged."""
-    motion = simulate(spec, thetas, task)
+    """What the rollout predicts at the recorded times; None if it diverged, or if the object could not stand."""
+    try:
+        motion = simulate(spec, thetas, task)
+    except TippedError:  # a fit may try such a centre of mass, and has to learn that it is no good
+        return None
     if motion.outcome is Outcome.DIVERGED:
         return None
     poses = tracked(motion, task.problem.times, task.effects)

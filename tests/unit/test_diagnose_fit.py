@@ -6,8 +6,9 @@ from runs import shipped_pushes
 
 from physid_drake.cell import CellConfig
 from physid_drake.diagnose import case_of
-from physid_drake.diagnose.fit import Fitter
+from physid_drake.diagnose.fit import FAILED, Fitter
 from physid_drake.diagnose.plain import coarse
+from physid_drake.effects.body import ComOffset
 from physid_drake.identify.config import ThetaConfig
 
 
@@ -30,3 +31,14 @@ def test_unknowns_are_released_although_holding_them_had_nothing_more_to_gain(fi
     fitted = fitter.fit(fitter.start(theta), rounds=6, careful=3, renew=True)
     assert fitted.score > held.score + 10.0
     assert max(np.abs(own).max() for own in fitted.state.own) > 0.01
+
+
+def test_a_centre_of_mass_beside_the_base_is_a_failed_rollout_and_ends_nothing(fitter):
+    """A fit may try one on its way."""
+    state = fitter.start(np.full(3, 0.5))
+    size = float(fitter.case.around.size[0])
+    stands, tips = (
+        fitter.vectors([fitter.task(state, 0, effects=[ComOffset(x=share * size)])])[0] for share in (0.1, 0.7)
+    )
+    assert np.all(tips == FAILED)
+    assert np.abs(stands - fitter.case.features[0].recorded).max() < 0.1 * FAILED
