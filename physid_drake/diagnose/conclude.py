@@ -244,7 +244,8 @@ def _why(name: str, candidate: Candidate | None, named: set[str], classes: set[s
         return "its fit ran to nothing"
     if not candidate.accepted:
         return "pushes that were left out do not confirm it"
-    return "predicts pushes that were left out worse"
+    worse = "predicts pushes that were left out worse"
+    return worse if named else "pushes that were left out confirm it, but it leaves more than noise"
 
 
 def _why_not_fitted(name: str, evidence: Evidence) -> str:

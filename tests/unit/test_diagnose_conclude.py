@@ -75,3 +75,15 @@ def test_what_is_not_confirmed_or_takes_little_away_is_not_worth_a_word(rejected
     told = evidence()
     assert "nothing in the catalogue accounts for it" in conclude._sentence("unexplained", (), None)
     assert conclude._left(told, told.plain, None).endswith("is viscous_drag, which does not account for it")
+
+
+@pytest.mark.parametrize(
+    ("named", "gain", "why"),
+    [
+        (set(), 50.0, "pushes that were left out confirm it, but it leaves more than noise"),
+        ({"magnet"}, 50.0, "predicts pushes that were left out worse"),
+        ({"magnet"}, -1.0, "pushes that were left out do not confirm it"),
+    ],
+)
+def test_why_an_effect_that_was_fitted_is_not_what_is_missing(named, gain, why):
+    assert conclude._why("viscous_drag", tried("viscous_drag", gain, None), named, set(), None) == why
