@@ -58,7 +58,7 @@ MEANING = {
 
 # A bounce is caught up by the hand and grows with the square; a soft tip rings with the root of its
 # compliance, and its re-contacts come and go: signatures are there, but straight only over shorter ways.
-CURVED = ("restitution", "hand_compliance")
+CURVED = ("hand_compliance",)
 
 every_effect = pytest.mark.parametrize("kind", CATALOGUE, ids=lambda kind: kind.name)
 
