@@ -14,14 +14,13 @@ from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.confirm import (
     EXPLAINED,
     Candidate,
-    left_out_residuals,
     out_of_question,
     push_scores,
     rivals,
     standard_error,
 )
 from physid_drake.diagnose.estimates import parameters_of, rms, smallest, theta_of
-from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, mismatch, unexplained
+from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, confirmed, mismatch, unexplained
 from physid_drake.diagnose.looks import locate
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import regime_gains
@@ -170,43 +169,49 @@ def _findings(evidence: Evidence) -> tuple[EffectFinding, ...]:
 
 def _partly(evidence: Evidence) -> Partly | None:
     """The effects that were added, or the best one that left-out pushes confirm, if they take a good part away."""
-    confirmed = [c for c in evidence.rejected if c.accepted]
-    if evidence.steps:
-        model, names = evidence.final, tuple(step[0].name for step in evidence.steps)
-    elif confirmed:
-        model, names = confirmed[0].fitted, (confirmed[0].name,)
-    else:
+    found = confirmed(evidence.steps, evidence.rejected, evidence.final)
+    if found is None:
         return None
-    (before, _, _), (left, position, rotation) = (_left_out(evidence.case, m) for m in (evidence.nearest, model))
-    share = 1.0 - (rms(left) / rms(before)) ** 2
+    names, model = found
+    before, after = (_errors(evidence.case, e) for e in (evidence.errors_before, evidence.errors_after))
+    share = 1.0 - (after.rms / before.rms) ** 2
     if share < GOOD_PART:
         return None
     return Partly(
-        effects=names, share=share, position=position, rotation=rotation, reduced_chi2=model.reduced_chi2
+        effects=names, share=share, position=after.position, rotation=after.rotation, reduced_chi2=model.reduced_chi2
     )  # fmt: skip
 
 
-def _left_out(case: Case, fitted: Fitted) -> tuple[Array, float, float]:
-    """Errors (w, 3) of pushes left out in standard deviations, and root mean squares of place and yaw [m, rad]."""
-    poses = [f.poses(r) for f, r in zip(case.features, left_out_residuals(fitted), strict=True)]
-    scaled = np.concatenate([p / f.sigmas for p, f in zip(poses, case.features, strict=True)])
+@dc.dataclass(frozen=True, kw_only=True)
+class _Errors:
+    """Of pushes left out: root mean squares in standard deviations (of each push too), of place and yaw [m, rad]."""
+
+    rms: float
+    per_push: tuple[float, ...]
+    position: float
+    rotation: float
+
+
+def _errors(case: Case, residuals: Sequence[Array]) -> _Errors:
+    poses = [f.poses(r) for f, r in zip(case.features, residuals, strict=True)]
+    scaled = [p / f.sigmas for p, f in zip(poses, case.features, strict=True)]
     every = np.concatenate(poses)
-    return scaled, math.sqrt(2.0) * rms(every[:, :2]), rms(every[:, 2])
+    return _Errors(
+        rms=rms(np.concatenate(scaled)), per_push=tuple(rms(s) for s in scaled),
+        position=math.sqrt(2.0) * rms(every[:, :2]), rotation=rms(every[:, 2]),
+    )  # fmt: skip
 
 
 def _quality(evidence: Evidence, after: Fitted) -> FitQuality:
     case, plain = evidence.case, evidence.plain
     gains = push_scores(after) - push_scores(plain)
-    (sigmas0, position0, rotation0), (sigmas1, position1, rotation1) = (
-        _left_out(case, fitted) for fitted in (evidence.nearest, evidence.nearest if after is plain else after)
-    )
-    ends = np.cumsum([len(f.middles) for f in case.features])[:-1]
-    per_push = [[rms(own) for own in np.split(sigmas, ends)] for sigmas in (sigmas0, sigmas1)]
+    left_out = (evidence.errors_before, evidence.errors_before if after is plain else evidence.errors_after)
+    old, new = (_errors(case, residuals) for residuals in left_out)
     return FitQuality(
-        rms_before=rms(sigmas0), rms_after=rms(sigmas1), position_before=position0, position_after=position1,
-        rotation_before=rotation0, rotation_after=rotation1,
+        rms_before=old.rms, rms_after=new.rms, position_before=old.position, position_after=new.position,
+        rotation_before=old.rotation, rotation_after=new.rotation,
         log_score_gain=float(gains.sum()), log_score_gain_se=standard_error(gains) if len(gains) > 1 else 0.0,
-        per_push=tuple((p.name, b, a) for p, b, a in zip(case.problems, *per_push, strict=True)),
+        per_push=tuple((p.name, b, a) for p, b, a in zip(case.problems, old.per_push, new.per_push, strict=True)),
         regimes=() if after is plain else regime_gains(case, plain, after),
     )  # fmt: skip
 

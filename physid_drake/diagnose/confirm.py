@@ -113,15 +113,6 @@ def push_scores(fitted: Fitted, folds: Sequence[Sequence[int]] | None = None) ->
     return scores - fitted.tolerance_cost / len(scores)
 
 
-def left_out_residuals(fitted: Fitted) -> tuple[Array, ...]:
-    """Recorded less predicted (m_i,) of each push, by the model as it leaves, fitted without that push."""
-    tolerances = len(fitted.prior_mean) - fitted.own_dimension
-    _, residuals = left_out_scores(
-        fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std, tolerances=tolerances
-    )
-    return residuals
-
-
 def confirm(
     fitter: Fitter, before: Fitted, scores: Sequence[Score], tick: Tick, *, most: int
 ) -> tuple[Candidate, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses as dc
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,8 @@ class Evidence:
         steps: one per accepted effect: all candidates of that step.
         rejected: candidates of a step in which none was accepted.
         final: the model at the end.
+        errors_before: per push (m,), recorded less what ``nearest`` predicts, fitted without that push.
+        errors_after: the same with the effects of ``confirmed``; those before where there are none.
         remaining: screening of what it leaves.
         wrenches: what is missing from the plain cell, window by window.
         next_push: that would tell the rivals apart.
@@ -62,11 +64,23 @@ class Evidence:
     steps: tuple[tuple[Candidate, ...], ...]
     rejected: tuple[Candidate, ...]
     final: Fitted
+    errors_before: tuple[Array, ...]
+    errors_after: tuple[Array, ...]
     remaining: Screening
     wrenches: tuple[MissingWrench, ...] = ()
     next_push: NextPush | None = None
     noise_share: float = 1.0
     detected: float | None = None
+
+
+def confirmed(
+    steps: Sequence[Sequence[Candidate]], rejected: Sequence[Candidate], final: Fitted
+) -> tuple[tuple[str, ...], Fitted] | None:
+    """The effects that were added, or the best rejected one that pushes left out confirm; with their model."""
+    if steps:
+        return tuple(step[0].name for step in steps), final
+    accepted = [c for c in rejected if c.accepted]
+    return ((accepted[0].name,), accepted[0].fitted) if accepted else None
 
 
 def mismatch(fitted: Fitted, screening: Screening | None) -> float:

@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, own_unknowns, solve
+from physid_drake.diagnose.linear import (
+    LinearPush,
+    Whitened,
+    best_scatter,
+    left_out_scores,
+    own_unknowns,
+    solve,
+)
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.effects import Effect
 from physid_drake.identify.rollouts import Prediction, Task
@@ -334,9 +341,18 @@ class Fitter:
                 break
         return best
 
-    def stepped(self, fitted: Fitted, share: float = 1.0) -> State:
-        """The state after a Gauss-Newton step."""
-        state, beta = fitted.state, share * fitted.solution.beta
+    def left_out(self, fitted: Fitted) -> tuple[Array, ...]:
+        """Recorded less predicted (m_i,) of each push, simulated by the model as it leaves, fitted without that push.
+
+        Nothing of the push itself is known to the prediction but the start of the object and the hand's path.
+        """
+        _, betas = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std)
+        states = [self.start(*self._moved(fitted.state, beta)) for beta in betas]
+        predicted = self.vectors([self.task(state, i) for i, state in enumerate(states)])
+        return tuple(f.recorded - p for f, p in zip(self.case.features, predicted, strict=True))
+
+    def _moved(self, state: State, beta: Array) -> tuple[Array, tuple[EffectPoint, ...]]:
+        """Theta (d,) and the effects of a state, moved by beta, no further than a step goes."""
         d = len(state.u)
         u = np.clip(state.u + np.clip(beta[:d], -MOST_THETA_MOVE, MOST_THETA_MOVE), 1e-3, 1.0 - 1e-3)
         effects, at = [], d
@@ -345,11 +361,17 @@ class Fitter:
             longest = np.array([e.chart(self.case)[j].std for j in e.free])
             effects.append(e.moved(self.case, np.clip(beta[at : at + len(e.free)], -longest, longest)))
             at += len(e.free)
+        return u, tuple(effects)
+
+    def stepped(self, fitted: Fitted, share: float = 1.0) -> State:
+        """The state after a Gauss-Newton step."""
+        state = fitted.state
+        u, effects = self._moved(state, share * fitted.solution.beta)
         own = []
         for i, (push, old) in enumerate(zip(fitted.pushes, state.own, strict=True)):
             new = own_unknowns(push, state.scatter, fitted.solution.beta)[: len(old)]
             own.append(self._within(i, old + share * (new - old)))
-        return State(u=u, effects=tuple(effects), own=tuple(own), scatter=state.scatter)
+        return State(u=u, effects=effects, own=tuple(own), scatter=state.scatter)
 
 
 def actual_cost(fitted: Fitted) -> float:

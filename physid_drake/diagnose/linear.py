@@ -148,8 +148,7 @@ def left_out_scores(
     prior_mean: Array,
     prior_std: Array,
     folds: Sequence[Sequence[int]] | None = None,
-    tolerances: int = 0,
-) -> tuple[Array, tuple[Array, ...]]:
+) -> tuple[Array, Array]:
     """Predict pushes by a fit to those of the other folds.
 
     Args:
@@ -158,26 +157,23 @@ def left_out_scores(
         prior_mean: (d,) of beta.
         prior_std: (d,).
         folds: indices of pushes that are left out together; None leaves out one at a time.
-        tolerances: how many of beta's last entries are tolerances, which are not part of the model that leaves.
 
     Returns:
-        (n,) log predictive densities, and the residuals (m_i,) of the predictions with the push's unknowns and the
-        tolerances at zero.
+        (n,) log predictive densities, and (n, d) the beta by which each push was predicted.
     """
     pieces = [_information(push, scatter) for push in pushes]
     information = sum((p[0] for p in pieces), np.diag(1.0 / prior_std**2))
     right = sum((p[1] for p in pieces), prior_mean / prior_std**2)
     ridge = 1e-10 * np.trace(information) * np.eye(len(right))
     scores = np.zeros(len(pushes))
-    residuals: list[Array] = [np.zeros(0)] * len(pushes)
+    betas = np.zeros((len(pushes), len(right)))
     for fold in folds or [(i,) for i in range(len(pushes))]:
         others = information - sum(pieces[i][0] for i in fold) + ridge
         beta = np.linalg.solve(others, right - sum(pieces[i][1] for i in fold))
-        model = np.concatenate([beta[: len(beta) - tolerances], np.zeros(tolerances)])
         for i in fold:
             scores[i] = _log_density(pushes[i], scatter, beta, others)
-            residuals[i] = pushes[i].residual - pushes[i].shared @ model
-    return scores, tuple(residuals)
+            betas[i] = beta
+    return scores, betas
 
 
 def _information(push: LinearPush, scatter: float) -> tuple[Array, Array]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.conclude import class_of, conclude
 from physid_drake.diagnose.confirm import (
+    A_LAW,
     EXPLAINED,
     WORTH_A_TRY,
     Candidate,
@@ -20,7 +21,7 @@ from physid_drake.diagnose.confirm import (
     rejudged,
     worthwhile,
 )
-from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, mismatch
+from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, confirmed, mismatch
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
 from physid_drake.diagnose.loudness import as_loud_as_left, quieter
@@ -100,9 +101,14 @@ def _on_short_ticks(answer: _Answer, tick: Tick) -> Evidence:
     refined = fine.refine(plain)
     final = fine.refine(model) if grown.steps else refined
     closest = nearest(fitter.case, case, plain)
+    tick("pushes left out", 0, 0)
+    before = after = fine.left_out(closest or refined)
+    best = confirmed(grown.steps, grown.rejected, final)
+    if best is not None:
+        after = (fine if grown.steps else fitter).left_out(best[1])
     case.pool.count += fitter.case.pool.count
     return Evidence(
-        case=case, fitter=fine, plain=refined, nearest=closest or refined,
+        case=case, fitter=fine, plain=refined, nearest=closest or refined, errors_before=before, errors_after=after,
         screening=grown.base.screening, signatures=grown.base.signatures,
         steps=grown.steps, rejected=grown.rejected, final=final, remaining=grown.last.screening,
         noise_share=answer.noise_share, detected=answer.detected,
@@ -218,7 +224,7 @@ def _grown(
                     continue
                 base = last = _Looked.at(better, base.signatures, rng)
                 candidates = rejudged(candidates, better)
-        added = _worth_adding(last.fitted, candidates)
+        added = _worth_adding(base.fitted, last.fitted, candidates)
         if added:
             steps.append(added)
             state = added[0].fitted.state
@@ -240,13 +246,17 @@ def _grown(
     return _Grown(base=base, last=last, steps=tuple(steps), rejected=rejected)
 
 
-def _worth_adding(before: Fitted, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """The candidates, the one to add first: the simplest of the best, or the best; none where neither will do."""
+def _worth_adding(base: Fitted, last: Fitted, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """The candidates, the one to add first: the simplest of the best, or the best; none where neither will do.
+
+    What is a hundredth of what the effects before it explain may be no more than the error of their laws.
+    """
     if not candidates:
         return ()
+    least = A_LAW * float((push_scores(last) - push_scores(base)).sum())
     best = max((c for c in candidates if not c.degenerate), key=lambda c: c.gain, default=candidates[0])
     for one in (candidates[0], best):
-        if worthwhile(before, one):
+        if worthwhile(last, one) and one.gain > least:
             return (one, *(c for c in candidates if c is not one))
     return ()
 

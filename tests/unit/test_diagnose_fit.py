@@ -1,5 +1,7 @@
 """Gauss-Newton on pushes: the rounds in which the pushes' unknowns are held, and those after."""
 
+import dataclasses as dc
+
 import numpy as np
 import pytest
 from runs import shipped_pushes
@@ -42,3 +44,15 @@ def test_a_centre_of_mass_beside_the_base_is_a_failed_rollout_and_ends_nothing(f
     )
     assert np.all(tips == FAILED)
     assert np.abs(stands - fitter.case.features[0].recorded).max() < 0.1 * FAILED
+
+
+def test_a_push_that_is_left_out_does_not_tell_its_own_prediction(fitter):
+    def predictions(one):
+        fitted = one.linearise(one.start(np.full(3, 0.5)), learn_scatter=False)
+        return [f.recorded - e for f, e in zip(one.case.features, one.left_out(fitted), strict=True)]
+
+    first, *others = fitter.case.features
+    elsewhere = dc.replace(first, recorded=first.recorded + 5.0)
+    told = Fitter(dc.replace(fitter.case, features=(elsewhere, *others)))
+    for i, (before, after) in enumerate(zip(predictions(fitter), predictions(told), strict=True)):
+        assert np.allclose(before, after, atol=1e-6) == (i == 0)

@@ -57,19 +57,30 @@ def tried(name, gains, *, coordinates=1, chi2=1.0, degenerate=False):
     )  # fmt: skip
 
 
-def test_the_best_is_added_where_the_simpler_one_leaves_too_much():
-    before = SimpleNamespace(reduced_chi2=6.0)
+@pytest.fixture
+def before(monkeypatch):
+    monkeypatch.setattr(story, "push_scores", lambda one: one.scores)
+    return SimpleNamespace(reduced_chi2=6.0, scores=np.zeros(8))
+
+
+def test_the_best_is_added_where_the_simpler_one_leaves_too_much(before):
     simple, best = tried("table_tilt", [49.0] * 8, chi2=5.5), tried("tether", [50.0] * 8, coordinates=4, chi2=2.0)
-    assert [c.name for c in story._worth_adding(before, (simple, best))] == ["tether", "table_tilt"]
+    assert [c.name for c in story._worth_adding(before, before, (simple, best))] == ["tether", "table_tilt"]
     enough = tried("table_tilt", [49.0] * 8, chi2=2.2)
-    assert [c.name for c in story._worth_adding(before, (enough, best))] == ["table_tilt", "tether"]
+    assert [c.name for c in story._worth_adding(before, before, (enough, best))] == ["table_tilt", "tether"]
 
 
-def test_nothing_is_added_that_pushes_do_not_confirm():
-    before = SimpleNamespace(reduced_chi2=6.0)
+def test_nothing_is_added_that_pushes_do_not_confirm(before):
     lost = tried("magnet", [50.0] * 8, degenerate=True)
-    assert story._worth_adding(before, (tried("table_tilt", [-1.0] * 8), lost)) == ()
-    assert story._worth_adding(before, ()) == ()
+    assert story._worth_adding(before, before, (tried("table_tilt", [-1.0] * 8), lost)) == ()
+    assert story._worth_adding(before, before, ()) == ()
+
+
+@pytest.mark.parametrize(("explained", "added"), [(7000.0, True), (9000.0, False)])
+def test_what_the_law_of_a_large_effect_may_be_wrong_by_is_no_second_one(before, explained, added):
+    base = SimpleNamespace(reduced_chi2=60.0, scores=np.full(8, -explained / 8.0))
+    small = tried("magnet", [10.0] * 8)
+    assert bool(story._worth_adding(base, before, (small,))) == added
 
 
 def names_of(grown):
