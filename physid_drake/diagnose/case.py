@@ -118,7 +118,7 @@ def case_of(
     )
     _refuse_still(recording, problems, noise)
     thetas = theta_map(
-        recording.object, solid.outline, (config.friction_cells[0], config.friction_cells[1]), theta,
+        recording.object, solid, (config.friction_cells[0], config.friction_cells[1]), theta,
         config.default_mass_kg,
     )  # fmt: skip
     pushes = recording.pushes

@@ -33,6 +33,7 @@ SEARCHES: Final[Mapping[str, Callable[[], Search]]] = {
 }
 METHODS: Final = (GREEDY, RANDOM, LEAST_SQUARES, ENTROPY)
 CANDIDATES: Final = 1000
+AS_IN_THE_PAPER: Final = ThetaConfig(bounds={"mass": [0.1, 0.9]})  # kg
 _STEP = 0.01  # of the unit cube, for differences
 _FAILED = 1e3  # standard deviations
 
@@ -86,13 +87,13 @@ class Learner:
         Args:
             recording: the pushes.
             tick_s: of the cell [s].
-            theta: what is unknown; mass and both frictions if None.
+            theta: what is unknown; mass, within the paper's bounds, and both frictions if None.
             config: of the cell, instead of the default with that tick.
         """
         solver = SolverConfig(time_step_s=tick_s, slide_time_step_s=max(tick_s, 2e-3))
         self.config = config or CellConfig(solver=solver)
         identifier = Identifier(
-            recording, cell=self.config, theta=theta or ThetaConfig(), search=SearchConfig(jobs=1),
+            recording, cell=self.config, theta=theta or AS_IN_THE_PAPER, search=SearchConfig(jobs=1),
             held_out_share=0.0, seed=0,
         )  # fmt: skip
         self.problems: tuple[PushProblem, ...] = identifier.problems

@@ -155,7 +155,7 @@ class Identifier:
         self.noise = noise_of(recording)
         self.problems = problems_of(recording, self.noise, solid.height)
         free = theta_map(
-            recording.object, solid.outline, (cell.friction_cells[0], cell.friction_cells[1]), theta,
+            recording.object, solid, (cell.friction_cells[0], cell.friction_cells[1]), theta,
             cell.default_mass_kg,
         )  # fmt: skip
         self.thetas = tied_cells(free, solid.outline, theta)

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import Body
-from physid_drake.cell.outline import Outline
+from physid_drake.cell.solid import Solid
 from physid_drake.errors import ConfigError
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.recording import ObjectModel
 from physid_drake.space import Parameter, ParameterSpace
 
 Array = NDArray[np.float64]
+
+UNWEIGHED = 0.8  # standard deviation of the logarithm of a mass that nobody weighed
+LIGHTEST, HEAVIEST = 20.0, 8000.0  # kg/m^3 of the box around an object: foam, steel
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -61,13 +65,13 @@ def friction_names(cells: tuple[int, int]) -> list[str]:
 
 
 def theta_map(
-    model: ObjectModel, outline: Outline, cells: tuple[int, int], config: ThetaConfig, default_mass: float
+    model: ObjectModel, solid: Solid, cells: tuple[int, int], config: ThetaConfig, default_mass: float
 ) -> ThetaMap:
     """The parameter space of a recording's object.
 
     Args:
         model: the recorded object; a mass that a scale gave is its prior.
-        outline: of the object, which bounds its centre of mass.
+        solid: its shape, which bounds its centre of mass and its mass.
         cells: friction cells.
         config: the choice of parameters.
         default_mass: nominal mass where the recording gives none [kg].
@@ -75,7 +79,7 @@ def theta_map(
     Raises:
         ConfigError: if a name is unknown or bounds are not a pair.
     """
-    known = _catalogue(model, outline, cells, default_mass)
+    known = _catalogue(model, solid, cells, default_mass, config.bounds.get("mass"))
     for name in [*config.parameters, *config.bounds, *config.nominal]:
         if name not in known and name != "support_friction":
             raise ConfigError(f"theta: there is no parameter '{name}'; known are {', '.join(known)}.")
@@ -103,9 +107,13 @@ def _adjusted(parameter: Parameter, config: ThetaConfig) -> Parameter:
 
 
 def _catalogue(
-    model: ObjectModel, outline: Outline, cells: tuple[int, int], default_mass: float
+    model: ObjectModel,
+    solid: Solid,
+    cells: tuple[int, int],
+    default_mass: float,
+    mass_bounds: Sequence[float] | None,
 ) -> dict[str, Parameter]:
-    x0, y0, x1, y1 = outline.extent()
+    x0, y0, x1, y1 = solid.outline.extent()
     friction = [
         Parameter(
             name=name, unit="-", lower=0.02, upper=1.2, prior_mean=0.3, scale="log",
@@ -132,16 +140,19 @@ def _catalogue(
         Parameter(name="restitution", unit="-", lower=0.0, upper=0.9, prior_mean=0.0,
                   description="restitution between hand and object"),
     ]  # fmt: skip
-    everything = [_mass(model, default_mass), hand, *friction, *com, *rest]
+    everything = [_mass(model, solid, default_mass, mass_bounds), hand, *friction, *com, *rest]
     return {parameter.name: parameter for parameter in everything}
 
 
-def _mass(model: ObjectModel, default: float) -> Parameter:
-    """A weighed mass is known to its standard deviation; else the paper's bounds of 0.1 to 0.9 kg, or around it."""
+def _mass(model: ObjectModel, solid: Solid, default: float, bounds: Sequence[float] | None) -> Parameter:
+    """A weighed mass is as well known as the scale says; any other to its order, from foam to steel."""
     if model.mass is not None and model.mass_std is not None:
         share = model.mass_std / model.mass
         reach = max(1.1, math.exp(6.0 * share))
         return Parameter(name="mass", unit="kg", lower=model.mass / reach, upper=model.mass * reach,
                          prior_mean=model.mass, prior_std=share, scale="log", description="mass")  # fmt: skip
-    return Parameter(name="mass", unit="kg", lower=min(0.1, 0.5 * default), upper=max(0.9, 2.0 * default),
-                     prior_mean=default, scale="log", description="mass")  # fmt: skip
+    x0, y0, x1, y1 = solid.outline.extent()
+    volume = (x1 - x0) * (y1 - y0) * solid.height
+    return Parameter(name="mass", unit="kg", lower=min(0.5 * default, LIGHTEST * volume),
+                     upper=max(2.0 * default, HEAVIEST * volume), prior_mean=default,
+                     prior_std=None if bounds else UNWEIGHED, scale="log", description="mass")  # fmt: skip

@@ -7,6 +7,7 @@ import pytest
 
 from physid_drake.belief import Belief
 from physid_drake.cell.outline import rectangle
+from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError, ParameterError
 from physid_drake.identify import ThetaConfig
 from physid_drake.identify.cells import LEVEL_STD, cells_told, tied_cells
@@ -22,8 +23,8 @@ OUTLINE = rectangle(0.12, 0.06)
 
 def tied(cells, *parameters, **config):
     given = ThetaConfig(parameters=list(parameters or ("support_friction",)), **config)
-    model = ObjectModel(shape=Box(size=(0.12, 0.06, 0.03)))
-    return tied_cells(theta_map(model, OUTLINE, cells, given, 0.3), OUTLINE, given)
+    shape = Box(size=(0.12, 0.06, 0.03))
+    return tied_cells(theta_map(ObjectModel(shape=shape), solid_of(shape), cells, given, 0.3), OUTLINE, given)
 
 
 # The prior.
@@ -45,7 +46,7 @@ def test_without_a_grid_nothing_is_tied_and_others_stay_as_they_are():
     space = tied((2, 1), "mass", "support_friction", "com_x").space
     matrix = np.array(space.correlation)
     np.testing.assert_array_equal(matrix[[0, 3]], np.eye(4)[[0, 3]])
-    assert space.parameters[0].prior_std is None
+    assert space.parameters[0] == tied((1, 1), "mass").space.parameters[0]
 
 
 def test_drawn_frictions_have_the_correlation_asked_for_and_stay_inside():
@@ -127,7 +128,7 @@ def test_pushes_that_feel_only_the_sum_tell_one_combination_with_its_singular_va
 
 
 def test_mass_and_friction_of_which_a_force_tells_the_product_vary_against_one_another():
-    thetas = tied((1, 1), "mass", "support_friction")
+    thetas = tied((1, 1), "mass", "support_friction", bounds={"mass": [0.1, 0.9]})
     strength = 30.0
     a, b = strength * np.log(thetas.space.upper / thetas.space.lower)  # of ln m + ln mu, in the unit cube
     flat = 12.0  # information of a uniform prior there

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from physid_drake.cell.outline import rectangle
+from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError, ParameterError
 from physid_drake.identify import ThetaConfig
 from physid_drake.identify.theta import friction_names, theta_map
@@ -11,12 +11,12 @@ from physid_drake.recording import Box, ObjectModel
 
 SHAPE = Box(size=(0.12, 0.05, 0.03))
 WEIGHED = ObjectModel(shape=SHAPE, mass=0.054, mass_std=0.001)
-OUTLINE = rectangle(0.12, 0.05)
+SOLID = solid_of(SHAPE)
 
 
 def thetas(*parameters, model=None, cells=(1, 1), bounds=None, nominal=None, mass=0.3):
     config = ThetaConfig(parameters=list(parameters), bounds=bounds or {}, nominal=nominal or {})
-    return theta_map(model or ObjectModel(shape=SHAPE), OUTLINE, cells, config, mass)
+    return theta_map(model or ObjectModel(shape=SHAPE), SOLID, cells, config, mass)
 
 
 ALL = ("mass", "hand_friction", "support_friction", "com_x", "com_y", "inertia_ratio", "static_ratio", "restitution")
@@ -92,13 +92,20 @@ def test_a_weighed_mass_is_known_to_the_scale():
     assert mass.upper > 0.054 + 4 * 0.001
 
 
-def test_an_unweighed_mass_has_the_papers_bounds_and_no_prior():
+def test_an_unweighed_mass_is_known_to_its_order_and_lies_between_foam_and_steel():
     mass = thetas("mass").space.parameters[0]
-    assert (mass.lower, mass.upper, mass.prior_mean, mass.prior_std) == (0.1, 0.9, 0.3, None)
+    volume = 0.12 * 0.05 * 0.03
+    assert (mass.lower, mass.upper) == pytest.approx((20.0 * volume, 8000.0 * volume))
+    assert (mass.prior_mean, mass.prior_std) == (0.3, 0.8)
     heavy = thetas("mass", mass=2.0).space.parameters[0]
     assert heavy.lower < 2.0 < heavy.upper
-    light = thetas("mass", mass=0.05).space.parameters[0]
-    assert light.lower < 0.05 < light.upper
+    light = thetas("mass", mass=0.003).space.parameters[0]
+    assert light.lower < 0.003 < light.upper
+
+
+def test_bounds_that_are_asked_for_are_all_that_is_known_of_an_unweighed_mass():
+    mass = thetas("mass", bounds={"mass": [0.1, 0.9]}).space.parameters[0]
+    assert (mass.lower, mass.upper, mass.prior_mean, mass.prior_std) == (0.1, 0.9, 0.3, None)
 
 
 def test_the_centre_of_mass_stays_inside_the_outline():
@@ -156,7 +163,7 @@ def test_bounds_and_nominal_that_make_no_parameter_are_refused_by_name(bounds, n
 @pytest.mark.parametrize("theta", [[0.05], [0.95], [float("nan")], [0.3, 0.3]])
 def test_a_point_outside_the_bounds_makes_no_body(theta):
     with pytest.raises(ParameterError):
-        thetas("mass").body(np.array(theta))
+        thetas("mass", bounds={"mass": [0.1, 0.9]}).body(np.array(theta))
 
 
 def test_no_parameters_are_no_space():
