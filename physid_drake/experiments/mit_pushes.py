@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.cell import CellConfig, HandPath, SolverConfig
+from physid_drake.cell import CellConfig, SolverConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.cell.support import FrictionGrid, support_of
 from physid_drake.effects.body import UnevenSupport
@@ -311,7 +311,7 @@ def played(problem: PushProblem, speed: float) -> PushProblem:
     end = problem.end / factor + SETTLING
     return dc.replace(
         problem, begin=problem.begin / factor, end=end, times=np.array([end]),
-        path=HandPath(times=path.times / factor, velocities=path.velocities * factor, start=path.start),
+        path=dc.replace(path, times=path.times / factor, velocities=path.velocities * factor),
     )  # fmt: skip
 
 

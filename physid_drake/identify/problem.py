@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import CellConfig, HandPath, Start
-from physid_drake.cell.hand_path import fit_hand_path, stream_std
+from physid_drake.cell.hand_fit import fit_hand_paths, stream_std
 from physid_drake.errors import RecordingError
 from physid_drake.recording import Cylinder as CylinderShape
 from physid_drake.recording import Hand, NoiseEstimate, Push, Recording, Shape, estimate_noise, rest_segments
@@ -155,15 +155,15 @@ def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[Push
     Raises:
         RecordingError: if the hand passes above the object or an object cannot be compared.
     """
-    return tuple(_problem(recording, k, noise, height) for k in range(len(recording.pushes)))
+    hands = {k: push.hand for k, push in enumerate(recording.pushes) if push.hand is not None}
+    fitted = fit_hand_paths([(hand.times, hand.positions[:, :2]) for hand in hands.values()], noise.hand)
+    paths = dict(zip(hands, fitted, strict=True))
+    return tuple(_problem(recording, k, paths.get(k), noise, height) for k in range(len(recording.pushes)))
 
 
-def _problem(recording: Recording, order: int, noise: Noise, height: float) -> PushProblem:
+def _problem(recording: Recording, order: int, path: HandPath | None, noise: Noise, height: float) -> PushProblem:
     push = recording.pushes[order]
     planar = push.object.planar
-    path = None
-    if push.hand is not None:
-        path = fit_hand_path(push.hand.times, push.hand.positions[:, :2], noise.hand)
     start, start_std, first = _start_of(push, planar, noise, free=path is None)
     begin = float(push.object.times[0] if first == 0 else push.object.times[first])
     compared = (

@@ -39,6 +39,8 @@ _SHAPE_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "mesh": ("file", "scale"),
 }
 _TOP_KEYS: Final = ("format", "name", "description", "object", "table", "hand", "sensors", "pushes")
+_TEXT_KEYS: Final = ("name", "description", "file", "note")
+_LOOKS: Final = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("int", "float", "bool", "timestamp"))
 _SENSOR_KEYS: Final = ("object_position_std", "object_rotation_std", "hand_position_std", "force_std")
 _SENSOR_UNITS: Final = ("_m", "_rad", "_m", "_n")
 
@@ -50,7 +52,7 @@ class _Loader(yaml.SafeLoader):
 
 
 class Dumper(yaml.SafeDumper):
-    """Quotes a text that ``_Loader`` would read as a number: a name like ``66e70658``."""
+    """Quotes a text that other readers would take for a number: a name like ``66e70658``."""
 
 
 for _resolves in (_Loader, Dumper):
@@ -114,7 +116,7 @@ class Section:
         """A text; ``default`` where it is absent, required where that is None."""
         if default is not None and not self.has(key):
             return default
-        return self.get(key, "text (in quotes if it looks like a number)", _as_text)
+        return self.get(key, "text", _as_text)
 
     def choice(self, key: str, *choices: str) -> str:
         """One of some words."""
@@ -149,10 +151,12 @@ def load_description(folder: Path) -> Section:
     file = folder / DESCRIPTION_FILE
     text = read_text(file)
     try:
-        node = yaml.compose(text, Loader=_Loader)
+        loader = _Loader(text)
+        node = loader.get_single_node()
         lines: dict[str, int] = {}
         _number_lines(file, node, "", lines)
-        values = yaml.load(text, Loader=_Loader)
+        _keep_texts(node)
+        values = None if node is None else loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = mark.line + 1 if mark is not None else 1
@@ -311,6 +315,18 @@ def _number_lines(file: Path, node: yaml.Node | None, path: str, lines: dict[str
             seen.add(key.value)
             lines[inner] = line
             _number_lines(file, child, inner, lines)
+
+
+def _keep_texts(node: yaml.Node | None) -> None:
+    """Keeps a name as it was written where it looks like a number, a date or a truth value: ``12345678``, ``3e8``."""
+    if isinstance(node, yaml.SequenceNode):
+        for child in node.value:
+            _keep_texts(child)
+    elif isinstance(node, yaml.MappingNode):
+        for key, child in node.value:
+            if key.value in _TEXT_KEYS and child.tag in _LOOKS:
+                child.tag = "tag:yaml.org,2002:str"
+            _keep_texts(child)
 
 
 def _shown(value: object) -> str:

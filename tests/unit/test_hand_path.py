@@ -6,7 +6,8 @@ from reference.planar import HandPath as ReferencePath
 from scipy.integrate import quad
 
 from physid_drake.cell import HandPath
-from physid_drake.cell.hand_path import fit_hand_path, straight_path
+from physid_drake.cell.hand_fit import fit_hand_path
+from physid_drake.cell.hand_path import straight_path, subdivided
 
 
 def some_path(seed=0, knots=6):
@@ -75,6 +76,17 @@ def test_a_longer_brake_stops_at_the_same_place(share):
     changed = path.braking(share)
     assert changed.times[3] - changed.times[2] == pytest.approx(0.04 * (1 + share))
     np.testing.assert_allclose(changed.knot_positions()[-1], path.knot_positions()[-1], atol=1e-15)
+
+
+def test_the_smooth_brake_of_a_path_in_pieces_is_stretched_as_a_whole():
+    x = np.arange(5) / 4
+    speeds = np.concatenate([x**2 * (3 - 2 * x), np.ones(3), 1.0 - x**2 * (3 - 2 * x)])
+    ends = np.array([0.1, 0.2, 0.5, 0.6])
+    path = HandPath(times=subdivided(ends, 4), velocities=np.outer(speeds, [0.2, 0.1]), start=np.zeros(2), pieces=4)
+    longer = path.braking(0.5)
+    assert path.last_brake() == longer.last_brake() == (8, 12)
+    np.testing.assert_allclose(longer.times, subdivided(np.array([0.1, 0.2, 0.475, 0.625]), 4))
+    np.testing.assert_allclose(longer.knot_positions()[-1], path.knot_positions()[-1], atol=1e-15)
 
 
 def test_no_change_of_speed_or_brake_changes_no_bit():

@@ -67,12 +67,17 @@ def test_a_spreadsheets_byte_order_mark_and_line_ends_are_read(written):
     assert len(read_recording(folder).pushes[0].object) == 2
 
 
+@pytest.mark.parametrize("name", ["12345678", "344e4963", "0x1f", "on", "2026-11-22", "1_000"])
+def test_a_name_is_what_was_written_whatever_else_it_looks_like(written, name):
+    assert read_recording(written(YAML.replace("name: eraser", f"name: {name}"))).name == name
+
+
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
         ("physid-recording/1", "physid-recording/2", "line 1: format: unknown format"),
         ("format: physid-recording/1\n", "", "unknown format None"),
-        ("name: eraser", "name: 12", "line 2: name: must be text"),
+        ("name: eraser", "name: [12]", "line 2: name: must be text"),
         ("name: eraser\n", "", "name: is required"),
         ("name: eraser", "colour: red\nname: eraser", "line 2: colour: unknown key"),
         ("name: eraser", "name: a\nname: b", "line 3: name: the key stands twice"),
@@ -101,7 +106,7 @@ def test_a_spreadsheets_byte_order_mark_and_line_ends_are_read(written):
         ("  - file: pushes/001.csv\n    note: first", "  []", "must not be empty"),
         ("  - file: pushes/001.csv\n    note: first", "  - pushes/001.csv", "pushes[0]: must be a mapping"),
         ("name: eraser", "name: [unclosed", "not valid YAML"),
-        ("name: eraser", "name: 2024-13-45", "not valid YAML"),
+        ("mass_kg: 0.05", "mass_kg: 2024-13-45", "not valid YAML"),
         ("name: eraser", "name: !!python/object:os.system x", "not valid YAML"),
         (YAML, "just text", "must be a mapping"),
         (YAML, "", "must be a mapping"),
