@@ -26,8 +26,8 @@ SMALLEST_STD = 2e-5  # m: a stream recorded without noise is still sampled and r
 SHORTEST_PIECE = 2e-3  # s between knots
 PIECES = 24  # of a smooth ramp: speeds to 0.2 % of its height
 WIDER = 0.2  # at either end: where the fit of a smooth ramp starts
-MOST = 20.0  # of the criterion: what one stream may say for or against smooth ramps
-SURE = 10.0  # of the criterion: smooth ramps must be that much better in all, then straight ones in one stream
+SURE = 10.0  # of the criterion, in all streams: smooth ramps must be that much better
+MOST = 20.0  # what one stream may say against them; a stream of a smooth robot that says more keeps straight ones
 
 STRAIGHT: Final = Polynomial([0, 1])
 # Speeds s(x) from 0 to 1 over a ramp, x from 0 to 1: limited jerk, and least jerk (Flash and Hogan 1985).
@@ -50,7 +50,7 @@ def fit_hand_paths(streams: Sequence[tuple[Array, Array]], std: float | None) ->
     votes = [_votes(best, fits) for fits in smooth]
     if best and max(votes) > SURE:
         preferred = smooth[int(np.argmax(votes))]
-        best = {k: fit if fit.criterion < preferred[k].criterion - SURE else preferred[k] for k, fit in best.items()}
+        best = {k: fit if fit.criterion < preferred[k].criterion - MOST else preferred[k] for k, fit in best.items()}
     return tuple(
         best[k].path(float(times[0])) if k in best else _polygon_path(times, positions)
         for k, (times, positions) in enumerate(streams)
