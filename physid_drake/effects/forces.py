@@ -255,9 +255,11 @@ class Sloshing(Effect):
     by ``fraction`` times the swing. ``frequency`` and ``damping`` are those in an object that is held.
 
     Assumed, and only roughly true of a bottle: one linear mode, the same along x and y (a round bottle's first, while
-    it swings little); its pull acts at half the object's height; it rests under the centre of mass when the push
-    begins; and it turns with the object, so that the moment of inertia is the whole's, where real liquid stays
-    behind. A lying cylinder keeps its liquid low as it rolls: there the moving weight tips nothing.
+    it swings little); its pull acts at half the object's height; and it rests under the centre of mass when the push
+    begins. A lying cylinder keeps its liquid low as it rolls: there the moving weight tips nothing.
+
+    ``turning`` is not in the catalogue, which leaves it open: the share of the liquid's moment of inertia that turns
+    with the object, most of it in a box, next to none in a round bottle.
     """
 
     name: ClassVar[str] = "sloshing"
@@ -269,23 +271,31 @@ class Sloshing(Effect):
     fraction: float = parameter(0.0, "-")
     frequency: float = parameter(4.0, "Hz")
     damping: float = parameter(0.05, "-")
+    turning: float = parameter(1.0, "-")
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
-        """Fraction, log frequency, log damping."""
+        """Fraction, log frequency, log damping, turning."""
         del around
         return (
             Coordinate(name="fraction", step=0.02, lower=0.0, upper=0.8),
             Coordinate(name="frequency", log=True, step=0.02, lower=math.log(0.3), upper=math.log(40.0), std=0.7),
             Coordinate(name="damping", log=True, step=0.2, lower=math.log(1e-3), upper=math.log(2.0), std=1.0),
+            Coordinate(name="turning", step=0.2, lower=0.0, upper=1.0, std=0.5),
         )
+
+    @classmethod
+    def leading(cls, around: Surroundings) -> tuple[int, ...]:
+        """All but what turns."""
+        del around
+        return (0, 1, 2)
 
     @classmethod
     def families(cls, around: Surroundings) -> tuple[Family, ...]:
         """Frequencies half an octave apart: at twice the right one a liquid looks like another effect."""
         del around
         return tuple(
-            Family(point=(0.0, math.log(frequency), math.log(0.05)), free=(0,), size=3.0)
+            Family(point=(0.0, math.log(frequency), math.log(0.05), 0.5), free=(0,), size=3.0)
             for frequency in (1.5, 2.1, 3.0, 4.2, 6.0, 9.0)
         )
 
@@ -294,10 +304,10 @@ class Sloshing(Effect):
         return 1.0 / (1.0 - self.fraction)
 
     def body(self, body: Body, facts: PushFacts) -> Body:
-        """The rigid rest: lighter, with the moment of inertia of the whole."""
+        """The rigid rest: lighter, with the moment of inertia of all that turns."""
         del facts
-        rest = 1.0 - self.fraction
-        return dc.replace(body, mass=rest * body.mass, inertia_ratio=body.inertia_ratio / rest)
+        rest, turns = 1.0 - self.fraction, 1.0 - self.fraction * (1.0 - self.turning)
+        return dc.replace(body, mass=rest * body.mass, inertia_ratio=body.inertia_ratio * turns / rest)
 
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
         """A fresh oscillator for each rollout."""

@@ -159,6 +159,14 @@ class Pull:
         return Wrench(fx=self.force * (state.time < self.until - 1e-9), fy=0.0, torque=0.0)
 
 
+@pytest.mark.parametrize("turning", [0.0, 0.5, 1.0])
+def test_liquid_that_does_not_turn_has_no_part_in_the_moment_of_inertia(turning):
+    effect, whole = make("sloshing", fraction=0.3, turning=turning), body_of(MASS, MU)
+    body = effect.body(whole, None)
+    assert body.mass * body.inertia_ratio == pytest.approx(MASS * (0.7 + 0.3 * turning))
+    assert make("sloshing", turning=turning).body(whole, None) == whole
+
+
 @pytest.mark.parametrize(("fraction", "spin"), [(0.4, 20.0), (0.2, -8.0)])
 def test_a_swing_keeps_angular_momentum_and_gains_no_energy(fraction, spin):
     frequency, damping = 3.0, 0.2
