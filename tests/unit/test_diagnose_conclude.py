@@ -52,7 +52,7 @@ def test_the_best_effect_that_pushes_confirm_is_said_to_take_its_part():
     sentence = conclude._sentence("unexplained", (), found)
     assert "viscous_drag would take 84 % of the squared error away" in sentence
     plain = evidence().plain
-    assert conclude._left(evidence(), plain, found).endswith("with viscous_drag 4.0 times")
+    assert conclude._left(evidence(), "unexplained", plain, found).endswith("with viscous_drag 4.0 times")
 
 
 def test_effects_that_were_added_and_did_not_suffice_are_said_together():
@@ -67,7 +67,9 @@ def test_what_is_not_confirmed_or_takes_little_away_is_not_worth_a_word(rejected
     assert conclude._partly(evidence(rejected=candidates, after=after)) is None
     told = evidence()
     assert "nothing in the catalogue accounts for it" in conclude._sentence("unexplained", (), None)
-    assert conclude._left(told, told.plain, None).endswith("is viscous_drag, which does not account for it")
+    assert conclude._left(told, "unexplained", told.plain, None).endswith(
+        "is viscous_drag, which does not account for it"
+    )
 
 
 @pytest.mark.parametrize(
@@ -79,4 +81,16 @@ def test_what_is_not_confirmed_or_takes_little_away_is_not_worth_a_word(rejected
     ],
 )
 def test_why_an_effect_that_was_fitted_is_not_what_is_missing(named, gain, why):
-    assert conclude._why("viscous_drag", tried("viscous_drag", gain, None), named, set(), None) == why
+    assert conclude._why("viscous_drag", tried("viscous_drag", gain, None), named, set(), evidence()) == why
+
+
+def test_a_model_that_predicts_left_out_pushes_worse_explains_nothing():
+    worse = evidence(steps=((tried("magnet", 50.0, model_that_leaves(1.0)),),), after=12.0)
+    assert not conclude._explained(worse)
+    why = conclude._why("magnet", tried("magnet", 50.0, None), set(), set(), worse)
+    assert why == "predicts pushes that were left out worse"
+    hidden = SimpleNamespace(reduced_chi2=1.2, state=SimpleNamespace(scatter=4.7))
+    assert conclude._left(worse, "unexplained", hidden, None).startswith(
+        "what a friction would hide that scatters by 12 %"
+    )
+    assert conclude._left(worse, "consistent", hidden, None).startswith("nothing beyond noise")
