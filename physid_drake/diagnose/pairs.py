@@ -28,6 +28,7 @@ Pair = tuple[Score, Score]
 AMONG = 6  # effects, by their own score tests
 FITTED = 3  # pairs
 ROUNDS, CAREFUL = 6, 3  # of a fit; in the first of them the pushes' unknowns are held
+PROMISING = 0.5  # of the plain cell's cost: a pair that leaves more by then explains nothing in the end
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -74,9 +75,11 @@ def confirmed_pairs(
         if fitter.case.pool.count > most:
             break
         tick(f"fit with {pair[0].kind.name} and {pair[1].kind.name}", k, FITTED)
-        fitted = _fitted(fitter, plain, pair)
-        if not unexplained(plain, fitted.fitted) and all(c.accepted for c in fitted.candidates):
-            found.append(fitted)
+        model = _model_with(fitter, plain, pair)
+        if model is not None and not unexplained(plain, model):
+            fitted = _judged(fitter, pair, model)
+            if all(c.accepted for c in fitted.candidates):
+                found.append(fitted)
     if not found:
         return []
     best = max(found, key=lambda one: one.gain)
@@ -146,12 +149,19 @@ def _with_coefficients(one: Score, coefficients: Sequence[float]) -> Score:
     return dc.replace(one, coefficients=every)
 
 
-def _fitted(fitter: Fitter, plain: Fitted, pair: Pair) -> FittedPair:
-    """A pair fitted from the best of two scans, and each of its effects judged beside the other one."""
+def _model_with(fitter: Fitter, plain: Fitted, pair: Pair) -> Fitted | None:
+    """The model with a pair, fitted from the best of two scans; None where it does not lead anywhere."""
     first, _ = scanned_start(fitter, plain, pair[0], (start_of(fitter, pair[1]),))
     second, _ = scanned_start(fitter, plain, pair[1], (first,))
     start = fitter.start(plain.state.u, (first, second))
-    model = fitter.fit(start, rounds=ROUNDS, careful=CAREFUL, renew=True)
+    model = fitter.fit(start, rounds=CAREFUL, careful=CAREFUL, renew=True)
+    if model.reduced_chi2 > PROMISING * plain.reduced_chi2:
+        return None
+    return fitter.fit(model.state, rounds=ROUNDS - CAREFUL, renew=True)
+
+
+def _judged(fitter: Fitter, pair: Pair, model: Fitted) -> FittedPair:
+    """A fitted pair, each of its effects judged beside the other one."""
     alone = tuple(_alone(fitter, model, j) for j in (0, 1))
     candidates = tuple(candidate_of(fitter, pair[j], model, model.state.effects[j], alone[1 - j]) for j in (0, 1))
     return FittedPair(

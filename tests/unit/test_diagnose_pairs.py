@@ -1,5 +1,6 @@
 """Which of several pairs of effects is taken, and what is a rival of what."""
 
+import dataclasses as dc
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,13 @@ from physid_drake.diagnose.confirm import Candidate
 PUSHES = 8
 TETHER, TILT, SLOSHING, DRAG = (SimpleNamespace(name=name) for name in ("tether", "table_tilt", "sloshing", "drag"))
 COORDINATES = {"tether": 3, "table_tilt": 2, "sloshing": 1, "drag": 1}
+
+
+@dc.dataclass(frozen=True, eq=False)
+class Named:
+    """A score test that only says of what."""
+
+    kind: SimpleNamespace
 
 
 def model(score, chi2=1.0):
@@ -29,7 +37,7 @@ def pair_of(first, second, score, *, chi2=1.0, adds=(20.0, 20.0)):
         for kind, gain in zip(kinds, adds, strict=True)
     )  # fmt: skip
     alone = (fitted.each - adds[1], fitted.each - adds[0])
-    scores = tuple(SimpleNamespace(kind=kind) for kind in kinds)
+    scores = tuple(Named(kind) for kind in kinds)
     return pairs.FittedPair(pair=scores, fitted=fitted, candidates=candidates, alone=alone)
 
 
@@ -41,14 +49,18 @@ def confirmed(monkeypatch):
         pool = SimpleNamespace(count=0)
         left = iter(made)
 
+        judged = {}
+
         def fitted(fitter, plain, pair):
             pool.count += cost_each
-            return next(left)
+            judged[pair] = next(left)
+            return judged[pair].fitted
 
         monkeypatch.setattr(pairs, "push_scores", lambda one: one.each)
         monkeypatch.setattr(pairs, "unexplained", lambda plain, one: one.reduced_chi2 > 1.5)
         monkeypatch.setattr(pairs, "promising", lambda plain, scores: [one.pair for one in made])
-        monkeypatch.setattr(pairs, "_fitted", fitted)
+        monkeypatch.setattr(pairs, "_model_with", fitted)
+        monkeypatch.setattr(pairs, "_judged", lambda fitter, pair, model: judged[pair])
         fitter = SimpleNamespace(case=SimpleNamespace(pool=pool))
         found = pairs.confirmed_pairs(fitter, model(-50.0, 6.0), (), lambda *said: None, most=most)
         return found, pool.count // cost_each
@@ -89,3 +101,28 @@ def test_a_pair_that_explains_too_little_or_has_an_idle_member_is_none(confirmed
 def test_no_further_pair_is_fitted_beyond_the_budget(confirmed):
     made = [pair_of(TILT, SLOSHING, 10.0), pair_of(TETHER, SLOSHING, 10.0), pair_of(TILT, DRAG, 10.0)]
     assert confirmed(*made, cost_each=10, most=15)[1] == 2
+
+
+class Fits:
+    """Leaves so much of the plain cost after the rounds in which the pushes' unknowns are held."""
+
+    def __init__(self, left):
+        self.left, self.rounds = left, 0
+        self.case = None
+
+    def start(self, u, effects):
+        return effects
+
+    def fit(self, state, *, rounds, careful=0, renew):
+        self.rounds += rounds
+        return SimpleNamespace(reduced_chi2=self.left, state=state)
+
+
+@pytest.mark.parametrize(("left", "rounds"), [(20.0, pairs.ROUNDS), (60.0, pairs.CAREFUL)])
+def test_a_pair_that_leads_nowhere_is_given_up_early(monkeypatch, left, rounds):
+    monkeypatch.setattr(pairs, "start_of", lambda fitter, one: one)
+    monkeypatch.setattr(pairs, "scanned_start", lambda fitter, plain, one, beside: (one, None))
+    fits = Fits(left)
+    plain = SimpleNamespace(reduced_chi2=100.0, state=SimpleNamespace(u=None))
+    assert (pairs._model_with(fits, plain, (TILT, DRAG)) is None) == (rounds < pairs.ROUNDS)
+    assert fits.rounds == rounds
