@@ -344,12 +344,17 @@ class Fitter:
     def left_out(self, fitted: Fitted) -> tuple[Array, ...]:
         """Recorded less predicted (m_i,) of each push, simulated by the model as it leaves, fitted without that push.
 
-        Nothing of the push itself is known to the prediction but the start of the object and the hand's path.
+        Nothing of the push itself is known to the prediction but the start of the object and the hand's path. A push
+        whose rollout diverges is predicted by the model's derivatives.
         """
         _, betas = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std)
         states = [self.start(*self._moved(fitted.state, beta)) for beta in betas]
         predicted = self.vectors([self.task(state, i) for i, state in enumerate(states)])
-        return tuple(f.recorded - p for f, p in zip(self.case.features, predicted, strict=True))
+        known = fitted.own_dimension
+        return tuple(
+            push.residual - push.shared[:, :known] @ beta[:known] if np.all(vector == FAILED) else f.recorded - vector
+            for f, vector, push, beta in zip(self.case.features, predicted, fitted.pushes, betas, strict=True)
+        )
 
     def _moved(self, state: State, beta: Array) -> tuple[Array, tuple[EffectPoint, ...]]:
         """Theta (d,) and the effects of a state, moved by beta, no further than a step goes."""

@@ -56,3 +56,14 @@ def test_a_push_that_is_left_out_does_not_tell_its_own_prediction(fitter):
     told = Fitter(dc.replace(fitter.case, features=(elsewhere, *others)))
     for i, (before, after) in enumerate(zip(predictions(fitter), predictions(told), strict=True)):
         assert np.allclose(before, after, atol=1e-6) == (i == 0)
+
+
+def test_a_push_left_out_whose_rollout_diverges_is_predicted_by_the_derivatives(fitter, monkeypatch):
+    fitted = fitter.linearise(fitter.start(np.full(3, 0.5)), learn_scatter=False)
+    simulated = fitter.left_out(fitted)
+    monkeypatch.setattr(
+        fitter, "vectors", lambda tasks: [np.full(len(f.recorded), FAILED) for f in fitter.case.features]
+    )
+    for one, other in zip(simulated, fitter.left_out(fitted), strict=True):
+        assert np.abs(other).max() < 0.1 * FAILED
+        assert np.linalg.norm(one - other) < np.linalg.norm(one)
