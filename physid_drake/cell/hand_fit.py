@@ -7,7 +7,7 @@ of a smooth ramp are off by some percent of the speed at which the object is let
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Final
@@ -27,7 +27,8 @@ SHORTEST_PIECE = 2e-3  # s between knots
 PIECES = 24  # of a smooth ramp: speeds to 0.2 % of its height
 WIDER = 0.2  # at either end: where the fit of a smooth ramp starts
 SURE = 10.0  # of the criterion, in all streams: smooth ramps must be that much better
-MOST = 20.0  # what one stream may say against them; a stream of a smooth robot that says more keeps straight ones
+MOST = 20.0  # what one stream may say for or against them; one of a smooth robot that says more keeps straight ones
+VOTERS = 12  # about so many streams of a robot are asked
 
 STRAIGHT: Final = Polynomial([0, 1])
 # Speeds s(x) from 0 to 1 over a ramp, x from 0 to 1: limited jerk, and least jerk (Flash and Hogan 1985).
@@ -46,20 +47,26 @@ def fit_hand_paths(streams: Sequence[tuple[Array, Array]], std: float | None) ->
         std: standard deviation of one position [m]; None estimates it from third differences.
     """
     best = {k: _fit_of(*stream, std) for k, stream in enumerate(streams) if len(stream[0]) >= 6}
-    smooth = [{k: _SmoothFit(fit, ramp) for k, fit in best.items()} for ramp in SMOOTH_RAMPS]
-    votes = [_votes(best, fits) for fits in smooth]
-    if best and max(votes) > SURE:
-        preferred = smooth[int(np.argmax(votes))]
-        best = {k: fit if fit.criterion < preferred[k].criterion - MOST else preferred[k] for k, fit in best.items()}
+    asked = list(best.values())[:: max(1, len(best) // VOTERS)]
+    votes = [sum(_vote(fit, _SmoothFit(fit, ramp)) for fit in asked) for ramp in SMOOTH_RAMPS]
+    if max(votes) > SURE:
+        ramp = SMOOTH_RAMPS[int(np.argmax(votes))]
+        best = {k: _smoother(fit, ramp) for k, fit in best.items()}
     return tuple(
         best[k].path(float(times[0])) if k in best else _polygon_path(times, positions)
         for k, (times, positions) in enumerate(streams)
     )
 
 
-def _votes(straight: Mapping[int, _Fit], smooth: Mapping[int, _Fit]) -> float:
-    """By how much smooth ramps are better, over all streams; one that is stuck in a bad fit does not decide."""
-    return sum(float(np.clip(straight[k].criterion - smooth[k].criterion, -MOST, MOST)) for k in straight)
+def _vote(straight: _Fit, smooth: _Fit) -> float:
+    """By how much smooth ramps are better for a stream; one that is stuck in a bad fit does not decide."""
+    return float(np.clip(straight.criterion - smooth.criterion, -MOST, MOST))
+
+
+def _smoother(straight: _Fit, ramp: Polynomial) -> _Fit:
+    """A smooth robot's stream: smooth ramps, unless the hand has none or straight ones are much better."""
+    smooth = _SmoothFit(straight, ramp)
+    return smooth if len(smooth.knots) > 1 and _vote(straight, smooth) > -MOST else straight
 
 
 def fit_hand_path(times: Array, positions: Array, std: float | None) -> HandPath:

@@ -160,6 +160,16 @@ def test_a_robot_with_smooth_ramps_lets_go_as_it_does(ramp, seed):
     assert np.sqrt(np.mean(np.square(errors))) < 0.008  # 0.0017 to 0.0049; straight ramps: 0.025 to 0.032
 
 
+def test_a_smooth_robots_hand_may_rest_or_be_seen_too_seldom_for_a_fit():
+    pushes = robot(SMOOTH_RAMPS[0], 0)
+    times, stream = pushes[0][1]
+    still = (times, stream[0] + STD * np.random.default_rng(1).standard_normal(stream.shape))
+    *moving, resting, seldom = fit_hand_paths([s for _, s in pushes] + [still, (times[:3], stream[:3])], STD)
+    assert all(fit.pieces > 1 for fit in moving)
+    assert np.linalg.norm(resting.positions(times) - stream[0], axis=1).max() < STD
+    assert len(seldom.times) == 4
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_robot_with_straight_ramps_keeps_them(seed):
     assert all(fit.pieces == 1 for fit in fit_hand_paths([stream for _, stream in robot(STRAIGHT, seed, 1)], STD))
