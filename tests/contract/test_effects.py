@@ -56,8 +56,8 @@ MEANING = {
     "coefficient": (0, 1e9), "per_push": (-1, 10),
 }  # fmt: skip
 
-# A bounce is caught up by the hand and grows with the square; a soft tip rings with the root of its
-# compliance, and its re-contacts come and go: signatures are there, but straight only over shorter ways.
+# A soft tip rings with the root of its compliance, and its re-contacts come and go: its signature is there, but
+# straight only over shorter ways.
 CURVED = ("hand_compliance",)
 
 every_effect = pytest.mark.parametrize("kind", CATALOGUE, ids=lambda kind: kind.name)
