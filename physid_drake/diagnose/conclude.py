@@ -20,7 +20,15 @@ from physid_drake.diagnose.confirm import (
     standard_error,
 )
 from physid_drake.diagnose.estimates import parameters_of, rms, smallest, theta_of
-from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, confirmed, mismatch, unexplained
+from physid_drake.diagnose.evidence import (
+    MOST_OF_UNKNOWN,
+    TOO_SCATTERED,
+    Evidence,
+    confirmed,
+    mismatch,
+    scatter_p_value,
+    unexplained,
+)
 from physid_drake.diagnose.looks import locate
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import regime_gains
@@ -117,7 +125,7 @@ def _explained(evidence: Evidence) -> bool:
     if evidence.case.noise.known:
         return not unexplained(evidence.plain, evidence.final)
     # A noise that was taken to be what a model leaves: it must have become much less.
-    return evidence.noise_share <= MOST_OF_UNKNOWN
+    return evidence.noise_share <= MOST_OF_UNKNOWN and scatter_p_value(evidence.final) >= TOO_SCATTERED
 
 
 def _location(evidence: Evidence, verdict: str, findings: Sequence[EffectFinding], seed: int) -> Location | None:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.case import Case
+from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.confirm import Candidate
 from physid_drake.diagnose.fit import Fitter
+from physid_drake.diagnose.linear import Whitened, solve
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.screen import Screening, Signature
@@ -29,6 +30,8 @@ MOST_LEFT = 0.5  # beside what two laws of one effect differ by
 EVER_LEFT = 2.0  # in all
 LAW_ERROR = 0.1  # of an effect's motion: two honest implementations of a spring or a liquid differ by that much
 MOST_OF_UNKNOWN = 0.5  # of the noise's variance, where it is not known
+MOST_SCATTER = 0.08  # of friction from push to push: what differs by more is no scatter, but something left out
+TOO_SCATTERED = 0.01  # p-value below which a model with effects leaves frictions that differ by more
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -84,7 +87,7 @@ def confirmed(
 
 
 def mismatch(fitted: Fitted, screening: Screening | None) -> float:
-    """P-value of "this model explains the pushes": the better of the catalogue's and the cost's, for two looks.
+    """P-value of "this model explains the pushes": the best of the catalogue's, the cost's and the scatter's.
 
     Args:
         fitted: the model.
@@ -92,12 +95,31 @@ def mismatch(fitted: Fitted, screening: Screening | None) -> float:
             speaks: one odd push is no physics.
     """
     cost = float(stats.chi2.sf(fitted.solution.chi2 / SLACK, fitted.degrees))
-    best = cost if screening is None else min(screening.p_value, cost)
-    return float(-np.expm1(2.0 * np.log1p(-min(best, 1.0 - 1e-16))))
+    looks = [cost, scatter_p_value(fitted), *([] if screening is None else [screening.p_value])]
+    return float(-np.expm1(len(looks) * np.log1p(-min(*looks, 1.0 - 1e-16))))
+
+
+def scatter_p_value(fitted: Fitted) -> float:
+    """Of "frictions scatter by no more than ``MOST_SCATTER``", by the likelihood ratio.
+
+    Friction that changes as an object slides, warms or sticks makes pushes of other lengths differ, which a model
+    would otherwise take for scatter.
+    """
+    seen, most = fitted.state.scatter, MOST_SCATTER / UNIT_SCATTER
+    if seen <= most:
+        return 1.0
+    free, held = (
+        solve(Whitened.of(fitted.pushes, s), fitted.prior_mean, fitted.prior_std).log_likelihood for s in (seen, most)
+    )
+    # The scatter at its bound is half of the cases where it is no larger (Chernoff 1954).
+    return 0.5 * float(stats.chi2.sf(2.0 * max(0.0, free - held), 1))
 
 
 def unexplained(plain: Fitted, final: Fitted) -> bool:
-    """Whether a model leaves more than noise, the cell's error and what two honest laws of an effect differ by."""
+    """Whether a model leaves more than noise, the cell's error and what two honest laws of an effect differ by.
+
+    Or frictions that differ from push to push by more than scatter.
+    """
     before, left = plain.reduced_chi2 - 1.0, final.reduced_chi2 - 1.0
     most = min(MOST_LEFT + LAW_ERROR**2 * max(0.0, before), EVER_LEFT)
-    return left > most or left > max(NOISE_LIKE, MOST_SHARE * before)
+    return left > most or left > max(NOISE_LIKE, MOST_SHARE * before) or scatter_p_value(final) < TOO_SCATTERED

@@ -294,21 +294,25 @@ class Fitter:
         """
         best = self.linearise(state, learn_scatter=careful == 0, like=like)
         like = best if renew else like
-        k = 0
+        k, stale = 0, False
         while k < rounds:
             if say is not None:
                 say(f"round {k + 1} of at most {rounds}")
-            released = k + 1 >= careful
+            held, released = k + 1 < careful, k + 1 >= careful
             trial = self._tried(best, cautious=k < careful, released=released)
             gained = actual_cost(best) - actual_cost(trial)
-            if k + 1 < careful and gained <= 0.0:
+            if held and gained <= 0.0:
                 k = careful - 1  # nothing more to gain with the unknowns at zero
                 continue
             if k >= careful and gained < SETTLED:
                 return trial if gained > 0.0 else best
             anew = renew and k + 1 < rounds and gained > RENEWED * len(best.pushes)
-            best = self.linearise(trial.state, learn_scatter=released, like=None if anew else like, at=trial)
-            like = best if anew else like
+            # Unknowns that are held only weigh what is left: their derivatives may be those of nearby.
+            stale, whole = (stale or anew) and held, (stale or anew) and released
+            best = self.linearise(
+                trial.state, learn_scatter=released, like=None if whole else like, fresh_theta=anew, at=trial
+            )  # fmt: skip
+            like = best if anew or whole else like
             k += 1
         return best
 

@@ -157,7 +157,7 @@ def _model_with(fitter: Fitter, plain: Fitted, pair: Pair) -> Fitted | None:
     model = fitter.fit(start, rounds=CAREFUL, careful=CAREFUL, renew=True)
     if model.reduced_chi2 > PROMISING * plain.reduced_chi2:
         return None
-    return fitter.fit(model.state, rounds=ROUNDS - CAREFUL, renew=True)
+    return fitter.fit(model.state, rounds=ROUNDS - CAREFUL, like=model, renew=True)
 
 
 def _judged(fitter: Fitter, pair: Pair, model: Fitted) -> FittedPair:

@@ -163,4 +163,6 @@ def fit_plain(case: Case, rng: np.random.Generator, tick: Tick) -> Fitted:
         searched = fitter.linearise(fitter.start(u), learn_scatter=False)
         blunt = fitter.seen_from(searched, fitter.start(least_squares(case, searched).state.u), learn_scatter=False)
         return min((first, blunt), key=_squares_at_rest)
-    return fitter.fit(first.state, rounds=4, renew=True, say=lambda text: tick(f"plain fit, {text}", 0, 0))
+    return fitter.fit(
+        first.state, rounds=4, like=first, renew=True, say=lambda text: tick(f"plain fit, {text}", 0, 0)
+    )  # fmt: skip

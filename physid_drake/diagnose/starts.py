@@ -11,14 +11,15 @@ import dataclasses as dc
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.fit import Fitter
-from physid_drake.diagnose.model import EffectPoint, Fitted
+from physid_drake.diagnose.fit import Fitter, actual_cost
+from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.screen import Score
 
 Array = NDArray[np.float64]
 
 FAMILIES = 4  # of an effect, the best by their score tests
 MULTIPLES = (1.0, 2.5, 5.0)  # of what the score test says
+STRENGTHS = (1.0, 0.7, 0.85, 1.2, 1.4)  # times that of a fit
 
 
 def start_of(fitter: Fitter, one: Score) -> EffectPoint:
@@ -48,6 +49,25 @@ def scanned_start(
         seen.append(fitter.seen_from(before, dc.replace(before.state, effects=effects)))
     best = int(np.argmax([model.score for model in seen]))
     return points[best], seen[best].solution.beta[: len(before.state.u)]
+
+
+def of_other_strength(fitter: Fitter, model: Fitted) -> State:
+    """Where to fit once more: the model's last effect at the strength that fits best, the pushes' unknowns at zero.
+
+    Objects that bounce off the hand twice, or miss it, leave a cost with many minima; unknowns that were fitted in
+    one of them belong to it.
+    """
+    *others, last = model.state.effects
+    leading = last.kind.leading(fitter.case.around)
+    chart = last.chart(fitter.case)
+    states = []
+    for strength in STRENGTHS:
+        point = last.point.copy()
+        for j in leading:
+            stronger = last.origin[j] + strength * (last.point[j] - last.origin[j])
+            point[j] = np.clip(stronger, chart[j].lower, chart[j].upper)
+        states.append(fitter.start(model.state.u, (*others, dc.replace(last, point=point))))
+    return min(states, key=lambda state: actual_cost(fitter.seen_from(model, state)))
 
 
 def _families(one: Score) -> list[Score]:

@@ -39,6 +39,7 @@ from physid_drake.diagnose.screen import (
     tolerances,
     with_frictions,
 )
+from physid_drake.diagnose.starts import of_other_strength
 from physid_drake.diagnose.values import Diagnosis
 from physid_drake.effects import Effect, applicable
 
@@ -298,7 +299,10 @@ def _plain_from(fitter: Fitter, plain: Fitted, candidate: Candidate, tick: Tick)
     if lost or candidate.fitted.score - plain.score < ANOTHER_BASIN:
         return None
     tick("plain fit from there", 0, 0)
-    again = fitter.fit(fitter.start(candidate.fitted.state.u), rounds=4, careful=2, renew=True)
+    near = fitter.fit(fitter.start(candidate.fitted.state.u), rounds=2, careful=2, renew=True)
+    if near.score < plain.score:
+        return None
+    again = fitter.fit(near.state, rounds=2, like=near, renew=True)
     return again if again.score - plain.score > ANOTHER_BASIN else None
 
 
@@ -378,7 +382,7 @@ def _model_with(fitter: Fitter, state: State) -> Fitted:
     if near.reduced_chi2 > HOPELESS or (near.reduced_chi2 <= EXPLAINED and near.state.scatter <= WIDE):
         return near
     # The pushes' unknowns may have been imitating what is missing: once more, without them at first.
-    far = fitter.fit(fitter.start(near.state.u, near.state.effects), rounds=4, careful=1, renew=True)
+    far = fitter.fit(of_other_strength(fitter, near), rounds=4, careful=1, renew=True)
     return far if far.score > near.score else near
 
 

@@ -113,7 +113,7 @@ class Fits:
     def start(self, u, effects):
         return effects
 
-    def fit(self, state, *, rounds, careful=0, renew):
+    def fit(self, state, *, rounds, careful=0, renew, like=None):
         self.rounds += rounds
         return SimpleNamespace(reduced_chi2=self.left, state=state)
 

@@ -137,7 +137,7 @@ def test_a_plain_fit_in_a_wrong_basin_is_left_if_an_effect_leads_out_of_it():
         """Plain fits from anywhere end at one score."""
 
         def __init__(self, score):
-            self.end = SimpleNamespace(score=score)
+            self.end = SimpleNamespace(score=score, state=None)
 
         def start(self, u):
             return u
@@ -168,5 +168,6 @@ def test_a_plain_fit_in_a_wrong_basin_is_left_if_an_effect_leads_out_of_it():
     ],
 )
 def test_a_large_effect_may_leave_what_two_honest_laws_of_it_differ_by(before, after, left):
-    plain, final = SimpleNamespace(reduced_chi2=before), SimpleNamespace(reduced_chi2=after)
+    usual = SimpleNamespace(scatter=1.0)
+    plain, final = SimpleNamespace(reduced_chi2=before), SimpleNamespace(reduced_chi2=after, state=usual)
     assert unexplained(plain, final) is left

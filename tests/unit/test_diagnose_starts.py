@@ -1,0 +1,51 @@
+"""Where fits start."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from physid_drake.diagnose import starts
+from physid_drake.diagnose.model import EffectPoint, State
+from physid_drake.effects import Surroundings, effect_named
+
+AROUND = Surroundings(
+    mass=0.2, friction=0.3, size=np.array([0.12, 0.05]), height=0.03, region=np.array([[-0.5, -0.5], [0.5, 0.5]]),
+    top_speed=0.5, pushes=10, has_hand=True, rolls=False, interval=0.01,
+)  # fmt: skip
+DRAG, BOUNCE = effect_named("viscous_drag"), effect_named("restitution")
+
+
+class Fitter:
+    """Its pushes cost most far from one point of the last effect's chart."""
+
+    def __init__(self, best):
+        self.case, self.best = SimpleNamespace(around=AROUND), best
+
+    def start(self, u, effects):
+        return State(u=u, effects=tuple(effects), own=(np.zeros(2),), scatter=1.0)
+
+    def seen_from(self, model, state):
+        assert not state.own[0].any()
+        return float(abs(state.effects[-1].point[0] - self.best))
+
+
+def model_with(*effects):
+    return SimpleNamespace(state=State(u=np.array([0.4]), effects=effects, own=(np.ones(2),), scatter=3.0))
+
+
+def point_of(kind, value):
+    return EffectPoint(kind=kind, point=np.array([value]), free=(0,), origin=np.array([0.0]))
+
+
+@pytest.mark.parametrize(
+    ("fitted", "best", "start"),
+    [(0.40, 0.49, 0.48), (0.40, 0.41, 0.40), (0.40, 0.10, 0.28), (0.80, 1.3, 0.9)],  # 0.9 is the chart's bound
+)
+def test_the_last_effect_is_tried_weaker_and_stronger(monkeypatch, fitted, best, start):
+    monkeypatch.setattr(starts, "actual_cost", lambda cost: cost)
+    other = point_of(DRAG, 0.3)
+    state = starts.of_other_strength(Fitter(best), model_with(other, point_of(BOUNCE, fitted)))
+    assert state.effects[0] is other
+    np.testing.assert_allclose(state.effects[1].point, [start])
+    np.testing.assert_array_equal(state.u, [0.4])
