@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from physid_drake.diagnose import story
+from physid_drake.diagnose import grow
 from physid_drake.diagnose.confirm import Candidate
 from physid_drake.diagnose.evidence import unexplained
 from physid_drake.diagnose.model import State
@@ -38,15 +38,15 @@ class Refits:
 
 @pytest.fixture
 def grown(monkeypatch):
-    monkeypatch.setattr(story, "push_scores", lambda one: one.scores)
+    monkeypatch.setattr(grow, "push_scores", lambda one: one.scores)
     monkeypatch.setattr(
-        story._Looked,
+        grow.Looked,
         "at",
         classmethod(lambda cls, one, signatures, rng: cls(fitted=one, signatures=tuple(signatures), screening=None)),
     )
-    base = story._Looked(fitted=fitted((), -50.0), signatures=(), screening=None)
-    last = story._Looked(fitted=fitted(("magnet", "table_tilt"), -1.0), signatures=(), screening=None)
-    return story._Grown(base=base, last=last, steps=(step("magnet"), step("table_tilt")), rejected=())
+    base = grow.Looked(fitted=fitted((), -50.0), signatures=(), screening=None)
+    last = grow.Looked(fitted=fitted(("magnet", "table_tilt"), -1.0), signatures=(), screening=None)
+    return grow.Grown(base=base, last=last, steps=(step("magnet"), step("table_tilt")), rejected=())
 
 
 def tried(name, gains, *, coordinates=1, chi2=1.0, degenerate=False):
@@ -59,46 +59,46 @@ def tried(name, gains, *, coordinates=1, chi2=1.0, degenerate=False):
 
 @pytest.fixture
 def before(monkeypatch):
-    monkeypatch.setattr(story, "push_scores", lambda one: one.scores)
+    monkeypatch.setattr(grow, "push_scores", lambda one: one.scores)
     return SimpleNamespace(reduced_chi2=6.0, scores=np.zeros(8))
 
 
 def test_the_best_is_added_where_the_simpler_one_leaves_too_much(before):
     simple, best = tried("table_tilt", [49.0] * 8, chi2=5.5), tried("tether", [50.0] * 8, coordinates=4, chi2=2.0)
-    assert [c.name for c in story._worth_adding(before, before, (simple, best))] == ["tether", "table_tilt"]
+    assert [c.name for c in grow.worth_adding(before, before, (simple, best))] == ["tether", "table_tilt"]
     enough = tried("table_tilt", [49.0] * 8, chi2=2.2)
-    assert [c.name for c in story._worth_adding(before, before, (enough, best))] == ["table_tilt", "tether"]
+    assert [c.name for c in grow.worth_adding(before, before, (enough, best))] == ["table_tilt", "tether"]
 
 
 def test_nothing_is_added_that_pushes_do_not_confirm(before):
     lost = tried("magnet", [50.0] * 8, degenerate=True)
-    assert story._worth_adding(before, before, (tried("table_tilt", [-1.0] * 8), lost)) == ()
-    assert story._worth_adding(before, before, ()) == ()
+    assert grow.worth_adding(before, before, (tried("table_tilt", [-1.0] * 8), lost)) == ()
+    assert grow.worth_adding(before, before, ()) == ()
 
 
 @pytest.mark.parametrize(("explained", "added"), [(7000.0, True), (9000.0, False)])
 def test_what_the_law_of_a_large_effect_may_be_wrong_by_is_no_second_one(before, explained, added):
     base = SimpleNamespace(reduced_chi2=60.0, scores=np.full(8, -explained / 8.0))
     small = tried("magnet", [10.0] * 8)
-    assert bool(story._worth_adding(base, before, (small,))) == added
+    assert bool(grow.worth_adding(base, before, (small,))) == added
 
 
 def names_of(grown):
     return [candidates[0].name for candidates in grown.steps]
 
 
-def quiet(*said):
-    del said
+def growth(fitter):
+    return grow.Growth(fitter=fitter, kinds=(), alpha=0.01, rng=None, tick=lambda *said: None)
 
 
 def test_an_effect_that_a_later_one_makes_superfluous_is_taken_out(grown):
-    pruned = story._pruned(Refits({("table_tilt",): -1.2}), grown, None, quiet)
+    pruned = growth(Refits({("table_tilt",): -1.2})).pruned(grown)
     assert names_of(pruned) == ["table_tilt"]
     assert [e.kind.name for e in pruned.last.fitted.state.effects] == ["table_tilt"]
 
 
 def test_two_effects_that_both_matter_stay(grown):
-    pruned = story._pruned(Refits({("table_tilt",): -9.0}), grown, None, quiet)
+    pruned = growth(Refits({("table_tilt",): -9.0})).pruned(grown)
     assert names_of(pruned) == ["magnet", "table_tilt"]
     assert pruned.last is grown.last
 
@@ -106,8 +106,8 @@ def test_two_effects_that_both_matter_stay(grown):
 @pytest.fixture
 def rivalled(grown, monkeypatch):
     """A magnet that a tilted table is like, and a drag beside it; (without the first effect, -60 a push)."""
-    monkeypatch.setattr(story, "class_of", lambda plain, step: ("table_tilt",))
-    monkeypatch.setattr(story, "_model_with", lambda fitter, state: fitter.fit(state))
+    monkeypatch.setattr(grow, "class_of", lambda plain, step: ("table_tilt",))
+    monkeypatch.setattr(grow.Growth, "_model_with", lambda self, state: self.fitter.fit(state))
     magnet = dc.replace(step("magnet")[0], coordinates=4)
     rival = dc.replace(step("table_tilt")[0], fitted=fitted(("table_tilt",), -60.0), coordinates=1)
     last = dc.replace(grown.last, fitted=fitted(("magnet", "viscous_drag"), -5.0))
@@ -118,7 +118,7 @@ def rivalled(grown, monkeypatch):
 def test_a_rival_that_does_better_beside_a_later_effect_takes_the_place(rivalled, beside, first):
     """Also one that does as well with fewer coordinates; not one that is 7 nats a push worse."""
     refits = Refits({("table_tilt", "viscous_drag"): beside, ("viscous_drag",): -60.0})
-    judged = story._reconsidered(refits, rivalled, 0, None, quiet)
+    judged = growth(refits).reconsidered(rivalled, 0)
     assert names_of(judged) == [first, "viscous_drag"]
     assert {c.name for c in judged.steps[0]} == {"magnet", "table_tilt", "uneven_support"}
     assert [e.kind.name for e in judged.last.fitted.state.effects] == [first, "viscous_drag"]
@@ -128,8 +128,8 @@ def test_a_rival_that_does_better_beside_a_later_effect_takes_the_place(rivalled
 
 
 def test_a_step_without_rivals_stays(rivalled, monkeypatch):
-    monkeypatch.setattr(story, "class_of", lambda plain, step: ())
-    assert story._reconsidered(Refits({}), rivalled, 0, None, quiet) is rivalled
+    monkeypatch.setattr(grow, "class_of", lambda plain, step: ())
+    assert growth(Refits({})).reconsidered(rivalled, 0) is rivalled
 
 
 def test_a_plain_fit_in_a_wrong_basin_is_left_if_an_effect_leads_out_of_it():
@@ -147,12 +147,12 @@ def test_a_plain_fit_in_a_wrong_basin_is_left_if_an_effect_leads_out_of_it():
 
     stuck = SimpleNamespace(score=-500.0)
     led_out = SimpleNamespace(fitted=SimpleNamespace(score=-60.0, reduced_chi2=1.0, state=SimpleNamespace(u=None)))
-    assert story._plain_from(FromThere(-62.0), stuck, led_out, quiet).score == -62.0
-    assert story._plain_from(FromThere(-495.0), stuck, led_out, quiet) is None
+    assert growth(FromThere(-62.0)).plain_from(stuck, led_out).score == -62.0
+    assert growth(FromThere(-495.0)).plain_from(stuck, led_out) is None
     no_better = SimpleNamespace(fitted=SimpleNamespace(score=-497.0, reduced_chi2=1.0))
-    assert story._plain_from(FromThere(-62.0), stuck, no_better, quiet) is None
+    assert growth(FromThere(-62.0)).plain_from(stuck, no_better) is None
     lost = SimpleNamespace(fitted=SimpleNamespace(score=-60.0, reduced_chi2=50.0))
-    assert story._plain_from(FromThere(-62.0), stuck, lost, quiet) is None
+    assert growth(FromThere(-62.0)).plain_from(stuck, lost) is None
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,235 @@
+"""A model, grown: effects that pushes left out confirm are added, and those that became superfluous taken out."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from physid_drake.diagnose.conclude import class_of
+from physid_drake.diagnose.confirm import (
+    A_LAW,
+    EXPLAINED,
+    Candidate,
+    confirm,
+    push_scores,
+    ranked,
+    rejudged,
+    worthwhile,
+)
+from physid_drake.diagnose.evidence import mismatch
+from physid_drake.diagnose.fit import Fitter
+from physid_drake.diagnose.model import EffectPoint, Fitted, State
+from physid_drake.diagnose.pairs import confirmed_pairs, steps_of
+from physid_drake.diagnose.screen import Screening, Signature, screen, signatures, with_frictions
+from physid_drake.diagnose.starts import of_other_strength
+from physid_drake.effects import Effect
+
+Tick = Callable[[str, int, int], None]
+
+MOST_EFFECTS = 3
+LONGEST = 450  # rollouts per push, after the first score tests, after which no further effect is looked for
+ANOTHER_BASIN = 10.0  # nats by which a plain fit must be better to be another one
+CANDIDATES = 4  # fitted in the first step, one less in each that follows
+WIDE = 2.0  # times the usual scatter of friction: it may be what is missing in disguise
+HOPELESS = 6.0  # cost per degree of freedom with two effects: no third one of the catalogue will make up for that
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Looked:
+    """A model, what the catalogue's effects would change of it, and their score tests."""
+
+    fitted: Fitted
+    signatures: tuple[Signature, ...]
+    screening: Screening
+
+    @classmethod
+    def at(cls, fitted: Fitted, signatures: Sequence[Signature], rng: np.random.Generator) -> Looked:
+        """Look at a model with signatures that were taken there or near."""
+        # Derivatives with respect to the pushes' own frictions may have been taken anew since.
+        fresh = tuple(with_frictions(fitted, s) for s in signatures)
+        return cls(fitted=fitted, signatures=fresh, screening=screen(fitted, fresh, rng))
+
+    @property
+    def p_value(self) -> float:
+        """Of "nothing is missing"."""
+        return mismatch(self.fitted, self.screening)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Grown:
+    """A model grown effect by effect: the plain one, the last, the steps between, and what a last step rejected."""
+
+    base: Looked
+    last: Looked
+    steps: tuple[tuple[Candidate, ...], ...]
+    rejected: tuple[Candidate, ...]
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Growth:
+    """How a model is grown.
+
+    Attributes:
+        fitter: with guard and tolerances.
+        kinds: the effects that may be missing.
+        alpha: false-alarm rate below which something is.
+        rng: of the score tests.
+        tick: told the stage.
+    """
+
+    fitter: Fitter
+    kinds: Sequence[type[Effect]]
+    alpha: float
+    rng: np.random.Generator
+    tick: Tick
+
+    def grow(self, plain: Looked) -> Grown:
+        """Add effects to the plain model, take out what became superfluous, and judge rivals again."""
+        grown = self.pruned(self._added_to(plain))
+        for k in range(len(grown.steps) - 1):
+            grown = self.reconsidered(grown, k)
+        return grown
+
+    def _added_to(self, base: Looked) -> Grown:
+        """Add the effect that pushes left out confirm most, as long as something is missing; or two at once."""
+        fitter, tick = self.fitter, self.tick
+        last, steps, rejected = base, list[tuple[Candidate, ...]](), tuple[Candidate, ...]()
+        pool = fitter.case.pool
+        longest = pool.count + LONGEST * len(fitter.case.problems)
+        most = min(MOST_EFFECTS, len(self.kinds))
+        while len(steps) < most and pool.count < longest and last.p_value < self.alpha:
+            candidates = confirm(fitter, last.fitted, last.screening.scores, tick, most=CANDIDATES - len(steps))
+            if not steps and candidates:
+                better = self.plain_from(base.fitted, candidates[0])
+                if better is not None:
+                    # The effect led out of a wrong basin of theta, and perhaps did nothing else.
+                    if better.reduced_chi2 <= EXPLAINED:
+                        fresh = signatures(Fitter(fitter.case), better, self.kinds)
+                        base = last = Looked.at(better, fresh, self.rng)
+                        continue
+                    base = last = Looked.at(better, base.signatures, self.rng)
+                    candidates = rejudged(candidates, better)
+            added = worth_adding(base.fitted, last.fitted, candidates)
+            if added:
+                steps.append(added)
+                state = added[0].fitted.state
+            else:
+                scores = last.screening.scores
+                pairs = [] if steps else confirmed_pairs(fitter, last.fitted, scores, tick, most=longest)
+                rejected = candidates
+                if not pairs:
+                    break
+                steps += steps_of(pairs)
+                state = pairs[0].fitted.state
+            tick(f"model with {' and '.join(step[0].name for step in steps)}", 0, 0)
+            model = self._model_with(state)
+            hopeless = len(steps) > 1 and model.reduced_chi2 > HOPELESS
+            more = not hopeless and len(steps) < MOST_EFFECTS and pool.count < longest
+            last = self._what_is_left(model, last.signatures, self.alpha if more else 0.0)
+            if hopeless:
+                break
+        return Grown(base=base, last=last, steps=tuple(steps), rejected=rejected)
+
+    def pruned(self, grown: Grown) -> Grown:
+        """Without the effects that a later one made superfluous: they had stood in for what was still missing."""
+        last, steps = grown.last, list(grown.steps)
+        for k in reversed(range(len(steps) - 1)):
+            name = steps[k][0].name
+            self.tick(f"model without {name}", 0, 0)
+            effects = tuple(e for e in last.fitted.state.effects if e.kind.name != name)
+            without = self.fitter.fit(dc.replace(last.fitted.state, effects=effects), rounds=4, like=last.fitted)
+            gains = push_scores(last.fitted) - push_scores(without)
+            if not dc.replace(steps[k][0], fitted=last.fitted, gains=gains).accepted:
+                missed = [s for s in grown.base.signatures if s.kind.name == name]
+                last = Looked.at(without, (*last.signatures, *missed), self.rng)
+                del steps[k]
+        return dc.replace(grown, last=last, steps=tuple(steps))
+
+    def reconsidered(self, grown: Grown, k: int) -> Grown:
+        """The rivals of a step judged again beside the effects that came after it: what was missing blurred them.
+
+        One that does better there takes the place of the step's effect.
+        """
+        plain, model, step = grown.base.fitted, grown.last.fitted, grown.steps[k]
+        effects = model.state.effects
+        present = {e.kind.name for e in effects}
+        alike = class_of(plain, step)
+        rivals = [c for c in step[1:] if c.name in alike and c.name not in present]
+        if not rivals:
+            return grown
+
+        def with_kth(points: tuple[EffectPoint, ...]) -> State:
+            return dc.replace(model.state, effects=(*effects[:k], *points, *effects[k + 1 :]))
+
+        models = {step[0].name: model}
+        for other in rivals:
+            self.tick(f"{other.name} in place of {step[0].name}", 0, 0)
+            point = next(e for e in other.fitted.state.effects if e.kind.name == other.name)
+            models[other.name] = self.fitter.fit(with_kth((point,)), rounds=4, like=model)
+        self.tick(f"model without {step[0].name}", 0, 0)
+        without = push_scores(self.fitter.fit(with_kth(()), rounds=4, like=model))
+        scores = {name: push_scores(one) for name, one in models.items()}
+        best = ranked([dc.replace(c, gains=scores[c.name] - without) for c in (step[0], *rivals)])[0].name
+        before = push_scores(plain)
+        judged = [dc.replace(c, gains=scores[c.name] - before) if c.name in scores else c for c in step]
+        judged.sort(key=lambda c: c.name != best)
+        steps = (*grown.steps[:k], tuple(judged), *grown.steps[k + 1 :])
+        if best == step[0].name:
+            return dc.replace(grown, steps=steps)
+        self.tick(f"model with {best}", 0, 0)
+        swapped = self._model_with(models[best].state)
+        missed = [s for s in grown.base.signatures if s.kind.name == step[0].name]
+        left = [s for s in grown.last.signatures if s.kind.name != best]
+        return dc.replace(grown, steps=steps, last=Looked.at(swapped, (*left, *missed), self.rng))
+
+    def plain_from(self, plain: Fitted, candidate: Candidate) -> Fitted | None:
+        """A better plain fit from the theta at which an effect's fit ended; None where there is none."""
+        lost = candidate.fitted.reduced_chi2 > HOPELESS  # and so is its theta
+        if lost or candidate.fitted.score - plain.score < ANOTHER_BASIN:
+            return None
+        self.tick("plain fit from there", 0, 0)
+        start = self.fitter.start(candidate.fitted.state.u)
+        near = self.fitter.fit(start, rounds=2, careful=2, renew=True)
+        if near.score < plain.score:
+            return None
+        again = self.fitter.fit(near.state, rounds=2, like=near, renew=True)
+        return again if again.score - plain.score > ANOTHER_BASIN else None
+
+    def _model_with(self, state: State) -> Fitted:
+        """A fitted model with all coordinates of its effects free, all derivatives taken where it is."""
+        fitter = self.fitter
+        effects = tuple(e.freed(fitter.case) for e in state.effects)
+        near = fitter.fit(dc.replace(state, effects=effects), rounds=3, renew=True)
+        if near.reduced_chi2 > HOPELESS or (near.reduced_chi2 <= EXPLAINED and near.state.scatter <= WIDE):
+            return near
+        # The pushes' unknowns may have been imitating what is missing: once more, without them at first.
+        far = fitter.fit(of_other_strength(fitter, near), rounds=4, careful=1, renew=True)
+        return far if far.score > near.score else near
+
+    def _what_is_left(self, model: Fitted, before: Sequence[Signature], alpha: float) -> Looked:
+        """The score tests of what a model leaves; signatures are taken anew only if something is missing at alpha."""
+        present = {e.kind for e in model.state.effects}
+        # Those of the model before are near enough to ask whether anything is left.
+        looked = Looked.at(model, [s for s in before if s.kind not in present], self.rng)
+        if looked.p_value >= alpha:
+            return looked
+        self.tick("score tests of what is left", 0, 0)
+        fresh = signatures(Fitter(self.fitter.case), model, [k for k in self.kinds if k not in present])
+        return Looked.at(model, fresh, self.rng)
+
+
+def worth_adding(base: Fitted, last: Fitted, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+    """The candidates, the one to add first: the simplest of the best, or the best; none where neither will do.
+
+    What is a hundredth of what the effects before it explain may be no more than the error of their laws.
+    """
+    if not candidates:
+        return ()
+    least = A_LAW * float((push_scores(last) - push_scores(base)).sum())
+    best = max((c for c in candidates if not c.degenerate), key=lambda c: c.gain, default=candidates[0])
+    for one in (candidates[0], best):
+        if worthwhile(last, one) and one.gain > least:
+            return (one, *(c for c in candidates if c is not one))
+    return ()
