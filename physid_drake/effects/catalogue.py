@@ -5,16 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from physid_drake.effects.body import ComOffset, Restitution, RotationalInertia, SizeError, UnevenSupport
+from physid_drake.effects.drag import QuadraticDrag, RollingResistance, ViscousDrag
 from physid_drake.effects.effect import Effect, Surroundings
-from physid_drake.effects.forces import (
-    Magnet,
-    QuadraticDrag,
-    RollingResistance,
-    Sloshing,
-    TableTilt,
-    Tether,
-    ViscousDrag,
-)
+from physid_drake.effects.fields import Magnet, TableTilt, Tether
 from physid_drake.effects.friction import (
     AnisotropicObject,
     AnisotropicTable,
@@ -24,6 +17,7 @@ from physid_drake.effects.friction import (
     StribeckFriction,
 )
 from physid_drake.effects.hand import ActuatorLag, HandCompliance, HandOffset
+from physid_drake.effects.liquid import Sloshing
 from physid_drake.effects.tracker import TrackerBias, TrackerLatency, TrackerScale
 from physid_drake.errors import ConfigError
 

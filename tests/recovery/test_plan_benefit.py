@@ -10,7 +10,7 @@ from reference.scenes import OBJECTS
 from twin import body_of, config_of, shape_of
 
 from physid_drake.cell import HandPath
-from physid_drake.effects.forces import TableTilt
+from physid_drake.effects.fields import TableTilt
 from physid_drake.model import Model
 from physid_drake.plan import DistanceToGoal, Situation, plan
 from physid_drake.plan.task import policy_for

@@ -9,7 +9,7 @@ from physid_drake.diagnose.estimates import correlation_of, theta_of
 from physid_drake.diagnose.model import EffectPoint
 from physid_drake.effects import Surroundings
 from physid_drake.effects.body import UnevenSupport
-from physid_drake.effects.forces import TableTilt
+from physid_drake.effects.fields import TableTilt
 from physid_drake.space import Parameter, ParameterSpace
 
 AROUND = Surroundings(

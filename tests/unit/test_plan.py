@@ -18,7 +18,7 @@ from twin import body_of
 from physid_drake import run_cell, run_plan
 from physid_drake.cell import SolverConfig
 from physid_drake.cli import main
-from physid_drake.effects.forces import TableTilt
+from physid_drake.effects.fields import TableTilt
 from physid_drake.errors import ConfigError
 from physid_drake.identify import SearchConfig, ThetaConfig
 from physid_drake.model import Correlation, Model, load_model

@@ -11,7 +11,7 @@ from physid_drake.cell import Body, CellConfig
 from physid_drake.cli import main
 from physid_drake.diagnose.memory import Memory
 from physid_drake.effects.body import UnevenSupport
-from physid_drake.effects.forces import ViscousDrag
+from physid_drake.effects.drag import ViscousDrag
 from physid_drake.errors import ConfigError
 from physid_drake.model import Correlation, Model
 from physid_drake.recording import Prism

@@ -1,0 +1,127 @@
+"""Effects that brake an object as it moves: viscous and quadratic drag, rolling resistance."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from physid_drake.cell.forces import ForceLaw, ObjectState, Wrench
+from physid_drake.effects.effect import Coordinate, Effect, PushFacts, Surroundings, parameter
+
+TICK = 2e-3  # s: the rollout's longest; a drag is damped as if it acted so long, so that it never drives backwards
+ROLLING_EDGE = 1e-3  # m/s: below it rolling resistance fades, so that it never drives backwards
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class ViscousDrag(Effect):
+    """A force -c v at the centre of mass and a torque -c k^2 w, k^2 the mean square radius of the underside."""
+
+    name: ClassVar[str] = "viscous_drag"
+    element: ClassVar[str] = "table"
+    statement: ClassVar[str] = "a drag in proportion to the object's speed"
+    frame: ClassVar[str] = "object_velocity"
+    amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
+
+    coefficient: float = parameter(0.0, "N*s/m")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """The coefficient."""
+        return (Coordinate(name="coefficient", step=around.slight / (0.5 * around.top_speed), lower=0.0),)
+
+    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
+        """The drag."""
+        return (_ViscousLaw(self.coefficient, facts.polar),)
+
+
+@dc.dataclass(frozen=True)
+class _ViscousLaw:
+    coefficient: float
+    polar: float
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        half = 0.5 * TICK * self.coefficient
+        # The impulse is that of the mean speed over the tick: of second order, and stable for any coefficient.
+        fx, fy = (-self.coefficient / (1.0 + half / state.mass) * state.v_WBcm).tolist()
+        turning = self.coefficient * self.polar / (1.0 + half * self.polar / state.inertia)
+        return Wrench(fx=fx, fy=fy, torque=-turning * state.yaw_rate)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class QuadraticDrag(Effect):
+    """A force -c v abs(v) at the centre of mass: air."""
+
+    name: ClassVar[str] = "quadratic_drag"
+    element: ClassVar[str] = "world"
+    statement: ClassVar[str] = "a drag in proportion to the square of the object's speed"
+    frame: ClassVar[str] = "object_velocity"
+    amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
+
+    coefficient: float = parameter(0.0, "N*s^2/m^2")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """The coefficient."""
+        return (Coordinate(name="coefficient", step=around.slight / (0.4 * around.top_speed**2), lower=0.0),)
+
+    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
+        """The drag."""
+        del facts
+        return (_QuadraticLaw(self.coefficient),)
+
+
+@dc.dataclass(frozen=True)
+class _QuadraticLaw:
+    coefficient: float
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        vx, vy = state.v_WBcm.tolist()
+        drag = self.coefficient * math.hypot(vx, vy)
+        factor = -drag / (1.0 + 0.5 * TICK * drag / state.mass)
+        return Wrench(fx=factor * vx, fy=factor * vy, torque=0.0)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class RollingResistance(Effect):
+    """A rolling object loses speed: the contact force leads by ``coefficient``, so a moment N b opposes the roll.
+
+    On a cylinder that rolls without slip the moment is a force N b / R at the centre of mass.
+    """
+
+    name: ClassVar[str] = "rolling_resistance"
+    element: ClassVar[str] = "object"
+    statement: ClassVar[str] = "a rolling object slows down"
+    frame: ClassVar[str] = "object_velocity"
+    amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
+
+    coefficient: float = parameter(0.0, "m")
+
+    @classmethod
+    def applies(cls, around: Surroundings) -> bool:
+        """On lying cylinders."""
+        return around.rolls
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """The coefficient."""
+        return (Coordinate(name="coefficient", step=5e-4 * around.height, lower=0.0, upper=0.2 * around.height),)
+
+    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
+        """The force."""
+        return (_RollingLaw(self.coefficient / facts.rolling_radius),) if facts.rolling_radius else ()
+
+
+@dc.dataclass(frozen=True)
+class _RollingLaw:
+    share: float  # of the weight
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        # Across the axis (y of B) it rolls; along the axis it slides.
+        across = np.array([math.cos(state.yaw), math.sin(state.yaw)])
+        speed = float(across @ state.v_WBcm)
+        edge = max(ROLLING_EDGE, self.share * state.weight / state.mass * TICK)
+        force = -self.share * state.weight * speed / math.hypot(speed, edge)
+        return Wrench(fx=force * across[0], fy=force * across[1], torque=0.0)

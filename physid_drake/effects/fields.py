@@ -1,0 +1,173 @@
+"""Effects that pull at an object by where it is: a tilted table, a tether, a magnet."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.cell.forces import ForceLaw, ObjectState, Wrench
+from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
+from physid_drake.effects.places import grid_of_places
+
+Array = NDArray[np.float64]
+WEAKEST = 1e-9  # N/m: a spring weaker than this has no anchor
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class TableTilt(Effect):
+    """Gravity has a component along the table: m g sin(x) along x of W, m g sin(y) along y."""
+
+    name: ClassVar[str] = "table_tilt"
+    element: ClassVar[str] = "table"
+    statement: ClassVar[str] = "a constant force along one direction of the table: it is not level"
+    frame: ClassVar[str] = "world"
+    amplitudes: ClassVar[tuple[str, ...]] = ("x", "y")
+
+    x: float = parameter(0.0, "rad")
+    y: float = parameter(0.0, "rad")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """The two angles."""
+        step, most = 0.015 * around.friction, 0.9 * math.atan(around.friction)
+        return tuple(Coordinate(name=name, step=step, lower=-most, upper=most) for name in ("x", "y"))
+
+    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
+        """Gravity's component."""
+        del facts
+        return (_TiltLaw(math.sin(self.x), math.sin(self.y)),)
+
+
+@dc.dataclass(frozen=True)
+class _TiltLaw:
+    x: float  # of the weight
+    y: float
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        return Wrench(fx=state.weight * self.x, fy=state.weight * self.y, torque=0.0)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Tether(Effect):
+    """A spring or cable to a point of the world: pulls with stiffness (d - rest_length) where it is taut."""
+
+    name: ClassVar[str] = "tether"
+    element: ClassVar[str] = "world"
+    statement: ClassVar[str] = "a pull towards a point of the world that grows with the distance: a spring or a cable"
+    frame: ClassVar[str] = "world"
+    amplitudes: ClassVar[tuple[str, ...]] = ("stiffness",)
+
+    stiffness: float = parameter(0.0, "N/m")
+    x: float = parameter(0.0, "m")
+    y: float = parameter(0.0, "m")
+    rest_length: float = parameter(0.0, "m")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """Stiffness, the force at the region's middle, and the rest length: linear where the rest length is 0."""
+        reach = float(np.max(around.region[1] - around.region[0]))
+        force, most = around.slight, 0.8 * around.friction * around.weight
+        return (
+            Coordinate(name="stiffness", step=2.0 * force / reach, lower=0.0),
+            Coordinate(name="force_x", step=force, lower=-most, upper=most),
+            Coordinate(name="force_y", step=force, lower=-most, upper=most),
+            Coordinate(name="rest_length", step=0.02 * reach, lower=0.0, upper=2.0 * reach, std=0.3 * reach),
+        )
+
+    @classmethod
+    def families(cls, around: Surroundings) -> tuple[Family, ...]:
+        """With rest length 0."""
+        return (Family(point=(0.0, 0.0, 0.0, 0.0), free=(0, 1, 2)),)
+
+    @classmethod
+    def at(cls, point: Array, around: Surroundings) -> Tether:
+        """The spring whose pull at the region's middle is the chart's force."""
+        stiffness, fx, fy, rest = point.tolist()
+        if stiffness == fx == fy == 0.0:
+            return cls(rest_length=rest)
+        middle = 0.5 * (around.region[0] + around.region[1])
+        k = max(stiffness, WEAKEST)
+        pull = math.hypot(fx, fy)
+        # Taut at the middle: pull = k (d - rest), towards the anchor.
+        stretch = 1.0 + (k * rest / pull if pull > 0.0 else 0.0)
+        x, y = middle + stretch * np.array([fx, fy]) / k
+        return cls(stiffness=k, x=float(x), y=float(y), rest_length=rest)
+
+    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
+        """The spring."""
+        del facts
+        return (_SpringLaw(self.stiffness, self.x, self.y, self.rest_length),)
+
+
+@dc.dataclass(frozen=True)
+class _SpringLaw:
+    stiffness: float
+    x: float
+    y: float
+    rest_length: float
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        px, py = state.p_WBcm.tolist()
+        dx, dy = self.x - px, self.y - py
+        if self.rest_length == 0.0:
+            return Wrench(fx=self.stiffness * dx, fy=self.stiffness * dy, torque=0.0)
+        distance = math.hypot(dx, dy)
+        pull = self.stiffness * max(0.0, distance - self.rest_length) / max(distance, 1e-9)
+        return Wrench(fx=pull * dx, fy=pull * dy, torque=0.0)
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Magnet(Effect):
+    """A short-range attraction to a point of the table: F = strength / (d^2 + core^2)."""
+
+    name: ClassVar[str] = "magnet"
+    element: ClassVar[str] = "world"
+    statement: ClassVar[str] = "an attraction to a point of the table that fades with distance"
+    frame: ClassVar[str] = "world"
+    amplitudes: ClassVar[tuple[str, ...]] = ("strength",)
+
+    strength: float = parameter(0.0, "N*m^2")
+    x: float = parameter(0.0, "m")
+    y: float = parameter(0.0, "m")
+    core: float = parameter(0.03, "m")
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """Strength, place, log of the core."""
+        _, spacing = grid_of_places(around)
+        return (
+            Coordinate(name="strength", step=1.0 * around.slight * spacing**2, lower=0.0),
+            Coordinate(name="x", step=0.05 * spacing, std=spacing),
+            Coordinate(name="y", step=0.05 * spacing, std=spacing),
+            Coordinate(name="core", log=True, step=0.1, lower=math.log(0.002), upper=math.log(0.3), std=0.7),
+        )
+
+    @classmethod
+    def families(cls, around: Surroundings) -> tuple[Family, ...]:
+        """A grid of places."""
+        places, _ = grid_of_places(around)
+        return tuple(Family(point=(0.0, float(x), float(y), math.log(0.03)), free=(0,)) for x, y in places)
+
+    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
+        """The attraction."""
+        del facts
+        return (_MagnetLaw(self.strength, self.x, self.y, self.core),)
+
+
+@dc.dataclass(frozen=True)
+class _MagnetLaw:
+    strength: float
+    x: float
+    y: float
+    core: float
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        px, py = state.p_WBcm.tolist()
+        dx, dy = self.x - px, self.y - py
+        square = dx * dx + dy * dy
+        pull = self.strength / (square + self.core**2) / max(math.sqrt(square), 1e-6)
+        return Wrench(fx=pull * dx, fy=pull * dy, torque=0.0)
