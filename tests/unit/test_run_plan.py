@@ -1,0 +1,194 @@
+"""What the command and the main job plan, write and refuse."""
+
+import json
+from dataclasses import replace
+
+import pytest
+import yaml
+from plans import MODEL, TILTED
+from rich.console import Console
+from runs import coarse_identifier, quick, shipped_pushes, write_small
+
+from physid_drake import run_cell, run_plan
+from physid_drake.cli import main
+from physid_drake.errors import ConfigError
+from physid_drake.model import Correlation, load_model
+from physid_drake.plan import PlanConfig
+from physid_drake.plan.system import planner_of
+from physid_drake.recording import Table
+from physid_drake.scenario_schema import Scenario
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "model.yaml").write_text(TILTED.dump())
+    return tmp_path / "run"
+
+
+QUICK = ["--goal", "0.25", "0", "--budget", "4", "--draws", "2"]
+
+
+def planned_files(folder, out, *argv):
+    assert main(["plan", str(folder), *QUICK, "--out", str(out), *argv]) == 0
+    return {path.name: path.read_bytes() for path in out.iterdir()}
+
+
+@pytest.fixture
+def few_rows(monkeypatch):
+    """A sweep of three rows, so that the command is quick."""
+    original = run_plan.plan
+    monkeypatch.setattr(run_plan, "plan", lambda *args, **more: original(*args, **{**more, "sweep": 3}))
+
+
+def test_the_command_writes_the_plan_and_the_same_seed_the_same_bytes(folder, tmp_path, capsys, few_rows):
+    files = planned_files(folder, tmp_path / "one")
+    shown = capsys.readouterr().out
+    assert set(files) == {"plan.json", "push.csv", "plan.png", "page.html", "settings.json"}
+    again = planned_files(folder, tmp_path / "two")
+    assert all(again[name] == content for name, content in files.items() if name != "settings.json")
+    content = json.loads(files["plan.json"])
+    assert content["format"] == "physid-plan/1" and content["effects"] == ["table_tilt"]
+    assert content["pushes"][0]["speed_mps"] == content["settings"]["speed"]["value"]
+    assert content["belief"]["draws"] == 2 and len(content["sweep"]["rows"]) == 3
+    assert f"{content['settings']['speed']['value']:.4f} m/s" in shown and "table_tilt" in shown
+    page = files["page.html"].decode()
+    assert f"{content['settings']['speed']['value']:.4f} m/s" in page
+    assert "http" not in page.replace("http://www.w3.org", "")
+
+
+def test_plain_plans_without_the_effects_and_says_what_they_make_of_it(folder, tmp_path, capsys, few_rows):
+    with_effects = json.loads(planned_files(folder, tmp_path / "one")["plan.json"])
+    plain = json.loads(planned_files(folder, tmp_path / "two", "--plain")["plan.json"])
+    assert plain["effects"] == [] and with_effects["predicted_with_effects"] is None
+    assert plain["settings"]["speed"]["value"] != with_effects["settings"]["speed"]["value"]
+    assert plain["predicted_with_effects"]["cost_m"] > with_effects["predicted"]["cost_m"]
+    assert "with the effects found" in capsys.readouterr().out
+
+
+def test_the_results_beside_a_model_give_scatter_and_order(folder, tmp_path, few_rows):
+    (folder / "model.yaml").write_text(replace(MODEL, intervals={}).dump())
+    assert json.loads(planned_files(folder, tmp_path / "one")["plan.json"])["belief"] is None
+    content = {"friction_scatter": 0.05, "held_out": {"pushes": ["a"]}, "training": {"pushes": ["b", "c"]}}
+    (folder / "result.json").write_text(json.dumps(content))
+    belief = json.loads(planned_files(folder, tmp_path / "two")["plan.json"])["belief"]
+    assert belief["ends"][0]["x_m"] != belief["ends"][1]["x_m"]
+    # Two pushes tell no scatter, so that it is as sure as its first guess; five add theirs.
+    assert run_plan._learnt(folder) == run_plan.Learnt(friction_scatter=0.05, scatter_freedom=4.0, pushes=3)
+    diagnosis = {"friction_scatter": 0.02, "fit": {"per_push": [1, 2, 3, 4, 5]}}
+    (folder / "diagnosis.json").write_text(json.dumps(diagnosis))
+    assert run_plan._learnt(folder) == run_plan.Learnt(friction_scatter=0.02, scatter_freedom=9.0, pushes=5)
+
+
+@pytest.mark.parametrize(
+    ("argv", "named"),
+    [
+        (["--goal", "9", "0"], "not on the table"), (["--goal", "nan", "0"], "finite"),
+        (["--goal", "0", "0"], "already"),
+        (["--policy", "throw"], "throw"), (["--speed", "0.1"], "push_direction"),
+        (["--direction", "nan"], "--direction"),
+        (["--start", "0", "0", "inf"], "--start"), (["--start", "5", "0", "0"], "start"),
+        (["--tolerance", "nan"], "tolerance"),
+        (["--budget", "0"], "budget"), (["--draws", "-1"], "draws"), (["--seed", "-1"], "--seed"),
+        (["--search", "luck"], "luck"), (["--travel", "0"], "travel"), (["--model", "nowhere.yaml"], "nowhere.yaml"),
+    ],
+)  # fmt: skip
+def test_bad_input_ends_in_one_line(folder, tmp_path, capsys, argv, named):
+    assert main(["plan", str(folder), *QUICK, "--out", str(tmp_path / "out"), *argv]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("error: ") and error.count("\n") == 1 and named in error
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("write", "named"),
+    [
+        ({}, "no model.yaml"),
+        ({"model.yaml": "{"}, "model.yaml"),
+        ({"model.yaml": MODEL.dump(), "result.json": "{"}, "result.json"),
+        ({"model.yaml": MODEL.dump(), "result.json": '{"friction_scatter": 7}'}, "result.json"),
+        ({"model.yaml": replace(MODEL, intervals={"theta.mass": "x"}).dump()}, "theta.mass"),
+    ],
+)
+def test_a_run_that_cannot_be_planned_from_ends_in_one_line(tmp_path, capsys, write, named):
+    (tmp_path / "run").mkdir()
+    for name, text in write.items():
+        (tmp_path / "run" / name).write_text(text)
+    assert main(["plan", str(tmp_path / "run"), *QUICK, "--out", str(tmp_path / "out")]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("error: ") and error.count("\n") == 1 and named in error
+    assert main(["plan", str(tmp_path / "nowhere"), *QUICK]) == 1
+    assert "no such folder" in capsys.readouterr().err
+    assert main(["plan", *QUICK]) == 1
+    assert "--model" in capsys.readouterr().err
+
+
+def test_ctrl_c_ends_with_130_and_writes_nothing(folder, tmp_path, capsys, monkeypatch):
+    def interrupted(*args, **more):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("physid_drake.plan.story.trajectory_of", interrupted)
+    assert main(["plan", str(folder), *QUICK, "--out", str(tmp_path / "out")]) == 130
+    assert "interrupted" in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
+# The main job.
+
+
+def test_the_main_job_plans_with_what_it_identified(tmp_path):
+    recording = write_small(tmp_path / "small")
+    override = {"plan": {"start_m": [0.0, 0.0], "goal_m": [0.25, 0.0], "budget": 6, "sweep": 3, "draws": 2}}
+    out = tmp_path / "out"
+    assert quick(out, recording=recording, plan_too=True, **override) == 0
+    content = json.loads((out / "plan.json").read_text())
+    theta = json.loads((out / "result.json").read_text())["theta"]["support_friction"]
+    model = load_model(out)
+    assert float(model.body.support_friction[0]) == theta["value"]
+    assert model.intervals["theta.support_friction"] == theta["ci90"]
+    assert model.correlation == Correlation(names=("theta.support_friction",), matrix=((1.0,),))
+    assert (
+        content["policy"] == "push_speed" and len(content["sweep"]["rows"]) == 3 and content["belief"]["draws"] == 2
+    )
+    assert yaml.safe_load((out / "config.yaml").read_text())["eraser"]["plan"]["budget"] == 6
+    assert (out / "push.csv").exists() and not (out / "plan.png").exists()
+    page = (out / "page.html").read_text()
+    assert f"{content['settings']['speed']['value']:.4f} m/s" in page and "Cost against speed" in page
+
+
+def test_the_main_job_refuses_a_goal_off_the_table_before_it_writes(tmp_path, capsys):
+    recording = write_small(tmp_path / "small")
+    assert quick(tmp_path / "out", recording=recording, plan_too=True, plan={"goal_m": [3.0, 0.0]}) == 1
+    assert "not on the table" in capsys.readouterr().err and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("plan_section", "named"),
+    [
+        ({"policy": "throw"}, "throw"),
+        ({"goal_m": [1.0]}, "goal_m"),
+        ({"budget": 0}, "budget"),
+        ({"speeds": 3}, "speeds"),
+    ],
+)
+def test_the_main_job_refuses_a_plan_it_cannot_make(tmp_path, capsys, plan_section, named):
+    recording = write_small(tmp_path / "small")
+    assert quick(tmp_path / "out", recording=recording, plan_too=True, plan=plan_section) == 1
+    assert named in capsys.readouterr().err
+
+
+def test_the_planner_starts_where_the_recording_began():
+    identifier = coarse_identifier(shipped_pushes(2))
+    planner = planner_of(PlanConfig(), identifier.pool.spec, identifier.problems, "eraser", 0)
+    assert planner.situation.start == identifier.problems[0].start.pose
+    assert planner.situation.order == 2 and planner.situation.hand_height == pytest.approx(0.015)
+    assert planner.goal == pytest.approx((planner.situation.start[0] + 0.3, planner.situation.start[1]))
+    assert planner.dimension == 3
+
+
+def test_no_goal_that_fits_is_no_reason_to_stop_but_a_wrong_one_is(capsys):
+    elsewhere = replace(shipped_pushes(2), table=Table(size=(0.1, 0.1), centre=(5.0, 5.0)))
+    identifier = coarse_identifier(elsewhere)
+    assert run_cell._planner(Scenario(), elsewhere, identifier, Console()) is None
+    assert "not on the table" in " ".join(capsys.readouterr().out.split())
+    with pytest.raises(ConfigError, match="not on the table"):
+        run_cell._planner(Scenario(plan=PlanConfig(goal_m=[0.0, 0.0])), elsewhere, identifier, Console())
