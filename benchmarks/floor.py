@@ -1,0 +1,111 @@
+"""How well left-out pushes can be predicted at best, and who could: floor.py PROOF_FOLDER [--worlds 20].
+
+The proof's floor is what the true world leaves of pushes whose own friction it is not told. It is told the start of
+the object exactly, which nobody is: a push may move its end by thirty times a difference of its start. Here the true
+world also starts where the tracker saw the object before it moved.
+"""
+
+import argparse
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+
+from physid_drake.prove.effects.catalogue import CATALOGUED, OTHERS
+from physid_drake.prove.floor import floor_of
+from physid_drake.prove.make import simulate
+from physid_drake.prove.scene import draw_scene
+from physid_drake.recording import read_recording
+
+STILL = 1e-5  # m, rad
+ATTEMPTS = 4  # in which a world may have been drawn
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--worlds", type=int, default=20)
+    given = parser.parse_args()
+    seals = sorted((given.folder / "sealed").glob("*.json"))[: given.worlds]
+    rows = [row_of(given.folder, seal) for seal in track(seals, console=Console(stderr=True))]
+    Console(width=120).print(table([row for row in rows if row is not None]))
+
+
+def row_of(folder, seal):
+    """Root mean square of the position [mm]: told the start, as tracked, and by the diagnosis if there is one."""
+    truth = json.loads(seal.read_text())
+    recording = read_recording(folder / "recordings" / truth["id"])
+    scene = scene_of(truth)
+    effects = [{**CATALOGUED, **OTHERS}[e["name"]](**tuples(e["parameters"])) for e in truth["effects"]]
+    plain = tuple(replace(push, friction_factor=1.0) for push in scene.pushes)
+    tracked = tuple(started(push, error) for push, error in zip(plain, start_errors(recording, truth), strict=True))
+    told, seen = (left(scene, pushes, effects, recording) for pushes in (plain, tracked))
+    found = folder / "diagnoses" / truth["id"] / "diagnosis.json"
+    after = math.nan
+    if found.is_file():
+        answer = json.loads(found.read_text())
+        right = {e["name"] for e in answer["effects"]} == {e["name"] for e in truth["effects"]}
+        after = 1e3 * answer["fit"]["held_out_rms_after_m"] if right else math.nan
+    return truth["id"], ", ".join(e["name"] for e in truth["effects"]) or truth["kind"], told, seen, after
+
+
+def scene_of(truth):
+    for attempt in range(ATTEMPTS):
+        scene = draw_scene(np.random.default_rng([truth["seed"], truth["index"], 4, attempt]))
+        if scene.plan.mass == truth["theta"]["mass"]:
+            return scene
+    raise SystemExit(f"error: world {truth['id']} was drawn by another version.")
+
+
+def tuples(parameters):
+    return {k: tuple(map(tuple, v)) if isinstance(v, list) else v for k, v in parameters.items()}
+
+
+def start_errors(recording, truth):
+    """Per push (3,), what the tracker's noise makes of the mean pose before the object moves."""
+    for push, poses in zip(recording.pushes, truth["noise_free_poses"].values(), strict=True):
+        free = np.array(poses)
+        moving = np.flatnonzero((np.abs(free - free[0]) > STILL).any(axis=1))
+        rest = max(1, int(moving[0]) if len(moving) else len(free))
+        error = push.object.planar[:rest] - free[:rest]
+        error[:, 2] = (error[:, 2] + math.pi) % (2.0 * math.pi) - math.pi
+        yield error.mean(axis=0)
+
+
+def started(push, error):
+    return replace(push, pose=tuple(np.asarray(push.pose) + error))
+
+
+def left(scene, pushes, effects, recording):
+    """Root mean square of recorded less predicted positions [mm]."""
+    expected = [motion.poses for motion in simulate(replace(scene, pushes=pushes), effects)]
+    deviations = np.array([scene.noise.position, scene.noise.position, scene.noise.rotation])
+    return 1e3 * floor_of(recording.pushes, expected, scene.rate, deviations)["position_m"]
+
+
+def table(rows):
+    made = Table(title="error of left-out pushes [mm]")
+    for column in ("world", "truth", "true world", "start as tracked", "ratio", "diagnosis", "over as tracked"):
+        made.add_column(column, justify="left" if column in ("world", "truth") else "right")
+    for name, truth, told, seen, after in rows:
+        made.add_row(
+            name, truth, f"{told:.2f}", f"{seen:.2f}", f"{seen / told:.2f}", shown(after), shown(after / seen)
+        )
+    told, seen, after = np.array([row[2:] for row in rows]).T
+    made.add_section()
+    columns = (told, seen, seen / told, after, after / seen)
+    made.add_row("median", "", *(shown(np.nanmedian(column)) for column in columns))
+    return made
+
+
+def shown(value):
+    return "" if math.isnan(value) else f"{value:.2f}"
+
+
+if __name__ == "__main__":
+    main()
