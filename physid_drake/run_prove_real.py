@@ -45,11 +45,7 @@ def run_real(arguments: argparse.Namespace, command: Commander = diagnose_comman
         reasons = {c.name: prepare(c, published, out, pushes=arguments.pushes, seed=arguments.seed) for c in cases}
         there = [case for case in cases if reasons[case.name] is None]
         hidden = (published, out / "held_out")
-        tasks = [
-            Task(name=case.id, words=command(out / "recordings" / case.id, out / "diagnoses" / case.id, *hidden),
-                 folder=out / "diagnoses" / case.id)
-            for case in there
-        ]  # fmt: skip
+        tasks = [_task(case, out, command, hidden, arguments.pushes) for case in there]
         run_tasks(tasks, arguments, console)
         _measure_fresh(there, out)
     outcomes = [
@@ -62,6 +58,12 @@ def run_real(arguments: argparse.Namespace, command: Commander = diagnose_comman
     console.print(real_table(outcomes))
     console.print(f"written: {out / 'real.md'}, {out / 'real.json'}", soft_wrap=True)
     return 0
+
+
+def _task(case: RealCase, out: Path, command: Commander, hidden: tuple[Path, Path], pushes: int) -> Task:
+    """A case to be diagnosed, on all of its pushes: a diagnosis takes fewer by itself."""
+    given, folder = out / "recordings" / case.id, out / "diagnoses" / case.id
+    return Task(name=case.id, words=(*command(given, folder, *hidden), "--pushes", str(pushes)), folder=folder)
 
 
 def _measure_fresh(cases: Sequence[RealCase], out: Path) -> None:

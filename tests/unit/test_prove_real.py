@@ -171,7 +171,9 @@ ANSWER = {
     "reduced_chi2_after": 9.0,
     "fit": {f"held_out_rms_{when}{unit}": 0.004 for when in ("before", "after") for unit in ("", "_m", "_rad")},
 }
-FAKE = "import pathlib, sys; (pathlib.Path(sys.argv[2]) / 'diagnosis.json').write_text(sys.argv[3])"
+FAKE = """import pathlib, sys
+assert sys.argv[4:] == ["--pushes", "20"]
+(pathlib.Path(sys.argv[2]) / "diagnosis.json").write_text(sys.argv[3])"""
 
 
 def test_the_command_writes_a_table_and_goes_on(published, tmp_path, monkeypatch):
