@@ -29,6 +29,7 @@ from physid_drake.diagnose.evidence import (
     scatter_p_value,
     unexplained,
 )
+from physid_drake.diagnose.frictions import friction_trend
 from physid_drake.diagnose.looks import locate
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import regime_gains
@@ -288,7 +289,9 @@ def _why_not_fitted(name: str, evidence: Evidence) -> str:
 def _left(evidence: Evidence, verdict: str, after: Fitted, partly: Partly | None) -> str:
     if after.reduced_chi2 <= EXPLAINED and verdict == "unexplained":
         scatter = 100.0 * UNIT_SCATTER * after.state.scatter
-        return f"what a friction would hide that scatters by {scatter:.0f} % from push to push"
+        trend = friction_trend(evidence.case, after)
+        follows = "" if trend is None else f", {trend}"
+        return f"what a friction would hide that scatters by {scatter:.0f} % from push to push{follows}"
     if after.reduced_chi2 <= EXPLAINED:
         return "nothing beyond noise, scatter and the simulator's own error"
     much = f"{math.sqrt(after.reduced_chi2):.1f} times what noise and the simulator's own error would leave"

@@ -46,7 +46,7 @@ Halves = tuple[tuple[int, ...], tuple[int, ...]]
 
 def _by_speed(case: Case) -> Halves | None:
     """The slow and the fast pushes; None where they are about as fast."""
-    speeds = np.array([_speed(case, i) for i in range(len(case.problems))])
+    speeds = np.array([speed_of(case, i) for i in range(len(case.problems))])
     order = np.argsort(speeds, kind="stable")
     slow, fast = np.array_split(order, 2)
     if len(fast) < FEWEST or np.median(speeds[fast]) < FASTER * np.median(speeds[slow]):
@@ -54,7 +54,7 @@ def _by_speed(case: Case) -> Halves | None:
     return tuple(slow.tolist()), tuple(fast.tolist())
 
 
-def _speed(case: Case, i: int) -> float:
+def speed_of(case: Case, i: int) -> float:
     """Largest speed of the hand [m/s], of the object where there is none."""
     path = case.problems[i].path
     if path is not None:

@@ -84,13 +84,14 @@ def test_why_an_effect_that_was_fitted_is_not_what_is_missing(named, gain, why):
     assert conclude._why("viscous_drag", tried("viscous_drag", gain, None), named, set(), evidence()) == why
 
 
-def test_a_model_that_predicts_left_out_pushes_worse_explains_nothing():
+def test_a_model_that_predicts_left_out_pushes_worse_explains_nothing(monkeypatch):
     worse = evidence(steps=((tried("magnet", 50.0, model_that_leaves(1.0)),),), after=12.0)
     assert not conclude._explained(worse)
     why = conclude._why("magnet", tried("magnet", 50.0, None), set(), set(), worse)
     assert why == "predicts pushes that were left out worse"
     hidden = SimpleNamespace(reduced_chi2=1.2, state=SimpleNamespace(scatter=4.7))
-    assert conclude._left(worse, "unexplained", hidden, None).startswith(
-        "what a friction would hide that scatters by 12 %"
-    )
+    hides = "what a friction would hide that scatters by 12 % from push to push"
+    for trend, said in ((None, hides), ("less the faster it is pushed", f"{hides}, less the faster it is pushed")):
+        monkeypatch.setattr(conclude, "friction_trend", lambda case, after, trend=trend: trend)
+        assert conclude._left(worse, "unexplained", hidden, None) == said
     assert conclude._left(worse, "consistent", hidden, None).startswith("nothing beyond noise")

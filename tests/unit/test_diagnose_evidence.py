@@ -1,10 +1,13 @@
 """When a model explains the pushes: how often frictions that only scatter are called something else."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from physid_drake.diagnose.case import UNIT_SCATTER
 from physid_drake.diagnose.evidence import MOST_SCATTER, scatter_p_value
+from physid_drake.diagnose.frictions import friction_trend
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve
 from physid_drake.diagnose.model import Fitted, State
 
@@ -45,3 +48,35 @@ def test_frictions_that_follow_something_else_are():
     of_a_slide = 0.25 * np.linspace(-1.0, 1.0, 10)  # say, of an object that sticks at first
     assert scatter_p_value(fitted_to(of_a_slide)) < 0.001
     assert scatter_p_value(fitted_to(0.2 * of_a_slide)) == 1.0
+
+
+def pushes_of(ways):
+    """Straight slides, so far [m], each pushed as fast as it takes."""
+    return SimpleNamespace(
+        problems=[
+            SimpleNamespace(
+                poses=np.array([[way, 0.0, 0.0]]), path=None, order=order,
+                start=SimpleNamespace(pose=(0.0, 0.0, 0.0), velocity=(np.sqrt(2.0 * 0.3 * 9.81 * way), 0.0, 0.0)),
+            )
+            for order, way in enumerate(ways)
+        ]
+    )  # fmt: skip
+
+
+def test_what_frictions_follow_is_said():
+    rng = np.random.default_rng(5)
+    ways = rng.permutation(np.linspace(0.02, 0.3, 10))
+    sticks = 0.25 - 1.5 * ways + 0.02 * rng.standard_normal(10)
+    assert friction_trend(pushes_of(ways), fitted_to(sticks)).startswith("less the further the object goes (rank")
+    worn = fitted_to(0.05 * np.arange(10.0))
+    assert friction_trend(pushes_of(ways), worn) == "more the later the push (rank correlation 1.00)"
+    assert friction_trend(pushes_of(ways[:5]), fitted_to(sticks[:5])) is None
+
+
+def test_frictions_that_follow_nothing_are_said_to_follow_something_in_one_of_twenty():
+    rng = np.random.default_rng(6)
+    said = [
+        friction_trend(pushes_of(rng.uniform(0.02, 0.3, 10)), fitted_to(0.2 * rng.standard_normal(10))) is not None
+        for _ in range(400)
+    ]
+    assert np.mean(said) <= 0.06

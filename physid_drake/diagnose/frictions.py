@@ -1,0 +1,59 @@
+"""What the pushes' own frictions follow, where they differ by more than friction scatters."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from physid_drake.diagnose.case import Case
+from physid_drake.diagnose.linear import LinearPush, own_unknowns
+from physid_drake.diagnose.model import Fitted
+from physid_drake.diagnose.regimes import speed_of
+
+Array = NDArray[np.float64]
+
+FEWEST = 6  # pushes that tell their friction
+TOLD = 0.5  # of a friction's spread: a push that leaves more of it does not tell it
+CHANCE = 0.05  # of the best of all looks
+
+
+def friction_trend(case: Case, fitted: Fitted) -> str | None:
+    """What friction goes with from push to push, in words; None where with nothing, or no more than by chance.
+
+    Looks at how far the object goes, how fast it is pushed, and which push it is, by Kendall's rank correlation.
+
+    Args:
+        case: the recording.
+        fitted: the model whose pushes have frictions of their own.
+    """
+    scatter, beta = fitted.state.scatter, fitted.solution.beta
+    told = [i for i, push in enumerate(fitted.pushes) if _left_open(push, scatter) < TOLD]
+    if len(told) < FEWEST:
+        return None
+    frictions = [own_unknowns(fitted.pushes[i], scatter, beta)[fitted.pushes[i].friction] for i in told]
+    looks = {
+        "the further the object goes": [_way(case, i) for i in told],
+        "the faster it is pushed": [speed_of(case, i) for i in told],
+        "the later the push": [float(case.problems[i].order) for i in told],
+    }
+    seen = {words: stats.kendalltau(frictions, values) for words, values in looks.items()}
+    best = min(seen, key=lambda words: float(np.nan_to_num(seen[words].pvalue, nan=1.0)))
+    if not len(looks) * seen[best].pvalue < CHANCE:
+        return None
+    tau = float(seen[best].statistic)
+    return f"{'more' if tau > 0.0 else 'less'} {best} (rank correlation {tau:.2f})"
+
+
+def _left_open(push: LinearPush, scatter: float) -> float:
+    """The standard deviation that a push leaves of its friction, over the prior's."""
+    own = push.own.copy()
+    own[:, push.friction] *= scatter
+    precision = np.eye(own.shape[1]) + own.T @ np.linalg.solve(push.noise, own)
+    return float(np.sqrt(np.linalg.inv(precision)[push.friction, push.friction]))
+
+
+def _way(case: Case, i: int) -> float:
+    """From the object's start to its end [m]."""
+    problem = case.problems[i]
+    return float(np.linalg.norm(problem.poses[-1, :2] - np.array(problem.start.pose[:2])))
