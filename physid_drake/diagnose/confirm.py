@@ -140,7 +140,7 @@ def confirm(
     for k, one in enumerate((*worth, *more)):
         if k >= len(worth) and (any(worthwhile(before, c) for c in found) or fitter.case.pool.count > spent):
             break
-        if _explained(found) and one.gain < RIVAL * ordered[0].gain:
+        if _explained([c for c in found if c.accepted]) and one.gain < RIVAL * ordered[0].gain:
             break
         tick(f"fit with {one.kind.name}", k, len(worth))
         found.append(_candidate(fitter, one, _fit(fitter, before, one), plain))

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from physid_drake.cell import HandPath, Start
+from physid_drake.diagnose import confirm
 from physid_drake.diagnose.confirm import Candidate, push_scores, ranked, rivals
 from physid_drake.diagnose.linear import LinearPush, Whitened, solve
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.regimes import _by_heading, _by_speed
-from physid_drake.effects import Effect
+from physid_drake.effects import Effect, effect_named
 
 
 def candidate(gains, *, degenerate=False, coordinates=1, left=1.0):
@@ -140,3 +141,21 @@ def test_pushes_to_either_side_are_two_regimes():
 def test_few_pushes_span_no_regimes():
     case = pushes([0.05, 0.5, 0.04, 0.6], [0.0, 3.0, 0.1, 3.1])
     assert _by_speed(case) is None and _by_heading(case) is None
+
+
+@pytest.mark.parametrize(("gains", "tried"), [([-9.0] * 8, 3), ([9.0] * 8, 2)])
+def test_what_left_out_pushes_do_not_confirm_keeps_no_weaker_effect_from_a_try(monkeypatch, gains, tried):
+    """Where a noise is taken to be what is left, every fit leaves no more than noise, also those of wrong effects."""
+    kept = {"kept": (0,), "log_p": -5.0, "signature": SimpleNamespace(friction_changes=())}
+    strong = {"tracker_bias": 100.0, "actuator_lag": 80.0, "uneven_support": 40.0}
+    scores = [SimpleNamespace(gain=gain, kind=effect_named(name), **kept) for name, gain in strong.items()]
+    fitted = SimpleNamespace(reduced_chi2=1.0, score=1000.0)
+    monkeypatch.setattr(confirm, "push_scores", lambda one: np.zeros(8))
+    monkeypatch.setattr(confirm, "_fit", lambda fitter, before, one: fitted)
+    judged = {"gains": np.array(gains), "degenerate": False}
+    monkeypatch.setattr(
+        confirm, "_candidate", lambda fitter, one, fitted, plain: Candidate(score=one, fitted=fitted, **judged)
+    )
+    fitter = SimpleNamespace(case=SimpleNamespace(pool=SimpleNamespace(count=0), problems=range(8)))
+    found = confirm.confirm(fitter, SimpleNamespace(reduced_chi2=1.0, score=0.0), scores, lambda *said: None, most=4)
+    assert len(found) == tried
