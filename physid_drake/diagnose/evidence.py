@@ -95,7 +95,10 @@ def mismatch(fitted: Fitted, screening: Screening | None) -> float:
             speaks: one odd push is no physics.
     """
     cost = float(stats.chi2.sf(fitted.solution.chi2 / SLACK, fitted.degrees))
-    looks = [cost, scatter_p_value(fitted), *([] if screening is None else [screening.p_value])]
+    looks = [cost, 1.0 if screening is None else screening.p_value]
+    scatter = scatter_p_value(fitted)
+    if scatter < 1.0:  # one that is within its bounds says nothing, and is no look
+        looks.append(scatter)
     return float(-np.expm1(len(looks) * np.log1p(-min(*looks, 1.0 - 1e-16))))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from physid_drake.diagnose.case import UNIT_SCATTER
-from physid_drake.diagnose.evidence import MOST_SCATTER, scatter_p_value
+from physid_drake.diagnose.evidence import MOST_SCATTER, mismatch, scatter_p_value
 from physid_drake.diagnose.frictions import friction_trend
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve
 from physid_drake.diagnose.model import Fitted, State
@@ -80,3 +80,10 @@ def test_frictions_that_follow_nothing_are_said_to_follow_something_in_one_of_tw
         for _ in range(400)
     ]
     assert np.mean(said) <= 0.06
+
+
+def test_a_scatter_within_bounds_is_no_look():
+    usual, wide = fitted_to(0.03 * np.linspace(-1.0, 1.0, 10)), fitted_to(0.2 * np.linspace(-1.0, 1.0, 10))
+    assert mismatch(usual, SimpleNamespace(p_value=1e-3)) == pytest.approx(2e-3, rel=1e-2)
+    assert mismatch(wide, SimpleNamespace(p_value=1e-3)) == pytest.approx(3e-3, rel=1e-2)
+    assert mismatch(wide, None) == pytest.approx(3.0 * scatter_p_value(wide), rel=1e-2)
