@@ -2,7 +2,7 @@
 
 The proof's floor is what the true world leaves of pushes whose own friction it is not told. It is told the start of
 the object exactly, which nobody is: a push may move its end by thirty times a difference of its start. Here the true
-world also starts where the tracker saw the object before it moved.
+world also starts where the tracker saw the object before it moved. Where worlds are diagnosed, only those are taken.
 """
 
 import argparse
@@ -31,9 +31,10 @@ def main():
     parser.add_argument("folder", type=Path)
     parser.add_argument("--worlds", type=int, default=20)
     given = parser.parse_args()
-    seals = sorted((given.folder / "sealed").glob("*.json"))[: given.worlds]
-    rows = [row_of(given.folder, seal) for seal in track(seals, console=Console(stderr=True))]
-    Console(width=120).print(table([row for row in rows if row is not None]))
+    answered = {path.parent.name for path in (given.folder / "diagnoses").glob("*/diagnosis.json")}
+    seals = [s for s in sorted((given.folder / "sealed").glob("*.json")) if s.stem in answered or not answered]
+    rows = [row_of(given.folder, seal) for seal in track(seals[: given.worlds], console=Console(stderr=True))]
+    Console(width=120).print(table(rows))
 
 
 def row_of(folder, seal):
