@@ -32,6 +32,7 @@ MOST_EFFECTS = 3
 LONGEST = 450  # rollouts per push, after the first score tests, after which no further effect is looked for
 ANOTHER_BASIN = 10.0  # nats by which a plain fit must be better to be another one
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
+ENOUGH = 180  # rollouts per push in the first step after which no further candidate is tried, half in the second
 WIDE = 2.0  # times the usual scatter of friction: it may be what is missing in disguise
 HOPELESS = 6.0  # cost per degree of freedom with two effects: no third one of the catalogue will make up for that
 
@@ -87,7 +88,10 @@ class Growth:
 
     def grow(self, plain: Looked) -> Grown:
         """Add effects to the plain model, take out what became superfluous, and judge rivals again."""
-        grown = self.pruned(self._added_to(plain))
+        grown = self._added_to(plain)
+        if grown.last.fitted.reduced_chi2 > HOPELESS:
+            return grown  # nothing of it will be named
+        grown = self.pruned(grown)
         for k in range(len(grown.steps) - 1):
             grown = self.reconsidered(grown, k)
         return grown
@@ -100,7 +104,10 @@ class Growth:
         longest = pool.count + LONGEST * len(fitter.case.problems)
         most = min(MOST_EFFECTS, len(self.kinds))
         while len(steps) < most and pool.count < longest and last.p_value < self.alpha:
-            candidates = confirm(fitter, last.fitted, last.screening.scores, tick, most=CANDIDATES - len(steps))
+            candidates = confirm(
+                fitter, last.fitted, last.screening.scores, tick, most=CANDIDATES - len(steps),
+                enough=ENOUGH // (1 + len(steps)),
+            )  # fmt: skip
             if not steps and candidates:
                 better = self.plain_from(base.fitted, candidates[0])
                 if better is not None:
@@ -216,7 +223,9 @@ class Growth:
         if looked.p_value >= alpha:
             return looked
         self.tick("score tests of what is left", 0, 0)
-        fresh = signatures(Fitter(self.fitter.case), model, [k for k in self.kinds if k not in present])
+        own = Fitter(self.fitter.case)
+        fitter = own if model.reduced_chi2 <= EXPLAINED else own.hasty
+        fresh = signatures(fitter, model, [k for k in self.kinds if k not in present])
         return Looked.at(model, fresh, self.rng)
 
 

@@ -110,6 +110,10 @@ class Fits:
         self.left, self.rounds = left, 0
         self.case = None
 
+    @property
+    def hasty(self):
+        return self
+
     def start(self, u, effects):
         return effects
 
