@@ -23,6 +23,7 @@ WORTH_A_FIT = 0.35  # of the best score test's gain
 RIVAL = 0.5  # where one explains the pushes already
 WORTH_A_TRY = 0.1  # where none takes a good part of the mismatch away
 IN_ORDER = math.log(1e-4)  # of a p-value
+ENOUGH = 180  # rollouts per push in one step after which no further effect is tried
 SURE = 2.0  # standard errors
 LEAST = 4.0  # nats of held-out gain
 CERTAIN = 40.0  # nats of held-out gain, the best push not counted
@@ -113,7 +114,7 @@ def push_scores(fitted: Fitted, folds: Sequence[Sequence[int]] | None = None) ->
 
 
 def confirm(
-    fitter: Fitter, before: Fitted, scores: Sequence[Score], tick: Tick, *, most: int, enough: int
+    fitter: Fitter, before: Fitted, scores: Sequence[Score], tick: Tick, *, most: int
 ) -> tuple[Candidate, ...]:
     """Fit the best few effects of a screening, each added to the model ``before``; best held-out gain first.
 
@@ -124,7 +125,6 @@ def confirm(
         tick: told which effect is fitted.
         most: effects that are fitted in any case, if they are worth it; as long as none takes a good part of the
             mismatch away, twice as many. Far from the plain cell a score test says little of what a fit will find.
-        enough: rollouts per push after which no further effect is tried, and no fit again.
     """
     ordered = sorted((s for s in scores if s.kept), key=lambda s: -s.gain)
     worth = [s for s in ordered if s.gain >= WORTH_A_FIT * ordered[0].gain][:most]
@@ -135,7 +135,7 @@ def confirm(
     rest = [s for s in ordered if s.gain >= WORTH_A_TRY * ordered[0].gain and s.kind not in taken]
     more = rest[: 2 * most - len(worth)]
     plain = push_scores(before)
-    spent = fitter.case.pool.count + enough * len(fitter.case.problems)
+    spent = fitter.case.pool.count + ENOUGH * len(fitter.case.problems)
     found: list[Candidate] = []
     for k, one in enumerate((*worth, *more)):
         if k >= len(worth) and (any(worthwhile(before, c) for c in found) or fitter.case.pool.count > spent):

@@ -32,7 +32,6 @@ MOST_EFFECTS = 3
 LONGEST = 450  # rollouts per push, after the first score tests, after which no further effect is looked for
 ANOTHER_BASIN = 10.0  # nats by which a plain fit must be better to be another one
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
-ENOUGH = 180  # rollouts per push in the first step after which no further candidate is tried, half in the second
 WIDE = 2.0  # times the usual scatter of friction: it may be what is missing in disguise
 HOPELESS = 6.0  # cost per degree of freedom with two effects: no third one of the catalogue will make up for that
 
@@ -104,10 +103,7 @@ class Growth:
         longest = pool.count + LONGEST * len(fitter.case.problems)
         most = min(MOST_EFFECTS, len(self.kinds))
         while len(steps) < most and pool.count < longest and last.p_value < self.alpha:
-            candidates = confirm(
-                fitter, last.fitted, last.screening.scores, tick, most=CANDIDATES - len(steps),
-                enough=ENOUGH // (1 + len(steps)),
-            )  # fmt: skip
+            candidates = confirm(fitter, last.fitted, last.screening.scores, tick, most=CANDIDATES - len(steps))
             if not steps and candidates:
                 better = self.plain_from(base.fitted, candidates[0])
                 if better is not None:

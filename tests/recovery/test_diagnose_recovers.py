@@ -90,8 +90,8 @@ def test_the_model_that_leaves_predicts_what_the_diagnosis_says(tilted, tmp_path
 
 
 def test_an_interrupted_diagnosis_goes_on_to_the_same_bytes(tmp_path):
-    made = case(world(count=4, pull=(ERASER.mass * 9.81 * 0.02, 0.0)))
-    effects = ("table_tilt", "viscous_drag")
+    made = case(world(count=3, pull=(ERASER.mass * 9.81 * 0.02, 0.0)))
+    effects = ("table_tilt",)
 
     def stop(stage, done, total):
         if stage.startswith("fit with"):
@@ -133,7 +133,7 @@ def test_a_noise_that_nothing_tells_is_what_the_plain_cell_leaves():
 def test_where_no_noise_is_known_an_effect_is_found_by_the_quiet_that_it_leaves():
     recording = endpoints(world(count=8, pull=(ERASER.mass * 9.81 * 0.03, 0.0)))
     made = case(replace(recording, sensors=Sensors()))
-    diagnosis, evidence = diagnose(made, effects=("table_tilt", "com_offset"))
+    diagnosis, evidence = diagnose(made, effects=("table_tilt",))
     assert not made.noise.known
     assert diagnosis.verdict in ("explained", "ambiguous")
     (found,) = diagnosis.effects

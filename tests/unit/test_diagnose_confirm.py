@@ -158,5 +158,5 @@ def test_what_left_out_pushes_do_not_confirm_keeps_no_weaker_effect_from_a_try(m
     )
     fitter = SimpleNamespace(case=SimpleNamespace(pool=SimpleNamespace(count=0), problems=range(8)))
     before = SimpleNamespace(reduced_chi2=1.0, score=0.0)
-    found = confirm.confirm(fitter, before, scores, lambda *said: None, most=4, enough=180)
+    found = confirm.confirm(fitter, before, scores, lambda *said: None, most=4)
     assert len(found) == tried
