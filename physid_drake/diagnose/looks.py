@@ -100,73 +100,91 @@ def looks_at(wrenches: Sequence[MissingWrench], order: Array, phases: Sequence[s
         order: (n,) of their pushes.
         phases: in which they act; elsewhere the patterns are zero.
     """
-    n = len(wrenches)
-    acting = np.array([w.phase in phases for w in wrenches])
     heading, yaw, speed, spin = (np.array([getattr(w, name) for w in wrenches]) for name in
                                  ("heading", "yaw", "speed", "spin"))  # fmt: skip
     place = np.array([w.place for w in wrenches])
-    one = np.ones(n)
-
-    def centred(values: Array) -> Array:
-        """Less their mean where the pattern acts, so that it is no constant force."""
-        return np.asarray(values - values[acting].mean(axis=0))
-
-    def pattern(component: int, *values: Array) -> Array:
-        weights = np.zeros((n, 3, len(values)))
-        for k, value in enumerate(values):
-            weights[:, component, k] = value * acting
-        return weights
-
-    def fixed(angle: Array) -> Array:
-        """Forces along a direction that turns with ``angle`` (n,), and across it."""
-        weights = np.zeros((n, 3, 2))
-        for k, direction in enumerate((angle, angle + 0.5 * math.pi)):
-            weights[:, 0, k], weights[:, 1, k] = (
-                acting * np.cos(direction - heading),
-                acting * np.sin(direction - heading),
-            )
-        return weights
-
-    def circle(angle: Array) -> tuple[Array, Array]:
-        return np.cos(angle), np.sin(angle)
-
-    def grain(angle: Array) -> Array:
-        """What a friction that is larger along one axis is more than its mean: it holds back, and draws aside."""
-        weights = np.zeros((n, 3, 2))
-        weights[:, 0, 0], weights[:, 1, 0] = acting * np.cos(2.0 * angle), acting * -np.sin(2.0 * angle)
-        weights[:, 0, 1], weights[:, 1, 1] = acting * np.sin(2.0 * angle), acting * np.cos(2.0 * angle)
-        return weights
-
+    every = np.ones(len(wrenches))
+    over = _Patterns(acting=np.array([w.phase in phases for w in wrenches]), heading=heading)
     along, across, torque = range(3)
     force, motion, turn = DOFS[:2], DOFS[:1], DOFS[2:]
     return [
-        Look(frame="object_velocity", dof=motion, weights=pattern(along, one),
+        Look(frame="object_velocity", dof=motion, weights=over.component(along, every),
              words=lambda c: f"{_sense(c)} the motion, wherever the object heads"),
-        Look(frame="object_velocity", dof=motion, weights=pattern(along, centred(speed)),
+        Look(frame="object_velocity", dof=motion, weights=over.component(along, over.centred(speed)),
              words=lambda c: f"{_sense(c)} the motion, more so the faster it is"),
-        Look(frame="object_velocity", dof=DOFS[1:2], weights=pattern(across, one),
-             words=lambda c: f"to the {'left' if c[0] > 0.0 else 'right'} of the motion, wherever the object heads"),
-        Look(frame="object_velocity", dof=turn, weights=pattern(torque, spin),
+        Look(frame="object_velocity", dof=DOFS[1:2], weights=over.component(across, every),
+             words=lambda c: f"to the {_side(c)} of the motion, wherever the object heads"),
+        Look(frame="object_velocity", dof=turn, weights=over.component(torque, spin),
              words=lambda c: f"{_sense(c)} its turning"),
-        Look(frame="world", dof=force, weights=fixed(np.zeros(n)),
+        Look(frame="world", dof=force, weights=over.fixed(0.0 * yaw),
              words=lambda c: f"towards {_degrees(c)} degrees on the table"),
-        Look(frame="world", dof=force, weights=grain(heading),
+        Look(frame="world", dof=force, weights=over.grain(heading),
              words=lambda c: f"against the motion, most along {_axis(-c)} degrees on the table, and aside"),
-        Look(frame="world", dof=motion, weights=pattern(along, *centred(place).T),
+        Look(frame="world", dof=motion, weights=over.component(along, *over.centred(place).T),
              words=lambda c: f"along the motion, changing towards {_degrees(c)} degrees on the table"),
-        Look(frame="object", dof=force, weights=fixed(yaw),
+        Look(frame="object", dof=force, weights=over.fixed(yaw),
              words=lambda c: f"towards {_degrees(c)} degrees of the object"),
-        Look(frame="object", dof=force, weights=grain(heading - yaw),
+        Look(frame="object", dof=force, weights=over.grain(heading - yaw),
              words=lambda c: f"against the motion, most along {_axis(-c)} degrees of the object, and aside"),
-        Look(frame="object", dof=turn, weights=pattern(torque, one),
-             words=lambda c: f"as a torque to the {'left' if c[0] > 0.0 else 'right'}"),
-        Look(frame="object", dof=turn, weights=pattern(torque, *circle(heading - yaw)),
+        Look(frame="object", dof=turn, weights=over.component(torque, every),
+             words=lambda c: f"as a torque to the {_side(c)}"),
+        Look(frame="object", dof=turn, weights=over.component(torque, *_circle(heading - yaw)),
              words=lambda c: "as a torque, by which side of the object leads"),
-        Look(frame="hand", dof=turn, weights=pattern(torque, *circle(heading)),
+        Look(frame="hand", dof=turn, weights=over.component(torque, *_circle(heading)),
              words=lambda c: "as a torque, by where the push heads"),
-        Look(frame="push_order", dof=motion, weights=pattern(along, centred(order)),
+        Look(frame="push_order", dof=motion, weights=over.component(along, over.centred(order)),
              words=lambda c: "along the motion, changing from push to push"),
     ]  # fmt: skip
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class _Patterns:
+    """Patterns (n, 3, k) over n windows: along the motion, across it, and about the vertical.
+
+    Attributes:
+        acting: (n,) whether a pattern acts in a window.
+        heading: (n,) of the motion [rad].
+    """
+
+    acting: NDArray[np.bool_]
+    heading: Array
+
+    def centred(self, values: Array) -> Array:
+        """Less their mean where the pattern acts, so that it is no constant force."""
+        return np.asarray(values - values[self.acting].mean(axis=0))
+
+    def component(self, row: int, *values: Array) -> Array:
+        """One degree of freedom, in proportion to each of the values (n,)."""
+        weights = self._blank(len(values))
+        for k, value in enumerate(values):
+            weights[:, row, k] = value * self.acting
+        return weights
+
+    def fixed(self, angle: Array) -> Array:
+        """Forces along a direction that turns with ``angle`` (n,), and across it."""
+        weights = self._blank(2)
+        for k, direction in enumerate((angle, angle + 0.5 * math.pi)):
+            weights[:, 0, k] = self.acting * np.cos(direction - self.heading)
+            weights[:, 1, k] = self.acting * np.sin(direction - self.heading)
+        return weights
+
+    def grain(self, angle: Array) -> Array:
+        """What a friction that is larger along one axis is more than its mean: it holds back, and draws aside."""
+        weights, (cosine, sine) = self._blank(2), _circle(2.0 * angle)
+        weights[:, 0, 0], weights[:, 1, 0] = self.acting * cosine, self.acting * -sine
+        weights[:, 0, 1], weights[:, 1, 1] = self.acting * sine, self.acting * cosine
+        return weights
+
+    def _blank(self, count: int) -> Array:
+        return np.zeros((len(self.heading), 3, count))
+
+
+def _circle(angle: Array) -> tuple[Array, Array]:
+    return np.cos(angle), np.sin(angle)
+
+
+def _side(coefficients: Array) -> str:
+    return "left" if coefficients[0] > 0.0 else "right"
 
 
 def _sense(coefficients: Array) -> str:
