@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from reference.planar import GRAVITY, box, simulate_planar
+from reference.planar import box, simulate_planar
 from reference.scenes import OBJECTS, Theta, draw_push
+from reference.steps import GRAVITY
 from scipy.integrate import dblquad
 from twin import MODELS, SIGMA, body_of, cell_of, config_of, rms, shape_of, twin
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from reference.planar import routh_impact
+from reference.steps import routh_impact
 
 from physid_drake.cell.impact import routh_impulse
 

@@ -13,7 +13,7 @@ from scipy.integrate import dblquad, solve_ivp
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from reference.planar import GRAVITY, Hand, HandPath, PlanarObject, box, routh_impact, simulate_planar
+from reference.planar import Hand, HandPath, PlanarObject, box, simulate_planar
 from reference.scenes import (
     OBJECTS,
     QUIET,
@@ -23,6 +23,7 @@ from reference.scenes import (
     sixty_pushes,
     write_reference_recording,
 )
+from reference.steps import GRAVITY, routh_impact
 
 LONG_ERASER = box("long eraser", (0.05, 0.12, 0.03), 0.05)
 ERASER = OBJECTS["eraser"]
