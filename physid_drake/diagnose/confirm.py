@@ -205,16 +205,15 @@ def _fit(fitter: Fitter, before: Fitted, one: Score) -> Fitted:
     """The model with an effect, from where the score test says, with the derivatives of the model before."""
     effects = (*before.state.effects, start_of(fitter, one))
     if before.reduced_chi2 > FAR_OFF:
-        return fitter.fit_from_afar(fitter.start(before.state.u, effects), careful=4, rounds=3, like=before)
+        return fitter.fit(fitter.start(before.state.u, effects), rounds=7, careful=4, like=before)
     return fitter.fit(dc.replace(before.state, effects=effects), rounds=4, like=before)
 
 
 def _fit_from_afar(fitter: Fitter, before: Fitted, candidate: Candidate) -> Fitted:
     """The same from the best of a scan, all derivatives taken on the way: far off, the plain ones mislead."""
-    point, theta = scanned_start(fitter.hasty, before, candidate.score)
+    point, theta = scanned_start(fitter, before, candidate.score)
     u = np.clip(before.state.u + np.clip(theta, -FAR, FAR), 1e-3, 1.0 - 1e-3)
-    start = fitter.start(u, (*before.state.effects, point))
-    return fitter.fit_from_afar(start, careful=2, rounds=2, renew=True)
+    return fitter.fit(fitter.start(u, (*before.state.effects, point)), rounds=4, careful=2, renew=True)
 
 
 def _degenerate(fitter: Fitter, one: Score, point: EffectPoint) -> bool:

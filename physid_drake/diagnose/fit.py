@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses as dc
 from collections.abc import Callable, Sequence
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +32,6 @@ SETTLED = 0.5  # of the cost: a step that gained less is the last
 REFINEMENTS = 3  # steps on short ticks
 RENEWED = 5.0  # of the cost, per push: a step that gained as much has left the place of its derivatives
 MOST_THETA_MOVE = 0.25  # of the unit cube in one iteration
-HASTE = 2.0  # times longer ticks
 Say = Callable[[str], None]
 
 
@@ -57,12 +55,6 @@ class Fitter:
         self._most = [
             np.array([MOST_FRICTION if name == "friction" else MOST_OWN for name in n.names]) for n in case.nuisances
         ]
-
-    @cached_property
-    def hasty(self) -> Fitter:
-        """The same on ticks twice as long: half the time, and a standard deviation off; enough far from an answer."""
-        problems = tuple(dc.replace(p, pace=HASTE * p.pace) for p in self.case.problems)
-        return Fitter(dc.replace(self.case, problems=problems), self.extra, self.tolerances)
 
     def start(self, u: Array, effects: tuple[EffectPoint, ...] = ()) -> State:
         """A model at theta ``u`` (d,), the pushes' unknowns at zero."""
@@ -323,13 +315,6 @@ class Fitter:
             like = best if anew or whole else like
             k += 1
         return best
-
-    def fit_from_afar(
-        self, state: State, *, careful: int, rounds: int, like: Fitted | None = None, renew: bool = False
-    ) -> Fitted:
-        """As ``fit``, with careful rounds in haste, and ``rounds`` after them."""
-        near = self.hasty.fit(state, rounds=careful, careful=careful, like=like, renew=renew)
-        return self.fit(near.state, rounds=rounds, like=near if renew else like, renew=renew)
 
     def _tried(self, best: Fitted, *, cautious: bool, released: bool) -> Fitted:
         """One step, shorter where a long one fails; the derivatives stay those of where it starts.

@@ -87,10 +87,7 @@ class Growth:
 
     def grow(self, plain: Looked) -> Grown:
         """Add effects to the plain model, take out what became superfluous, and judge rivals again."""
-        grown = self._added_to(plain)
-        if grown.last.fitted.reduced_chi2 > HOPELESS:
-            return grown  # nothing of it will be named
-        grown = self.pruned(grown)
+        grown = self.pruned(self._added_to(plain))
         for k in range(len(grown.steps) - 1):
             grown = self.reconsidered(grown, k)
         return grown
@@ -219,9 +216,7 @@ class Growth:
         if looked.p_value >= alpha:
             return looked
         self.tick("score tests of what is left", 0, 0)
-        own = Fitter(self.fitter.case)
-        fitter = own if model.reduced_chi2 <= EXPLAINED else own.hasty
-        fresh = signatures(fitter, model, [k for k in self.kinds if k not in present])
+        fresh = signatures(Fitter(self.fitter.case), model, [k for k in self.kinds if k not in present])
         return Looked.at(model, fresh, self.rng)
 
 

@@ -102,7 +102,7 @@ def least_squares(case: Case, at: Fitted) -> Fitted:
         case: the pushes.
         at: a plain model that says where to start, and how much is left over.
     """
-    loud = Fitter(_blunted(case, at)).hasty
+    loud = Fitter(_blunted(case, at))
     return loud.fit(loud.start(at.state.u), rounds=CAREFUL, careful=CAREFUL + 1, like=at, renew=True)
 
 

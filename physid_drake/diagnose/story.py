@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.conclude import class_of, conclude
-from physid_drake.diagnose.confirm import FAR_OFF, WORTH_A_TRY
+from physid_drake.diagnose.confirm import WORTH_A_TRY
 from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, confirmed
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.grow import Grown, Growth, Looked
@@ -174,8 +174,7 @@ def _looks(
     if kept is not None and len(kept) == len(blank) * len(case.problems):  # of a run of this version
         edges = iter(kept)
         return tuple(guard_kept), [dc.replace(s, columns=tuple(next(edges) for _ in case.problems)) for s in blank]
-    hasty = fitter.hasty if first.reduced_chi2 > FAR_OFF else fitter
-    found = signatures(hasty, first, kinds, lambda done, total: tick("score tests", done, total))
+    found = signatures(fitter, first, kinds, lambda done, total: tick("score tests", done, total))
     memory.keep("signatures", [c for s in found for c in s.columns])
     return tuple(guard_kept), found
 

@@ -157,6 +157,5 @@ def test_what_left_out_pushes_do_not_confirm_keeps_no_weaker_effect_from_a_try(m
         confirm, "_candidate", lambda fitter, one, fitted, plain: Candidate(score=one, fitted=fitted, **judged)
     )
     fitter = SimpleNamespace(case=SimpleNamespace(pool=SimpleNamespace(count=0), problems=range(8)))
-    before = SimpleNamespace(reduced_chi2=1.0, score=0.0)
-    found = confirm.confirm(fitter, before, scores, lambda *said: None, most=4)
+    found = confirm.confirm(fitter, SimpleNamespace(reduced_chi2=1.0, score=0.0), scores, lambda *said: None, most=4)
     assert len(found) == tried

@@ -67,19 +67,3 @@ def test_a_push_left_out_whose_rollout_diverges_is_predicted_by_the_derivatives(
     for one, other in zip(simulated, fitter.left_out(fitted), strict=True):
         assert np.abs(other).max() < 0.1 * FAILED
         assert np.linalg.norm(one - other) < np.linalg.norm(one)
-
-
-def test_haste_is_nearly_right_in_the_same_pool(fitter):
-    state = fitter.start(np.full(3, 0.5))
-    pool, before = fitter.case.pool, fitter.case.pool.count
-    exact, near = (one.vectors([one.task(state, i) for i in range(3)]) for one in (fitter, fitter.hasty))
-    errors = [float(np.sqrt(np.mean((a - b) ** 2))) for a, b in zip(exact, near, strict=True)]
-    assert 0.0 < max(errors) < 2.0  # standard deviations; 1.1 measured
-    assert pool.count == before + 6
-
-
-def test_a_fit_from_afar_ends_on_the_ticks_of_its_own_case(fitter):
-    fitted = fitter.fit_from_afar(fitter.start(np.full(3, 0.5)), careful=2, rounds=1, renew=True)
-    again = fitter.vectors([fitter.task(fitted.state, i) for i in range(3)])
-    assert all(np.array_equal(a, b) for a, b in zip(again, fitted.predicted, strict=True))
-    assert fitted.score > fitter.linearise(fitter.start(np.full(3, 0.5))).score

@@ -103,14 +103,6 @@ def test_two_effects_that_both_matter_stay(grown):
     assert pruned.last is grown.last
 
 
-@pytest.mark.parametrize(("left", "names"), [(2.0, ["table_tilt"]), (40.0, ["magnet", "table_tilt"])])
-def test_a_model_that_explains_nothing_is_not_tidied(grown, monkeypatch, left, names):
-    grown.last.fitted.reduced_chi2 = left
-    monkeypatch.setattr(grow.Growth, "_added_to", lambda self, plain: grown)
-    monkeypatch.setattr(grow, "class_of", lambda plain, step: ())
-    assert names_of(growth(Refits({("table_tilt",): -1.2})).grow(grown.base)) == names
-
-
 @pytest.fixture
 def rivalled(grown, monkeypatch):
     """A magnet that a tilted table is like, and a drag beside it; (without the first effect, -60 a push)."""

@@ -110,10 +110,6 @@ class Fits:
         self.left, self.rounds = left, 0
         self.case = None
 
-    @property
-    def hasty(self):
-        return self
-
     def start(self, u, effects):
         return effects
 
