@@ -116,7 +116,7 @@ def looks_at(wrenches: Sequence[MissingWrench], order: Array, phases: Sequence[s
              words=lambda c: f"to the {_side(c)} of the motion, wherever the object heads"),
         Look(frame="object_velocity", dof=turn, weights=over.component(torque, spin),
              words=lambda c: f"{_sense(c)} its turning"),
-        Look(frame="world", dof=force, weights=over.fixed(0.0 * yaw),
+        Look(frame="world", dof=force, weights=over.fixed(np.zeros_like(yaw)),
              words=lambda c: f"towards {_degrees(c)} degrees on the table"),
         Look(frame="world", dof=force, weights=over.grain(heading),
              words=lambda c: f"against the motion, most along {_axis(-c)} degrees on the table, and aside"),
