@@ -97,7 +97,8 @@ def mismatch(fitted: Fitted, screening: Screening | None) -> float:
     cost = float(stats.chi2.sf(fitted.solution.chi2 / SLACK, fitted.degrees))
     looks = [cost, 1.0 if screening is None else screening.p_value]
     scatter = scatter_p_value(fitted)
-    # One within its bounds says nothing and is no look: where the true one is at its bound, false alarms are up to 4/3.
+    # One within its bounds says nothing and is no look. Where the true one is at its bound, that costs up to a third
+    # more false alarms.
     if scatter < 1.0:
         looks.append(scatter)
     return float(-np.expm1(len(looks) * np.log1p(-min(*looks, 1.0 - 1e-16))))
