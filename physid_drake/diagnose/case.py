@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import CellConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.diagnose.features import PushFeatures, features_of
-from physid_drake.diagnose.noise import TrackerNoise, tracker_noise
+from physid_drake.diagnose.noise import ForceNoise, TrackerNoise, tracker_noise
 from physid_drake.effects import Surroundings
 from physid_drake.errors import RecordingError
 from physid_drake.identify.config import ThetaConfig
@@ -65,15 +65,15 @@ class Case:
     config: CellConfig
     odd: tuple[float, ...] = ()
 
-    def louder(self, factor: float, force_factor: float, odd: Sequence[float] = ()) -> Case:
+    def louder(self, factor: float, forces: ForceNoise, odd: Sequence[float] = ()) -> Case:
         """The case with more noise.
 
         Args:
             factor: times the noise of the poses.
-            force_factor: times the wandering of the forces.
+            forces: the noise of the forces.
             odd: (n,) how many times as loud as the others a push is, in all; none where empty.
         """
-        common = self.noise.louder(factor, force_factor)
+        common = self.noise.louder(factor, forces)
         odd = tuple(odd) or (1.0,) * len(self.problems)
         features = tuple(
             features_of(push, problem, common if times == 1.0 else common.louder(times))

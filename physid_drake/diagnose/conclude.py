@@ -125,8 +125,9 @@ def _explained(evidence: Evidence) -> bool:
         return False
     if evidence.case.noise.known:
         return not unexplained(evidence.plain, evidence.final)
-    # A noise that was taken to be what a model leaves: it must have become much less.
-    return evidence.noise_share <= MOST_OF_UNKNOWN and scatter_p_value(evidence.final) >= TOO_SCATTERED
+    # A noise that was taken to be what a model leaves: it must have become much less. Nobody states there how much
+    # friction scatters either: what it leaves is said (``left``), and takes no name away.
+    return evidence.noise_share <= MOST_OF_UNKNOWN
 
 
 def _location(evidence: Evidence, verdict: str, findings: Sequence[EffectFinding], seed: int) -> Location | None:
@@ -287,7 +288,8 @@ def _why_not_fitted(name: str, evidence: Evidence) -> str:
 
 
 def _left(evidence: Evidence, verdict: str, after: Fitted, partly: Partly | None) -> str:
-    if after.reduced_chi2 <= EXPLAINED and verdict == "unexplained":
+    hidden = scatter_p_value(after) < TOO_SCATTERED
+    if after.reduced_chi2 <= EXPLAINED and (hidden or verdict == "unexplained"):
         scatter = 100.0 * UNIT_SCATTER * after.state.scatter
         trend = friction_trend(evidence.case, after)
         follows = "" if trend is None else f", {trend}"

@@ -11,7 +11,7 @@ import dataclasses as dc
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.noise import TrackerNoise
+from physid_drake.diagnose.noise import ForceNoise, TrackerNoise
 from physid_drake.identify.problem import PushProblem
 from physid_drake.identify.rollouts import Prediction
 from physid_drake.recording import Push, rest_segments
@@ -35,6 +35,8 @@ class PushFeatures:
         recorded: (m,) the recording's features, in standard deviations.
         noise: (m, m) covariance of the features: tracker, time stamps, and the cell's own error.
         force_std: (k,) of each force window [N].
+        force_way: (k,) how far the hand has gone by each [m].
+        force_size: root mean square of the force [N].
     """
 
     averaging: Array
@@ -43,6 +45,8 @@ class PushFeatures:
     recorded: Array
     noise: Array
     force_std: Array
+    force_way: Array
+    force_size: float
 
     def of(self, prediction: Prediction) -> Array:
         """Features (m,) of a rollout."""
@@ -51,6 +55,13 @@ class PushFeatures:
     def _vector(self, poses: Array, forces: Array) -> Array:
         windows = (self.averaging @ poses) / self.sigmas
         return np.concatenate([windows.T.ravel(), (forces / self.force_std[:, None]).T.ravel()])
+
+    def force_noise(self, forces: ForceNoise) -> Array:
+        """Covariance (k, k) of a component in all windows, in deviations: white, wandering, off as a whole."""
+        gaps = np.abs(self.force_way[:, None] - self.force_way[None, :])
+        shares = forces.scatter**2 * np.exp(-gaps / FORCE_MEMORY) + forces.offset**2
+        scaled: Array = self.force_size**2 * shares / np.outer(self.force_std, self.force_std)
+        return np.eye(len(self.force_std)) + scaled
 
     def poses(self, vector: Array) -> Array:
         """Window means (w, 3) [m, m, rad] of a vector (m,)."""
@@ -74,7 +85,6 @@ def features_of(push: Push, problem: PushProblem, noise: TrackerNoise) -> PushFe
         part = slice(dof * count, (dof + 1) * count)
         blocks[part, part] = averaging @ covariance @ averaging.T
         blocks[part, part] += (FLOOR[dof] / noise.sigmas[dof]) ** 2 * (0.9 + 0.1 * np.eye(count))
-    blocks[3 * count :, 3 * count :] = _force_noise(problem, noise.force_scatter)
     made = PushFeatures(
         averaging=averaging,
         middles=averaging @ times,
@@ -82,24 +92,18 @@ def features_of(push: Push, problem: PushProblem, noise: TrackerNoise) -> PushFe
         recorded=np.zeros(0),
         noise=blocks,
         force_std=force_std,
+        force_way=_way(problem),
+        force_size=float(np.sqrt((problem.forces**2).sum(axis=1).mean())) if len(force_std) else 0.0,
     )
+    blocks[3 * count :, 3 * count :] = np.kron(np.eye(2), made.force_noise(noise.forces))
     return dc.replace(made, recorded=made._vector(problem.poses, problem.forces))
 
 
-def _force_noise(problem: PushProblem, scatter: float) -> Array:
-    """Covariance (2k, 2k) of force windows in their deviations: white noise, and friction that wanders on the way."""
-    k = len(problem.force_std)
-    if not k:
-        return np.zeros((0, 0))
-    size = float(np.sqrt((problem.forces**2).sum(axis=1).mean())) * scatter
+def _way(problem: PushProblem) -> Array:
+    """How far the hand has gone (k,) by each force window [m]."""
+    k = len(problem.force_times)
     places = np.zeros((k, 2)) if problem.path is None else problem.path.positions(problem.force_times)
-    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
-    gaps = np.abs(way[:, None] - way[None, :])
-    wandering = size**2 * np.exp(-gaps / FORCE_MEMORY) / np.outer(problem.force_std, problem.force_std)
-    block = np.eye(k) + wandering
-    zero = np.zeros((k, k))
-    noise: Array = np.block([[block, zero], [zero, block]])
-    return noise
+    return np.concatenate([np.zeros(min(k, 1)), np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
 
 
 def _averaging(push: Push, problem: PushProblem) -> Array:

@@ -23,6 +23,19 @@ CONTRADICTS = 1.5  # seen over stated: beyond it the stated figure is not believ
 
 
 @dc.dataclass(frozen=True, kw_only=True)
+class ForceNoise:
+    """What the hand's recorded force differs by from that of a rigid body, beside white noise.
+
+    Attributes:
+        scatter: by how much of itself it wanders on its way [-].
+        offset: by how much of itself it may be off over a whole push, along and across [-].
+    """
+
+    scatter: float = FORCE_SCATTER
+    offset: float = 0.0
+
+
+@dc.dataclass(frozen=True, kw_only=True)
 class TrackerNoise:
     """Noise of the object's stream.
 
@@ -32,7 +45,7 @@ class TrackerNoise:
         jitter: standard deviation of the time stamps [s], as far as moving samples show more noise than resting ones.
         stated: whether the recording states the standard deviations, and they are believed.
         known: whether they were stated or seen; if not, what the plain cell leaves has to serve.
-        force_scatter: by how much of itself the hand's force wanders on its way [-].
+        forces: of the hand's force.
         warnings: what was found to contradict the recording.
     """
 
@@ -42,7 +55,7 @@ class TrackerNoise:
     jitter: float
     stated: bool
     known: bool = True
-    force_scatter: float = FORCE_SCATTER
+    forces: ForceNoise = ForceNoise()
     warnings: tuple[str, ...] = ()
 
     @property
@@ -50,15 +63,15 @@ class TrackerNoise:
         """Standard deviations (3,) of x, y, yaw [m, m, rad]."""
         return np.array([self.position, self.position, self.rotation])
 
-    def louder(self, factor: float, force_factor: float = 1.0) -> TrackerNoise:
-        """The same noise, ``factor`` times as large, forces wandering ``force_factor`` times as much; it says so."""
+    def louder(self, factor: float, forces: ForceNoise | None = None) -> TrackerNoise:
+        """The same noise, ``factor`` times as large, and perhaps another one of the forces; it says so."""
         position, rotation = factor * self.position, factor * self.rotation
         said = (
             f"{UNKNOWN}: the object's noise is taken to be what the plain cell leaves,"
             f" {1e3 * position:.2g} mm and {math.degrees(rotation):.2g} deg"
         )
         return dc.replace(
-            self, position=position, rotation=rotation, force_scatter=force_factor * self.force_scatter,
+            self, position=position, rotation=rotation, forces=forces or self.forces,
             warnings=(*(w for w in self.warnings if not w.startswith(UNKNOWN)), said),
         )  # fmt: skip
 

@@ -5,18 +5,25 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from physid_drake.diagnose.features import PushFeatures
 from physid_drake.diagnose.linear import LinearPush
 from physid_drake.diagnose.loudness import _left_over, quieter
+from physid_drake.diagnose.noise import ForceNoise
 
 PUSHES = 40
 
 
-def case_of_ends(odd=()):
-    return SimpleNamespace(features=[SimpleNamespace(middles=np.zeros(1))] * PUSHES, odd=odd)
+def case_of_ends(odd=(), windows=0):
+    features = PushFeatures(
+        averaging=np.ones((1, 1)), middles=np.zeros(1), sigmas=np.ones(3), recorded=np.zeros(3 + 2 * windows),
+        noise=np.eye(3 + 2 * windows), force_std=np.full(windows, 0.1), force_size=2.0,
+        force_way=np.linspace(0.0, 0.02, windows),
+    )  # fmt: skip
+    return SimpleNamespace(features=[features] * PUSHES, odd=odd, noise=SimpleNamespace(forces=ForceNoise()))
 
 
 def model_that_leaves(residuals, forces=None):
-    """A model whose pushes have an end pose each, (n, 3) [standard deviations], and perhaps forces (n, k)."""
+    """A model whose pushes have an end pose each, (n, 3) [standard deviations], and perhaps forces (n, 2k)."""
     vectors = residuals if forces is None else np.hstack([residuals, forces])
     pushes = tuple(
         LinearPush(
@@ -36,9 +43,9 @@ def errors():
 
 
 def test_the_noise_is_that_of_most_pushes(errors):
-    factor, force_factor, odd = _left_over(case_of_ends(), model_that_leaves(errors))
+    factor, forces, odd = _left_over(case_of_ends(), model_that_leaves(errors))
     assert factor == pytest.approx(3.0, rel=0.15)  # the median of 40 has a standard error of 9 %
-    assert force_factor == 1.0
+    assert forces == ForceNoise()
     assert np.mean(np.array(odd) == 1.0) > 0.9
 
 
@@ -60,10 +67,15 @@ def test_what_a_loud_push_leaves_is_counted_in_everyones_deviations(errors):
     np.testing.assert_allclose(again[2], first[2], rtol=1e-9)
 
 
-def test_forces_have_a_factor_of_their_own(errors):
-    forces = 2.0 * np.random.default_rng(1).normal(size=(PUSHES, 10))
-    _, force_factor, _ = _left_over(case_of_ends(), model_that_leaves(errors, forces))
-    assert force_factor == pytest.approx(2.0, rel=0.1)
+@pytest.mark.parametrize(("scatter", "offset"), [(0.12, 0.0), (0.03, 0.16), (0.12, 0.32)])
+def test_forces_wander_and_are_off_as_much_as_they_do(errors, scatter, offset):
+    case = case_of_ends(windows=40)
+    lower = np.linalg.cholesky(case.features[0].force_noise(ForceNoise(scatter=scatter, offset=offset)))
+    white = np.random.default_rng(1).normal(size=(PUSHES, 2, 40))
+    _, forces, _ = _left_over(case, model_that_leaves(errors, (white @ lower.T).reshape(PUSHES, -1)))
+    # The grids' steps are a factor of 1.41 and 2.
+    assert forces.scatter == pytest.approx(scatter, rel=0.5)
+    assert forces.offset == pytest.approx(offset, rel=0.6, abs=0.03)
 
 
 def test_half_the_deviation_is_a_quarter_of_the_variance():
