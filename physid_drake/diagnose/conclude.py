@@ -288,8 +288,9 @@ def _why_not_fitted(name: str, evidence: Evidence) -> str:
 
 
 def _left(evidence: Evidence, verdict: str, after: Fitted, partly: Partly | None) -> str:
-    hidden = scatter_p_value(after) < TOO_SCATTERED
-    if after.reduced_chi2 <= EXPLAINED and (hidden or verdict == "unexplained"):
+    named = verdict in ("explained", "ambiguous")
+    hidden = verdict == "unexplained" or (named and scatter_p_value(after) < TOO_SCATTERED)
+    if after.reduced_chi2 <= EXPLAINED and hidden:
         scatter = 100.0 * UNIT_SCATTER * after.state.scatter
         trend = friction_trend(evidence.case, after)
         follows = "" if trend is None else f", {trend}"

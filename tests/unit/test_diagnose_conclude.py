@@ -95,3 +95,8 @@ def test_a_model_that_predicts_left_out_pushes_worse_explains_nothing(monkeypatc
         monkeypatch.setattr(conclude, "friction_trend", lambda case, after, trend=trend: trend)
         assert conclude._left(worse, "unexplained", hidden, None) == said
     assert conclude._left(worse, "consistent", hidden, None).startswith("nothing beyond noise")
+    # Beside a name, too, where nobody states how much friction scatters.
+    for p_value, said in ((0.001, hides), (0.1, "nothing beyond noise")):
+        monkeypatch.setattr(conclude, "friction_trend", lambda case, after: None)
+        monkeypatch.setattr(conclude, "scatter_p_value", lambda fitted, p=p_value: p)
+        assert conclude._left(worse, "explained", hidden, None).startswith(said)
