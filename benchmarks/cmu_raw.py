@@ -5,6 +5,9 @@ turns by d / c^2 for every metre that it goes along the force, c being the large
 friction force (S. Goyal, A. Ruina, J. Papadopoulos, Wear 143, 1991; R. Howe, M. Cutkosky, IJRR 15, 1996). Under the
 Coulomb friction of known weights c is their mean distance from the centre of mass. So the slope of turn per metre
 over measured arms says how far out the triangle stands; neither friction nor the contact with the finger matters.
+With c, each push's mean force f at its arm d says what a force without an arm would be, f sqrt(1 + (d / c)^2); how
+much that differs from push to push is the scatter of friction (median absolute deviation of its logarithm, as of a
+normal distribution).
 """
 
 import argparse
@@ -37,15 +40,15 @@ def main():
     if not folder.is_dir():
         sys.exit(f"error: no folder '{folder}'.")
     table = Table(title="largest friction torque over largest friction force [mm]")
-    for column in ("support", "pushes", "from the logs", "90 %", "from the points", "if even"):
+    for column in ("support", "pushes", "from the logs", "90 %", "from the points", "if even", "friction"):
         table.add_column(column, no_wrap=True, justify="left" if column == "support" else "right")
     for name in SUPPORTS:
-        arms, turns = arms_and_turns(pushes_in(folder / name))
+        arms, turns, forces = arms_turns_and_forces(pushes_in(folder / name))
         radius, (low, high) = fitted_radius(arms, turns)
         known = "" if name == "patch" else f"{1e3 * radius_of_points(name):.1f}"
         table.add_row(
             name, str(len(arms)), f"{1e3 * radius:.1f}", f"{1e3 * low:.1f} to {1e3 * high:.1f}", known,
-            f"{1e3 * radius_if_even():.1f}",
+            f"{1e3 * radius_if_even():.1f}", f"+-{100 * scatter_of_friction(arms, forces, radius):.0f} %",
         )  # fmt: skip
     Console(width=110).print(table)
 
@@ -58,13 +61,13 @@ def pushes_in(source):
         return read_recording(Path(made) / "pushes").pushes
 
 
-def arms_and_turns(pushes):
-    """Arm of the mean force about the centre of mass (n,) [m], and turn per way along it (n,) [rad/m]."""
-    rows = [row for row in map(arm_and_turn, pushes) if row is not None]
+def arms_turns_and_forces(pushes):
+    """Arm of the mean force about the centre of mass [m], turn per way along it [rad/m], that force [N]: (3, n)."""
+    rows = [row for row in map(arm_turn_and_force, pushes) if row is not None]
     return np.array(rows).T
 
 
-def arm_and_turn(push):
+def arm_turn_and_force(push):
     force = push.force.forces[:, :2]
     size = np.linalg.norm(force, axis=1)
     if (size > LEAST_FORCE).sum() < 20:
@@ -77,13 +80,20 @@ def arm_and_turn(push):
     arm = hand - (push.object.positions[0, :2] + done[:, None] * way)
     torque = np.mean(arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0])
     mean = force.mean(axis=0)
-    along = float(way @ mean) / float(np.linalg.norm(mean))
+    pull = float(np.linalg.norm(mean))
+    along = float(way @ mean) / pull
     w, _, _, z = push.object.quaternions[[0, -1]].T
     yaw = 2.0 * np.arctan2(z, w)
     turn = (yaw[1] - yaw[0] + np.pi) % (2.0 * np.pi) - np.pi
     if along < LEAST_WAY:
         return None
-    return torque / float(np.linalg.norm(mean)), turn / along
+    return torque / pull, turn / along, pull
+
+
+def scatter_of_friction(arms, forces, radius):
+    """How much the force without an arm differs from push to push [-]."""
+    logs = np.log(forces * np.hypot(1.0, arms / radius))
+    return float(stats.median_abs_deviation(logs, scale="normal"))
 
 
 def fitted_radius(arms, turns):
