@@ -106,7 +106,7 @@ def _verdict(evidence: Evidence, p_value: float, alpha: float, detectable: Seque
         return "underpowered" if blind else "consistent"
     if not evidence.steps or not _explained(evidence):
         return "unexplained"
-    return "ambiguous" if any(class_of(evidence.plain, step) for step in evidence.steps) else "explained"
+    return "ambiguous" if any(_class_beside(evidence, k) for k in range(len(evidence.steps))) else "explained"
 
 
 def _predicts(evidence: Evidence) -> bool:
@@ -156,11 +156,22 @@ def class_of(plain: Fitted, step: Sequence[Candidate]) -> tuple[str, ...]:
     return tuple(sorted(close))
 
 
-def _probability(step: Sequence[Candidate]) -> float:
+def _others(evidence: Evidence, k: int) -> set[str]:
+    """Effects of the model but that of step k: what the model has beside it is no rival of it."""
+    return {step[0].name for j, step in enumerate(evidence.steps) if j != k}
+
+
+def _class_beside(evidence: Evidence, k: int) -> tuple[str, ...]:
+    """Names that these pushes cannot tell from the effect of step k, beside the model's other effects."""
+    others = _others(evidence, k)
+    return tuple(name for name in class_of(evidence.plain, evidence.steps[k]) if name not in others)
+
+
+def _probability(step: Sequence[Candidate], others: set[str]) -> float:
     """That the best of a step is the right one: odds of each rival from its held-out deficit and standard error."""
     best, total = step[0], 1.0
     for other in step[1:]:
-        if out_of_question(best, other):
+        if other.name in others or out_of_question(best, other):
             continue
         difference = best.gains - other.gains
         # Some error of the scores themselves, so that few pushes do not make sure.
@@ -181,8 +192,8 @@ def _findings(evidence: Evidence) -> tuple[EffectFinding, ...]:
             EffectFinding(
                 name=kind.name,
                 element=kind.element,
-                indistinguishable_from=class_of(evidence.plain, step),
-                probability=_probability(step),
+                indistinguishable_from=_class_beside(evidence, k),
+                probability=_probability(step, _others(evidence, k)),
                 parameters=parameters_of(evidence, k),
                 statement=kind.statement,
             )

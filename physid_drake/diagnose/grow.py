@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses as dc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -59,12 +59,16 @@ class Looked:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Grown:
-    """A model grown effect by effect: the plain one, the last, the steps between, and what a last step rejected."""
+    """A model grown effect by effect: the plain one, the last, the steps between, and what a last step rejected.
+
+    ``without`` has the last model's fits without one of its effects, by the effect's name, as far as they were made.
+    """
 
     base: Looked
     last: Looked
     steps: tuple[tuple[Candidate, ...], ...]
     rejected: tuple[Candidate, ...]
+    without: Mapping[str, Fitted] = dc.field(default_factory=dict)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -134,18 +138,23 @@ class Growth:
 
     def pruned(self, grown: Grown) -> Grown:
         """Without the effects that a later one made superfluous: they had stood in for what was still missing."""
-        last, steps = grown.last, list(grown.steps)
+        last, steps, made = grown.last, list(grown.steps), dict[str, Fitted]()
         for k in reversed(range(len(steps) - 1)):
             name = steps[k][0].name
-            self.tick(f"model without {name}", 0, 0)
-            effects = tuple(e for e in last.fitted.state.effects if e.kind.name != name)
-            without = self.fitter.fit(dc.replace(last.fitted.state, effects=effects), rounds=4, like=last.fitted)
+            made[name] = without = self._without(name, last.fitted)
             gains = push_scores(last.fitted) - push_scores(without)
             if not dc.replace(steps[k][0], fitted=last.fitted, gains=gains).accepted:
                 missed = [s for s in grown.base.signatures if s.kind.name == name]
                 last = Looked.at(without, (*last.signatures, *missed), self.rng)
+                made.clear()
                 del steps[k]
-        return dc.replace(grown, last=last, steps=tuple(steps))
+        return dc.replace(grown, last=last, steps=tuple(steps), without=made)
+
+    def _without(self, name: str, model: Fitted) -> Fitted:
+        """A model fitted again without one of its effects."""
+        self.tick(f"model without {name}", 0, 0)
+        effects = tuple(e for e in model.state.effects if e.kind.name != name)
+        return self.fitter.fit(dc.replace(model.state, effects=effects), rounds=4, like=model)
 
     def reconsidered(self, grown: Grown, k: int) -> Grown:
         """The rivals of a step judged again beside the effects that came after it: what was missing blurred them.
@@ -160,16 +169,15 @@ class Growth:
         if not rivals:
             return grown
 
-        def with_kth(points: tuple[EffectPoint, ...]) -> State:
-            return dc.replace(model.state, effects=(*effects[:k], *points, *effects[k + 1 :]))
+        def with_kth(point: EffectPoint) -> State:
+            return dc.replace(model.state, effects=(*effects[:k], point, *effects[k + 1 :]))
 
         models = {step[0].name: model}
         for other in rivals:
             self.tick(f"{other.name} in place of {step[0].name}", 0, 0)
             point = next(e for e in other.fitted.state.effects if e.kind.name == other.name)
-            models[other.name] = self.fitter.fit(with_kth((point,)), rounds=4, like=model)
-        self.tick(f"model without {step[0].name}", 0, 0)
-        without = push_scores(self.fitter.fit(with_kth(()), rounds=4, like=model))
+            models[other.name] = self.fitter.fit(with_kth(point), rounds=4, like=model)
+        without = push_scores(grown.without.get(step[0].name) or self._without(step[0].name, model))
         scores = {name: push_scores(one) for name, one in models.items()}
         best = ranked([dc.replace(c, gains=scores[c.name] - without) for c in (step[0], *rivals)])[0].name
         before = push_scores(plain)
@@ -182,7 +190,7 @@ class Growth:
         swapped = self._model_with(models[best].state)
         missed = [s for s in grown.base.signatures if s.kind.name == step[0].name]
         left = [s for s in grown.last.signatures if s.kind.name != best]
-        return dc.replace(grown, steps=steps, last=Looked.at(swapped, (*left, *missed), self.rng))
+        return dc.replace(grown, steps=steps, last=Looked.at(swapped, (*left, *missed), self.rng), without={})
 
     def plain_from(self, plain: Fitted, candidate: Candidate) -> Fitted | None:
         """A better plain fit from the theta at which an effect's fit ended; None where there is none."""

@@ -100,3 +100,16 @@ def test_a_model_that_predicts_left_out_pushes_worse_explains_nothing(monkeypatc
         monkeypatch.setattr(conclude, "friction_trend", lambda case, after: None)
         monkeypatch.setattr(conclude, "scatter_p_value", lambda fitted, p=p_value: p)
         assert conclude._left(worse, "explained", hidden, None).startswith(said)
+
+
+def test_what_the_model_has_beside_an_effect_is_no_rival_of_it(monkeypatch):
+    gains = {"size_error": 50.0, "stribeck_friction": 49.0, "viscous_drag": 49.0}
+    size, stribeck, drag = (tried(name, gain, model_that_leaves(1.0)) for name, gain in gains.items())
+    monkeypatch.setattr(conclude, "class_of", lambda plain, step: tuple(c.name for c in step[1:]))
+    alone = evidence(steps=((size, stribeck, drag),))
+    both = evidence(steps=((size, stribeck, drag), (stribeck,)))
+    assert conclude._class_beside(alone, 0) == ("stribeck_friction", "viscous_drag")
+    assert conclude._class_beside(both, 0) == ("viscous_drag",)
+    monkeypatch.setattr(conclude, "out_of_question", lambda best, other: False)
+    three, two = (conclude._probability(e.steps[0], conclude._others(e, 0)) for e in (alone, both))
+    assert three < two < 1.0
