@@ -23,6 +23,8 @@ from physid_drake.cell.setters import Body
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+SLOWEST = 5e-4  # m/s: below this slip a point feels the contact's full friction, which holds it at rest
+
 
 @dataclass(frozen=True, kw_only=True)
 class Underside:
@@ -100,6 +102,13 @@ class ObjectState:
     def slips(self) -> Complex:
         """Velocities (n,) of the support points, x + iy in W [m/s]."""
         return self.arms * (1j * self.yaw_rate) + self.v_WBo
+
+    @cached_property
+    def slip_directions(self) -> Complex:
+        """Directions (n,) in which the support points slip, x + iy in W; they fade to zero at rest."""
+        speeds = np.abs(self.slips)
+        directions: Complex = self.slips / np.sqrt(speeds * speeds + SLOWEST**2)
+        return directions
 
     @property
     def p_WQ(self) -> Array:

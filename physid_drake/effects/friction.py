@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import dataclasses as dc
 import math
 from typing import ClassVar
@@ -15,21 +16,12 @@ from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, S
 from physid_drake.effects.places import grid_of_places
 
 Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-SLOWEST = 5e-4  # m/s: below this slip a point feels the contact's full friction, which holds it at rest
 SLIGHT_SHARE = 0.015  # of the friction
-
-
-def _direction(state: ObjectState) -> tuple[Array, Complex]:
-    """Slip speeds (n,) and directions (n,), x + iy, that fade to zero at rest."""
-    speeds = np.abs(state.slips)
-    return speeds, state.slips / np.sqrt(speeds * speeds + SLOWEST**2)
 
 
 def _along(state: ObjectState, share: Array) -> Array:
     """Forces (n, 2) along the slip, ``share`` (n,) times what friction holds [N]."""
-    _, along = _direction(state)
-    return as_plane(share * state.holding * along)
+    return as_plane(share * state.holding * state.slip_directions)
 
 
 @dc.dataclass(frozen=True)
@@ -45,8 +37,7 @@ class Together:
 
     def refund(self, state: ObjectState) -> Array:
         """What the contact's friction, ``largest`` times the plain one, is too much."""
-        _, along = _direction(state)
-        whole = state.holding * along
+        whole = state.holding * state.slip_directions
         moving = whole != 0.0
         ratio = np.ones(len(whole), dtype=np.complex128)
         for law in self.laws:
@@ -177,16 +168,14 @@ class _EllipseLaw:
 
     def refund(self, state: ObjectState) -> Array:
         angle = self.angle + (state.yaw if self.fixed_in_object else 0.0)
-        slippery = complex(math.cos(angle), math.sin(angle))
-        low, high = 1.0 / math.sqrt(self.ratio), math.sqrt(self.ratio)
-        _, along = _direction(state)
-        own = along * slippery.conjugate()  # in the ellipse's axes
-        a, b = own.real, own.imag
-        size = np.sqrt((low * a) ** 2 + (high * b) ** 2)
-        # |M v| and |v| fade together, so that their ratio stays what it is.
-        scale = np.where(size > 1e-12, np.abs(own) / np.maximum(size, 1e-12), 0.0)
-        true = (low**2 * a + 1j * (high**2 * b)) * scale
-        return as_plane(state.holding * (self.largest * own - true) * slippery)
+        # M^2 v of a plane vector v = x + iy with the slippery axis at an angle a is mean v + half e^(2ia) conj(v).
+        mean, half = 0.5 * (1.0 / self.ratio + self.ratio), 0.5 * (1.0 / self.ratio - self.ratio)
+        along = state.slip_directions
+        flipped = along.conj()
+        squeezed = mean * along + (half * cmath.exp(2j * angle)) * flipped
+        # |M v|^2 = v . M^2 v; |M v| and |v| fade together, so that their ratio stays what it is.
+        ratio = (flipped * along).real / np.maximum((flipped * squeezed).real, 1e-24)
+        return as_plane(state.holding * (self.largest * along - np.sqrt(ratio) * squeezed))
 
 
 @dc.dataclass(frozen=True, kw_only=True)
