@@ -23,7 +23,7 @@ from physid_drake.diagnose.values import (
     ThetaEstimate,
 )
 from physid_drake.effects import Effect
-from physid_drake.space import ParameterSpace
+from physid_drake.identify.theta import cell_error
 
 Array = NDArray[np.float64]
 Tick = Callable[[str, int, int], None]
@@ -31,9 +31,6 @@ Tick = Callable[[str, int, int], None]
 SAMPLES = 400  # of an effect's chart, for the intervals of its parameters
 JOINT_SAMPLES = 2000  # of theta and all charts, for how the estimates vary together
 IDENTIFIABLE = 0.5  # posterior over prior standard deviation
-# Of theta, relative: what the cell's own error (0.3 to 0.4 of a usual tracker's noise) moves an estimate by. Of
-# thirty worlds of MuJoCo, frictions that pushes tell to 0.3 % by their noise alone came out 1 to 2 % off.
-CELL_ERROR = 0.01
 
 
 def shared_covariance(fitted: Fitted) -> Array:
@@ -100,7 +97,7 @@ def theta_of(evidence: Evidence, fitted: Fitted) -> dict[str, ThetaEstimate]:
     for j, parameter in enumerate(space.parameters):
         std = math.sqrt(covariance[j, j])
         told = std < IDENTIFIABLE * prior[j]
-        std = math.hypot(std, _cell_error(space, here, j))
+        std = math.hypot(std, cell_error(space, here, j))
         ends = []
         for sign in (-1.0, 1.0):
             u = fitted.state.u.copy()
@@ -114,13 +111,6 @@ def theta_of(evidence: Evidence, fitted: Fitted) -> dict[str, ThetaEstimate]:
             before=float(before[j]),
         )
     return result
-
-
-def _cell_error(space: ParameterSpace, theta: Array, j: int) -> float:
-    """The cell's own error of the j-th parameter, in the unit cube."""
-    moved = theta.copy()
-    moved[j] = max(space.parameters[j].lower, theta[j] * (1.0 - CELL_ERROR))
-    return float(abs(np.asarray(space.to_unit(moved))[j] - np.asarray(space.to_unit(theta))[j]))
 
 
 def correlation_of(case: Case, fitted: Fitted) -> tuple[tuple[str, ...], Array]:

@@ -22,7 +22,7 @@ from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
 from physid_drake.identify.polish import Polished, Polisher
 from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
-from physid_drake.identify.theta import ThetaMap, theta_map
+from physid_drake.identify.theta import ThetaMap, cell_error, theta_map
 from physid_drake.recording import Recording
 from physid_drake.search import SearchResult, search_minimum, search_named
 from physid_drake.space import ParameterSpace
@@ -272,8 +272,9 @@ class Identifier:
 def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
     """Estimates with intervals: the wider of the cost's curvature and the pushes' disagreement.
 
-    The curvature knows the noise that is in the model. What is not in it (the cell's own error, a hand path that
-    was fitted) pulls theta differently in every push; taking the push as the unit shows by how much.
+    The curvature knows the noise that is in the model. What is not in it (a hand path that was fitted) pulls theta
+    differently in every push; taking the push as the unit shows by how much. None is narrower than the cell's own
+    error, which pushes share.
 
     Source: G. A. F. Seber and C. J. Wild, Nonlinear Regression, 1989, section 5.1 (curvature); K.-Y. Liang and
     S. L. Zeger, Biometrika 73, 1986 (the sandwich over clusters).
@@ -295,7 +296,8 @@ def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
     for j, parameter in enumerate(space.parameters):
         told = bool(spread[j] < IDENTIFIABLE * prior_spread[j])
         if told or parameter.prior_std is not None:
-            reach = z * min(spread[j], prior_spread[j])
+            std = math.hypot(spread[j], cell_error(space, np.asarray(polished.theta), j))
+            reach = z * min(std, prior_spread[j])
             low, high = max(0.0, u[j] - reach), min(1.0, u[j] + reach)
         else:
             low, high = 0.05, 0.95  # of a uniform prior

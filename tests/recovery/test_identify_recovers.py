@@ -14,7 +14,7 @@ from worlds import POINTS, endpoints, pushes_of, recorded, slides
 
 from physid_drake.cell import CellConfig, ContactConfig
 from physid_drake.identify import Identification, SearchConfig, ThetaConfig
-from physid_drake.identify.theta import UNWEIGHED
+from physid_drake.identify.theta import CELL_ERROR, UNWEIGHED
 from physid_drake.recording import read_recording, write_recording
 from physid_drake.report.result import result_json
 
@@ -58,6 +58,12 @@ def shipped():
 def test_friction_of_the_shipped_recording_is_recovered(shipped):
     assert_recovered(shipped, "support_friction", 0.27, 0.03)  # +1.1 %
     assert_recovered(shipped, "hand_friction", 0.22, 0.03)  # -1.6 %
+
+
+def test_no_interval_is_narrower_than_the_cells_own_error(shipped):
+    for name in FRICTIONS:
+        low, high = estimate(shipped, name).ci90
+        assert 0.5 * np.log(high / low) > stats.norm.ppf(0.95) * CELL_ERROR
 
 
 def test_a_weighed_mass_that_a_push_cannot_tell_keeps_its_prior(shipped):
