@@ -36,18 +36,18 @@ class Pressure:
 
     Attributes:
         map: (150, 150) pressure over its mean per square millimetre, rows along x of B; zero outside the triangle.
-        points: (3, 2) of support, in B [m].
-        near: share of the weight within `NEAR` of the points.
+        points: (3, 2) of support, in B [m]; none of full contact.
+        near: share of the weight within `NEAR` of the points; NaN without points, as below.
         even: the same share if the pressure were even.
-        gyration: radius of gyration of the pressure [m]: found, of the points, and if it were even. Friction's torque
-            feels hardly more of a pressure than this.
+        arm: mean distance of the weight from the centre of mass [m]: found, of the points, and if it were even. It is
+            the largest friction torque over the largest friction force; friction feels hardly more of a pressure.
     """
 
     map: Array
     points: tuple[tuple[float, float], ...]
     near: float
     even: float
-    gyration: tuple[float, float, float]
+    arm: tuple[float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,15 +188,24 @@ def weight_near(pressure: Array, points: Array) -> tuple[float, float]:
     return float(load[near].sum() / load.sum()), float((inside & near).sum() / inside.sum())
 
 
-def gyration_of(pressure: Array, points: Array) -> tuple[float, float, float]:
-    """Radii of gyration about the centroid [m]: of a pressure, of feet at points (3, 2) that balance, if even."""
+def mean_arm(pressure: Array, points: Array | None) -> tuple[float, float, float]:
+    """Mean distance of the weight from the centroid [m].
+
+    Args:
+        pressure: (150, 150) as of `balanced_pressure`.
+        points: (3, 2) of feet in B [m]; None where there are none.
+
+    Returns:
+        Of the pressure; of feet at the points that balance, NaN without points; and if the pressure were even.
+    """
     x, y, inside = _raster()
-    squares = (x - _CORNER) ** 2 + (y - _CORNER) ** 2
+    distances = np.hypot(x - _CORNER, y - _CORNER)
     load = pressure.ravel()
-    loads = np.linalg.solve(np.vstack([np.ones(3), points.T]), np.array([1.0, 0.0, 0.0]))
-    of_points = float(loads @ (points**2).sum(axis=1))
-    found, even = float(load @ squares / load.sum()), float(squares[inside].mean())
-    return math.sqrt(found), math.sqrt(max(0.0, of_points)), math.sqrt(even)
+    of_points = math.nan
+    if points is not None:
+        loads = np.linalg.solve(np.vstack([np.ones(3), points.T]), np.array([1.0, 0.0, 0.0]))
+        of_points = float(loads @ np.linalg.norm(points, axis=1))
+    return float(load @ distances / load.sum()), of_points, float(distances[inside].mean())
 
 
 def _raster() -> tuple[Array, Array, NDArray[np.bool_]]:
@@ -207,16 +216,14 @@ def _raster() -> tuple[Array, Array, NDArray[np.bool_]]:
 
 
 def _pressure(case: RealCase, said: dict[str, Any]) -> Pressure | None:
-    points = points_of_support(Path(case.source).name)
     found = next((e for e in said["effects"] if e["name"] == "uneven_support"), None)
-    if points is None or found is None:
+    if found is None or not case.name.startswith("cmu_"):
         return None
+    points = points_of_support(Path(case.source).name)
     pressure = balanced_pressure(np.array(found["parameters"]["weights"]["value"], dtype=np.float64))
-    near, even = weight_near(pressure, points)
-    return Pressure(
-        map=pressure, points=tuple((x, y) for x, y in points.tolist()), near=near, even=even,
-        gyration=gyration_of(pressure, points),
-    )  # fmt: skip
+    near, even = (math.nan, math.nan) if points is None else weight_near(pressure, points)
+    places = () if points is None else tuple((x, y) for x, y in points.tolist())
+    return Pressure(map=pressure, points=places, near=near, even=even, arm=mean_arm(pressure, points))
 
 
 def _fresh(file: Path) -> tuple[float, float]:

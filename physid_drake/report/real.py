@@ -16,7 +16,7 @@ from physid_drake.prove.real_score import NEAR, Pressure, RealOutcome
 FORMAT = "physid-proof-real/1"
 COLUMNS = ("case", "pushes", "chi2 plain", "after", "verdict", "names", "held out mm", "deg", "fresh mm", "deg",
            "ellipsoid mm", "deg", "4th order mm", "deg", "weight near the points",
-           "radius of gyration mm")  # fmt: skip
+           "mean arm of the weight mm")  # fmt: skip
 _LEG, _CORNER = 150.0, 50.0  # mm
 
 
@@ -31,12 +31,11 @@ def _row(outcome: RealOutcome) -> tuple[str, ...]:
         return (o.case.name, str(o.pushes or "-"), "-", "-", o.skipped, *("-",) * (len(COLUMNS) - 5))
     published = o.published or {}
     models = [_errors(published.get(name, (math.nan, math.nan))) for name in ("quadratic", "poly4")]
-    near = "-" if o.pressure is None else f"{100 * o.pressure.near:.0f} % (even: {100 * o.pressure.even:.0f} %)"
     return (
         o.case.name, str(o.pushes), _fixed(o.chi2[0]), _fixed(o.chi2[1]), o.verdict,
         " + ".join(" or ".join(names) for names in o.classes) or "-",
         _change([1e3 * v for v in o.position]), _change([math.degrees(v) for v in o.rotation]),
-        *_errors(o.fresh), *models[0], *models[1], near, _gyration(o),
+        *_errors(o.fresh), *models[0], *models[1], _near(o), _arm(o),
     )  # fmt: skip
 
 
@@ -56,16 +55,23 @@ NOTES = (
     "Held out: pushes of the diagnosis, each predicted while left out of the fit, plain cell to model with what was"
     " found. Fresh: end points of pushes that the diagnosis did not get. Ellipsoid, 4th order: the publishers' models"
     f" on the diagnosed pushes. Weight near the points: share of the pressure found within {1e3 * NEAR:g} mm of the"
-    " points that the object stood on. Radius of gyration of the pressure: what friction's torque feels of it."
+    " points that the object stood on. Mean arm of the weight about the centre of mass: what friction feels of it."
     " All errors are root mean squares."
 )
 
 
-def _gyration(outcome: RealOutcome) -> str:
+def _near(outcome: RealOutcome) -> str:
+    if outcome.pressure is None or not outcome.pressure.points:
+        return "-"
+    return f"{100 * outcome.pressure.near:.0f} % (even: {100 * outcome.pressure.even:.0f} %)"
+
+
+def _arm(outcome: RealOutcome) -> str:
     if outcome.pressure is None:
         return "-"
-    found, points, even = (f"{1e3 * r:.0f}" for r in outcome.pressure.gyration)
-    return f"{found} (points: {points}, even: {even})"
+    found, points, even = outcome.pressure.arm
+    known = f"points: {1e3 * points:.0f}, " if math.isfinite(points) else ""
+    return f"{1e3 * found:.0f} ({known}even: {1e3 * even:.0f})"
 
 
 def real_markdown(outcomes: Sequence[RealOutcome]) -> str:
@@ -107,10 +113,12 @@ def _case(outcome: RealOutcome) -> dict[str, Any]:
         "held_out_rad": _numbers(o.rotation),
         "fresh": _numbers(o.fresh),
         "published": None if o.published is None else {name: _numbers(e) for name, e in o.published.items()},
-        "weight_near_points": None if pressure is None else {"found": pressure.near, "even": pressure.even},
-        "gyration_m": None
+        "weight_near_points": None
+        if pressure is None or not pressure.points
+        else {"found": pressure.near, "even": pressure.even},
+        "mean_arm_m": None
         if pressure is None
-        else dict(zip(("found", "points", "even"), pressure.gyration, strict=True)),
+        else dict(zip(("found", "points", "even"), _numbers(pressure.arm), strict=True)),
         "seconds": _numbers((o.seconds,))[0],
     }
 
@@ -129,7 +137,7 @@ def pressure_picture(pressure: Pressure, title: str) -> Figure:
     ends = (-_CORNER, _LEG - _CORNER)
     image = axes.imshow(shown.T, origin="lower", extent=(*ends, *ends), cmap="Blues", vmin=0.0)
     figure.colorbar(image, label="pressure over its mean")
-    points = 1e3 * np.array(pressure.points)
+    points = 1e3 * np.array(pressure.points).reshape(-1, 2)
     axes.plot(points[:, 0], points[:, 1], "o", markersize=9, markerfacecolor="none", color="#b42318")
     axes.set_xlabel("x of the object [mm]")
     axes.set_ylabel("y of the object [mm]")

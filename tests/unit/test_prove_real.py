@@ -14,7 +14,7 @@ from physid_drake.errors import RecordingError
 from physid_drake.prove.real import chosen_cases, prepare, slides_of_squares
 from physid_drake.prove.real_score import (
     balanced_pressure,
-    gyration_of,
+    mean_arm,
     points_of_support,
     published_errors,
     weight_near,
@@ -158,10 +158,11 @@ def test_a_recovered_pressure_balances_the_weight():
     # Three feet under a centre of mass at (50, 50) mm: the lever rule, however stiff they are.
     loads = [pressure[a : a + 10, b : b + 10].sum() / pressure.sum() for a, b in ((30, 90), (30, 30), (90, 30))]
     np.testing.assert_allclose(loads, [0.25, 0.5, 0.25], atol=0.02)
-    found, of_points, even = gyration_of(pressure, points_of_support("35_95_35_35_35_95"))
-    # A right triangle's is a third of its leg; a foot's own size adds 4 mm to the square.
-    assert even == pytest.approx(0.05, rel=0.01)
-    assert found == pytest.approx(np.hypot(of_points, 0.004), rel=0.02)
+    found, of_points, even = mean_arm(pressure, points_of_support("35_95_35_35_35_95"))
+    assert even == pytest.approx(0.0453, rel=0.005)  # by the raster of benchmarks/cmu_raw.py
+    assert of_points == pytest.approx(0.25 * 2 * math.hypot(45, 15) / 1e3 + 0.5 * math.hypot(15, 15) / 1e3)
+    assert found == pytest.approx(of_points, rel=0.02)  # feet of 10 mm
+    assert math.isnan(mean_arm(pressure, None)[1])
 
 
 ANSWER = {
