@@ -10,7 +10,8 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Polygon
+from matplotlib.path import Path
 
 from physid_drake.diagnose.values import EffectFinding
 from physid_drake.report.numbers import number
@@ -187,20 +188,27 @@ def _pull(p: Mapping[str, Any], view: TableView, force: Callable[[Array], Array]
     return figure, caption + f" It is fixed beyond the view, at ({number(p['x'])}, {number(p['y'])}) m."
 
 
-def _pressure(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str] | None:
+def _support(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str] | None:
     """The grid of weights under the object: rows along x of B, columns along y."""
     weights = np.asarray(p["weights"], dtype=np.float64)
     if weights.ndim != 2 or weights.size < 2:
         return None
-    half = np.array([1.0, 1.0]) if view.outline is None else MM * np.abs(view.outline).max(axis=0)
-    x, y = (np.linspace(-h, h, n + 1) for h, n in zip(half.tolist(), weights.shape, strict=True))
-    figure, axes = map_axes((-half[0], -half[1], half[0], half[1]), 3.8, 3.6)
+    outline = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    if view.outline is not None:
+        outline = MM * view.outline
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    x, y = (np.linspace(a, b, n + 1) for a, b, n in zip(low, high, weights.shape, strict=True))
+    pad = 0.08 * (high - low)
+    figure, axes = map_axes((*(low - pad), *(high + pad)), 3.8, 3.6)
     axes.grid(visible=False)
-    axes.pcolormesh(x, y, weights.T, cmap="Blues", vmin=0.0, vmax=1.35 * float(weights.max()), edgecolors="white")
+    middles = _middles(outline, x, y)
+    shown = np.ma.masked_where(np.isnan(middles[..., 0]), weights)
+    mesh = axes.pcolormesh(x, y, shown.T, cmap="Blues", vmin=0.0, vmax=1.35 * float(shown.max()), edgecolors="white")
+    mesh.set_clip_path(axes.add_patch(Polygon(outline, closed=True, facecolor="none", edgecolor=INK, linewidth=1.0)))
     ends = np.asarray(p["ci90"], dtype=np.float64)
-    for i, j in np.ndindex(weights.shape):
-        at = 0.5 * (x[i] + x[i + 1]), 0.5 * (y[j] + y[j + 1])
-        dark = "white" if weights[i, j] > 0.8 * weights.max() else INK
+    for i, j in np.argwhere(np.isfinite(middles[..., 0])):
+        at = (middles[i, j, 0], middles[i, j, 1])
+        dark = "white" if weights[i, j] > 0.8 * shown.max() else INK
         axes.annotate(
             f"{weights[i, j]:.2f}", at, (0, 1), textcoords="offset points", ha="center", fontsize=9, color=dark
         )
@@ -208,7 +216,22 @@ def _pressure(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str] | Non
             text = f"{ends[0, i, j]:.2f} to {ends[1, i, j]:.2f}"
             axes.annotate(text, at, (0, -9), textcoords="offset points", ha="center", fontsize=6.5, color=dark)
     axes.set(xlabel="x of the object [mm]", ylabel="y of the object [mm]")
-    return figure, "Pressure under the object over its mean, with 90 % intervals."
+    caption = "How firmly each part of the underside stands on the table, over the mean, with 90 % intervals."
+    return figure, caption + " The pressure is that, tilted until it balances the weight."
+
+
+def _middles(outline: Array, x: Array, y: Array) -> Array:
+    """Middle (n, m, 2) of what each cell covers of the object, edges at x (n + 1,), y (m + 1,); NaN of nothing."""
+    inside = Path(outline)
+    parts = (np.arange(9) + 0.5) / 9.0
+    middles = np.full((len(x) - 1, len(y) - 1, 2), np.nan)
+    for i, j in np.ndindex(len(x) - 1, len(y) - 1):
+        axes = np.meshgrid(x[i] + parts * (x[i + 1] - x[i]), y[j] + parts * (y[j + 1] - y[j]))
+        places = np.column_stack([axis.ravel() for axis in axes])
+        covered = places[inside.contains_points(places)]
+        if len(covered):
+            middles[i, j] = covered.mean(axis=0)
+    return middles
 
 
 _LAWS: dict[str, tuple[_Law, tuple[str, ...]]] = {
@@ -222,5 +245,5 @@ _LAWS: dict[str, tuple[_Law, tuple[str, ...]]] = {
     "table_tilt": (_tilt, ("x", "y")),
     "tether": (_spring, ("stiffness", "x", "y")),
     "magnet": (_magnet, ("strength", "x", "y", "core")),
-    "uneven_support": (_pressure, ("weights",)),
+    "uneven_support": (_support, ("weights",)),
 }

@@ -23,6 +23,7 @@ from physid_drake.diagnose.values import (
     Window,
 )
 from physid_drake.recording import Box, Cylinder, Hand, ObjectModel, PoseStream, Push, Recording, Sensors, Table
+from physid_drake.report import effect_laws
 from physid_drake.report.diagnosis_page import ShownPush, diagnosis_page
 
 NAMES = ("pushes/<b>1</b>.csv", "pushes/$2$ & co.csv")
@@ -268,3 +269,14 @@ def test_every_law_is_drawn():
 def test_a_standing_cylinder_is_round():
     shape = Cylinder(radius=0.03, length=0.05, axis="z")
     assert "Table from above" in diagnosis_page(diagnosis_with(), recording_of(shape), shown_pushes()[:1], ())
+
+
+def test_cells_under_a_triangle_have_a_middle_under_it_and_those_beside_it_have_none():
+    triangle = np.array([[-50.0, -50.0], [100.0, -50.0], [-50.0, 100.0]])
+    edges = np.linspace(-50.0, 100.0, 4)
+    middles = effect_laws._middles(triangle, edges, edges)
+    np.testing.assert_array_equal(
+        np.isfinite(middles[..., 0]), [[True, True, True], [True, True, False], [True, False, False]]
+    )
+    np.testing.assert_allclose(middles[0, 0], [-25.0, -25.0])
+    np.testing.assert_allclose(middles[1, 1], [16.7, 16.7], atol=2.0)  # the half of a cell: a third of its side
