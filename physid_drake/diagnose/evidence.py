@@ -97,8 +97,8 @@ def mismatch(fitted: Fitted, screening: Screening | None) -> float:
     cost = float(stats.chi2.sf(fitted.solution.chi2 / SLACK, fitted.degrees))
     looks = [cost, 1.0 if screening is None else screening.p_value]
     scatter = scatter_p_value(fitted)
-    # One within its bounds says nothing and is no look. Where the true one is at its bound, that costs up to a third
-    # more false alarms.
+    # One within its bounds says nothing and is no look: of frictions that scatter by just so much, its own test calls
+    # 0.2 % where 1 % is asked.
     if scatter < 1.0:
         looks.append(scatter)
     return float(-np.expm1(len(looks) * np.log1p(-min(*looks, 1.0 - 1e-16))))
@@ -108,14 +108,14 @@ def scatter_p_value(fitted: Fitted) -> float:
     """Of "frictions scatter by no more than ``MOST_SCATTER``", by the likelihood ratio.
 
     Friction that changes as an object slides, warms or sticks makes pushes of other lengths differ, which a model
-    would otherwise take for scatter.
+    would otherwise take for scatter. The push that speaks most for it is left out: what is odd of one push, its own
+    friction takes up, and that is no physics.
     """
     seen, most = fitted.state.scatter, MOST_SCATTER / UNIT_SCATTER
-    if seen <= most:
+    if seen <= most or len(fitted.pushes) < 2:
         return 1.0
-    # Without the push that speaks most for it: one odd push, which its own friction takes up, is no physics.
     pushes = fitted.pushes
-    subsets = [pushes[:i] + pushes[i + 1 :] for i in range(len(pushes))] if len(pushes) > 1 else [pushes]
+    subsets = [pushes[:i] + pushes[i + 1 :] for i in range(len(pushes))]
     least = min(_more_likely(fitted, subset, seen, most) for subset in subsets)
     # The scatter at its bound is half of the cases where it is no larger (Chernoff 1954).
     return 0.5 * float(stats.chi2.sf(2.0 * max(0.0, least), 1))
