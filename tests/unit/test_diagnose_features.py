@@ -1,12 +1,15 @@
 """What is compared of a push, and the noise that it is said to have."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from runs import shipped_pushes
 
 from physid_drake.cell import CellConfig
+from physid_drake.cell.hand_path import HandPath
 from physid_drake.diagnose import case_of
-from physid_drake.diagnose.features import FORCE_MEMORY, PushFeatures
+from physid_drake.diagnose.features import FORCE_MEMORY, PushFeatures, _way
 from physid_drake.diagnose.noise import ForceNoise
 from physid_drake.identify.config import ThetaConfig
 
@@ -30,6 +33,14 @@ def test_a_force_wanders_with_the_hands_way():
     assert noise[0, 0] == pytest.approx(1.0 + wandering / 0.1**2)
     assert noise[0, 1] == pytest.approx(wandering * np.exp(-1.0) / (0.1 * 0.2))
     assert noise[0, 2] == pytest.approx(wandering * np.exp(-5.0) / 0.1**2)
+
+
+def test_the_way_is_the_hands_whether_it_takes_long_or_not():
+    for speed in (0.01, 0.1):
+        path = HandPath(times=np.array([0.0, 9.0]), velocities=np.full((2, 2), [speed, 0.0]), start=np.zeros(2))
+        way = _way(SimpleNamespace(path=path, force_times=np.array([1.0, 2.0, 6.0])))
+        np.testing.assert_allclose(way, speed * np.array([0.0, 1.0, 5.0]))
+    assert _way(SimpleNamespace(path=None, force_times=np.zeros(0))).shape == (0,)
 
 
 def test_a_force_that_is_off_is_off_over_the_whole_push():
