@@ -23,16 +23,17 @@ from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.pairs import confirmed_pairs, steps_of
 from physid_drake.diagnose.screen import Screening, Signature, screen, signatures, with_frictions
-from physid_drake.diagnose.starts import of_other_strength
+from physid_drake.diagnose.starts import corners, of_other_shape, of_other_strength
 from physid_drake.effects import Effect
 
 Tick = Callable[[str, int, int], None]
 
 MOST_EFFECTS = 3
 LONGEST = 450  # rollouts per push, after the first score tests, after which no further effect is looked for
-ANOTHER_BASIN = 10.0  # nats by which a plain fit must be better to be another one
+ANOTHER_BASIN = 10.0  # nats by which a fit must be better to be another one
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
 WIDE = 2.0  # times the usual scatter of friction: it may be what is missing in disguise
+HOP = 3  # steps of a fit from another shape: an effect that belongs there shows by then
 HOPELESS = 6.0  # cost per degree of freedom with two effects: no third one of the catalogue will make up for that
 
 
@@ -209,12 +210,30 @@ class Growth:
         """A fitted model with all coordinates of its effects free, all derivatives taken where it is."""
         fitter = self.fitter
         effects = tuple(e.freed(fitter.case) for e in state.effects)
-        near = fitter.fit(dc.replace(state, effects=effects), rounds=3, renew=True)
-        if near.reduced_chi2 > HOPELESS or (near.reduced_chi2 <= EXPLAINED and near.state.scatter <= WIDE):
-            return near
-        # The pushes' unknowns may have been imitating what is missing: once more, without them at first.
-        far = fitter.fit(of_other_strength(fitter, near), rounds=4, careful=1, renew=True)
-        return far if far.score > near.score else near
+        best = fitter.fit(dc.replace(state, effects=effects), rounds=3, renew=True)
+        if best.reduced_chi2 <= EXPLAINED and best.state.scatter <= WIDE:
+            return best
+        if best.reduced_chi2 <= HOPELESS:
+            # The pushes' unknowns may have been imitating what is missing: once more, without them at first.
+            far = fitter.fit(of_other_strength(fitter, best), rounds=4, careful=1, renew=True)
+            best = max((best, far), key=lambda model: model.score)
+        return self._of_other_shape(best)
+
+    def _of_other_shape(self, model: Fitted) -> Fitted:
+        """A model fitted again from other shapes of its last effect, as long as none explains the pushes.
+
+        A patch that is found half as large and beside where it is takes most of a mismatch away, and no step leads on
+        from there.
+        """
+        best, ways = model, corners(self.fitter, model)
+        for k, corner in enumerate(ways):
+            if best.reduced_chi2 <= EXPLAINED:
+                break
+            self.tick(f"{best.state.effects[-1].kind.name} elsewhere", k, len(ways))
+            start = of_other_shape(self.fitter, best, corner)
+            tried = self.fitter.fit(start, rounds=HOP, careful=HOP, like=best)
+            best = tried if tried.score > best.score + ANOTHER_BASIN else best
+        return best if best is model else self.fitter.fit(best.state, rounds=3, like=best, renew=True)
 
     def _what_is_left(self, model: Fitted, before: Sequence[Signature], alpha: float) -> Looked:
         """The score tests of what a model leaves; signatures are taken anew only if something is missing at alpha."""

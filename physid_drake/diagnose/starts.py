@@ -7,6 +7,7 @@ place, from which a fit does not find out; a few rollouts of strong versions tel
 from __future__ import annotations
 
 import dataclasses as dc
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ Array = NDArray[np.float64]
 FAMILIES = 4  # of an effect, the best by their score tests
 MULTIPLES = (1.0, 2.5, 5.0)  # of what the score test says
 STRENGTHS = (1.0, 0.7, 0.85, 1.2, 1.4)  # times that of a fit
+ASIDE = 0.7  # prior standard deviations, in each coordinate of shape
 
 
 def start_of(fitter: Fitter, one: Score) -> EffectPoint:
@@ -68,6 +70,36 @@ def of_other_strength(fitter: Fitter, model: Fitted) -> State:
             point[j] = np.clip(stronger, chart[j].lower, chart[j].upper)
         states.append(fitter.start(model.state.u, (*others, dc.replace(last, point=point))))
     return min(states, key=lambda state: actual_cost(fitter.seen_from(model, state)))
+
+
+def of_other_shape(fitter: Fitter, model: Fitted, corner: tuple[int, ...]) -> State:
+    """A model whose last effect has another shape, the pushes' unknowns at zero.
+
+    Args:
+        fitter: that of the model.
+        model: where a fit ended.
+        corner: of the cube around the effect's shape, -1 or 1 in each coordinate of it.
+    """
+    *others, last = model.state.effects
+    chart = last.chart(fitter.case)
+    point, origin = last.point.copy(), last.origin.copy()
+    for j, side in zip(_shape(last, fitter), corner, strict=True):
+        origin[j] = point[j] = np.clip(point[j] + side * ASIDE * chart[j].std, chart[j].lower, chart[j].upper)
+    return fitter.start(model.state.u, (*others, dc.replace(last, point=point, origin=origin)))
+
+
+def corners(fitter: Fitter, model: Fitted) -> list[tuple[int, ...]]:
+    """Of the cube around the shape of a model's last effect; none for an effect that has strengths only."""
+    count = len(_shape(model.state.effects[-1], fitter))
+    return list(product((-1, 1), repeat=count)) if count else []
+
+
+def _shape(one: EffectPoint, fitter: Fitter) -> list[int]:
+    """Leading coordinates in which no score test moves: a place, a speed, a frequency."""
+    around = fitter.case.around
+    moved = {j for family in one.kind.families(around) for j in family.free}
+    chart = one.kind.chart(around)
+    return [j for j in one.kind.leading(around) if j not in moved and np.isfinite(chart[j].std)]
 
 
 def _families(one: Score) -> list[Score]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import Body
 from physid_drake.cell.forces import FrictionLaw, ObjectState, as_complex, as_plane
 from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
-from physid_drake.effects.places import grid_of_places
+from physid_drake.effects.places import close_grid_of_places
 
 Array = NDArray[np.float64]
 SLIGHT_SHARE = 0.015  # of the friction
@@ -196,7 +196,7 @@ class FrictionPatch(Effect):
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """Log ratio, place, log radius."""
-        _, spacing = grid_of_places(around)
+        _, spacing = close_grid_of_places(around)
         return (
             Coordinate(name="ratio", log=True, step=0.04, lower=-2.0, upper=2.0),
             Coordinate(name="x", step=0.05 * spacing, std=spacing),
@@ -207,7 +207,7 @@ class FrictionPatch(Effect):
     @classmethod
     def families(cls, around: Surroundings) -> tuple[Family, ...]:
         """A grid of places, with a radius that covers the gaps between them."""
-        places, spacing = grid_of_places(around)
+        places, spacing = close_grid_of_places(around)
         return tuple(Family(point=(0.0, float(x), float(y), math.log(0.6 * spacing)), free=(0,)) for x, y in places)
 
     def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:

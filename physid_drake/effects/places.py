@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,11 +11,27 @@ from physid_drake.effects.effect import Surroundings
 
 Array = NDArray[np.float64]
 
+FEWEST, MOST = 3, 6  # places along a side
+CLOSE = 1.2  # radii of the object: from further off a fit does not find a patch that is as large as the object
+
 
 def grid_of_places(around: Surroundings) -> tuple[Array, float]:
     """A grid of three by three places (9, 2) over where the object was [m], and their spacing [m]."""
+    return _grid(around, (FEWEST, FEWEST))
+
+
+def close_grid_of_places(around: Surroundings) -> tuple[Array, float]:
+    """A grid of places (n, 2) [m] not much further apart than the object is wide, as far as few do; their spacing."""
+    low, high = around.region
+    wanted = (math.ceil(side / (CLOSE * around.radius)) for side in (high - low).tolist())
+    columns, rows = (min(max(count, FEWEST), MOST) for count in wanted)
+    return _grid(around, (columns, rows))
+
+
+def _grid(around: Surroundings, counts: tuple[int, int]) -> tuple[Array, float]:
     low, high = around.region
     margin = 0.3 * around.radius
-    x, y = (np.linspace(low[k] - margin, high[k] + margin, 7)[[1, 3, 5]] for k in (0, 1))
+    # The middles of equal cells.
+    x, y = (np.linspace(low[k] - margin, high[k] + margin, 2 * n + 1)[1::2] for k, n in enumerate(counts))
     places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     return places, float(max(0.5 * (x[1] - x[0] + y[1] - y[0]), 0.02))

@@ -171,3 +171,52 @@ def test_a_large_effect_may_leave_what_two_honest_laws_of_it_differ_by(before, a
     usual = SimpleNamespace(scatter=1.0)
     plain, final = SimpleNamespace(reduced_chi2=before), SimpleNamespace(reduced_chi2=after, state=usual)
     assert unexplained(plain, final) is left
+
+
+class Basins:
+    """Fits that end in one of four places, by the corner from which they start; a renewed fit stays there."""
+
+    def __init__(self, scores, explains):
+        self.scores, self.explains, self.tried = scores, explains, 0
+
+    def fit(self, state, **how):
+        if how.get("renew"):
+            return self.at(state.own)
+        self.tried += 1
+        return self.at(state)
+
+    def at(self, where):
+        kind = SimpleNamespace(name="friction_patch")
+        state = SimpleNamespace(effects=(SimpleNamespace(kind=kind),), own=where)
+        score = self.scores[where]
+        return SimpleNamespace(state=state, score=score, reduced_chi2=1.1 if score >= self.explains else 3.0)
+
+
+@pytest.fixture
+def four_corners(monkeypatch):
+    monkeypatch.setattr(grow, "corners", lambda fitter, model: [0, 1, 2, 3])
+    monkeypatch.setattr(grow, "of_other_shape", lambda fitter, model, corner: corner)
+
+
+@pytest.mark.parametrize(
+    ("scores", "end", "tried"),
+    [
+        ([-500.0, -60.0, -55.0, -900.0], 1, 2),  # the first that explains
+        ([-500.0, -495.0, -300.0, -295.0], 2, 4),  # the best where none does; a few nats are no other basin
+        ([-600.0, -495.0, -502.0, -700.0], "here", 4),
+    ],
+)
+def test_a_shape_that_does_not_explain_is_looked_for_elsewhere(four_corners, scores, end, tried):
+    basins = Basins(dict(enumerate(scores)) | {"here": -500.0}, explains=-100.0)
+    here = basins.at("here")
+    model = growth(basins)._of_other_shape(here)
+    assert model.state.own == end
+    assert basins.tried == tried
+    assert (model is here) == (end == "here")
+
+
+def test_a_shape_that_explains_stays(four_corners):
+    basins = Basins({"here": -50.0}, explains=-100.0)
+    here = basins.at("here")
+    assert growth(basins)._of_other_shape(here) is here
+    assert basins.tried == 0

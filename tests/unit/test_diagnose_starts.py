@@ -49,3 +49,31 @@ def test_the_last_effect_is_tried_weaker_and_stronger(monkeypatch, fitted, best,
     assert state.effects[0] is other
     np.testing.assert_allclose(state.effects[1].point, [start])
     np.testing.assert_array_equal(state.u, [0.4])
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [
+        ("friction_patch", ("x", "y", "radius")),
+        ("stribeck_friction", ("speed",)),
+        ("viscous_drag", ()),
+        ("uneven_support", ()),
+    ],
+)
+def test_another_shape_is_a_corner_of_the_prior_around_it(name, shape):
+    kind = effect_named(name)
+    chart = kind.chart(AROUND)
+    middle = np.array(kind.families(AROUND)[0].point) + 0.1
+    point = EffectPoint(kind=kind, point=middle, free=tuple(range(len(chart))), origin=np.zeros(len(chart)))
+    fitter, model = Fitter(0.0), model_with(point_of(DRAG, 0.3), point)
+    corners = starts.corners(fitter, model)
+    assert len(set(corners)) == (2 ** len(shape) if shape else 0)
+    for corner in corners:
+        state = starts.of_other_shape(fitter, model, corner)
+        assert not state.own[0].any()
+        moved = state.effects[-1]
+        ways = (moved.point - middle) / np.array([c.std for c in chart])
+        assert [chart[j].name for j in np.flatnonzero(ways)] == list(shape)
+        np.testing.assert_allclose(ways[ways != 0.0], starts.ASIDE * np.array(corner))
+        # What was unsure is unsure about the new place, and the amplitude about where it was.
+        np.testing.assert_array_equal(moved.origin, np.where(ways != 0.0, moved.point, 0.0))
