@@ -1,0 +1,98 @@
+"""What the proof makes: worlds that tell nothing, share nothing with the diagnosis, and can be made again."""
+
+import ast
+import json
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco")
+
+from physid_drake.errors import ProofError
+from physid_drake.prove import make, mujoco_world
+from physid_drake.prove.effects import catalogue as fx
+from physid_drake.prove.effects.effect import parameters_of
+from physid_drake.prove.mujoco_world import PushWorld
+from physid_drake.prove.scene import draw_scene
+from physid_drake.prove.world_plan import Plan
+from physid_drake.recording import Box, read_recording
+
+PLAN = Plan(
+    shape=Box(size=(0.127, 0.051, 0.030)), mass=0.2, support_friction=0.3, hand_friction=0.2, tip_radius=0.008,
+    tip_height=0.015,
+)  # fmt: skip
+
+
+def test_the_package_shares_nothing_with_the_diagnosis():
+    forbidden = {"effects", "cell", "identify", "diagnose"}
+    folder = Path(mujoco_world.__file__).parent
+    worlds = ("make", "scene", "knobs", "shapes", "feet", "world_plan", "contact", "mujoco_xml", "mujoco_world")
+    for file in [*(folder / f"{name}.py" for name in worlds), *(folder / "effects").glob("*.py")]:
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            for name in names:
+                parts = name.split(".")
+                assert parts[0] != "pydrake"
+                assert parts[0] != "physid_drake" or not forbidden & set(parts[1:2])
+
+
+def test_missing_mujoco_says_what_to_install(monkeypatch):
+    def missing(name):
+        raise ImportError(name)
+
+    monkeypatch.setattr(mujoco_world.importlib, "import_module", missing)
+    with pytest.raises(ProofError, match=r"pip install 'physid_drake\[proof\]'"):
+        PushWorld(PLAN)
+
+
+def test_the_mix_is_a_quarter_nothing_and_every_effect_has_its_turn():
+    drawn = [make.assign(index, 7) for index in range(200)]
+    assert {kind: sum(d.kind == kind for d in drawn) for kind in make.KINDS} == {
+        "none": 50,
+        "effect": 100,
+        "other": 30,
+        "pair": 20,
+    }
+    assert {d.effects[0] for d in drawn if d.kind == "effect"} == set(fx.CATALOGUED)
+    assert {d.effects[0] for d in drawn if d.kind == "other"} == set(fx.OTHERS)
+    assert all(len(set(d.effects)) == 2 for d in drawn if d.kind == "pair")
+    assert len({make.world_id(index, 7) for index in range(200)}) == 200
+
+
+@pytest.fixture
+def short_scenes(monkeypatch):
+    """Two pushes a world: enough for what is written."""
+    monkeypatch.setattr(make, "draw_scene", lambda rng: _cut(draw_scene(rng)))
+
+
+def _cut(scene):
+    return replace(scene, pushes=scene.pushes[:2])
+
+
+def test_a_world_is_made_again_bit_for_bit_and_tells_nothing(tmp_path, short_scenes):
+    seals = [make.make(tmp_path / name, 1, 3, kind="effect") for name in ("a", "b")]
+    assert seals[0] == seals[1] == make.make(tmp_path / "a", 1, 3, kind="effect")
+    files = sorted(p.relative_to(tmp_path / "a") for p in (tmp_path / "a").rglob("*") if p.is_file())
+    for file in files:
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes()
+    for folder in (tmp_path / "a" / "recordings").iterdir():
+        recording = read_recording(folder)
+        truth = json.loads((tmp_path / "a" / "sealed" / f"{folder.name}.json").read_text())
+        text = (folder / "recording.yaml").read_text()
+        assert not any(name in text for name in [*fx.CATALOGUED, *fx.OTHERS])
+        for push_ in recording.pushes:
+            exact = np.array(
+                truth["noise_free_poses"][f"pushes/{push_.name.split('/')[-1].removesuffix('.csv')}.csv"]
+            )
+            error = push_.object.planar - exact
+            assert np.abs(error[:, :2]).max() < 6 * truth["noise"]["position"]
+            assert len(exact) == len(push_.object)
+
+
+def test_parameters_are_plain_numbers():
+    for effect in (fx.CATALOGUED | fx.OTHERS).values():
+        written = json.loads(json.dumps(parameters_of(effect())))
+        assert set(written) == {field.name for field in fields(effect)}
