@@ -145,15 +145,23 @@ def confirm(
         tick(f"fit with {one.kind.name}", k, len(worth))
         found.append(_candidate(fitter, one, _fit(fitter, before, one), plain))
     found = ranked(found)
-    for k, candidate in enumerate(found[:PERSISTENT]):
+    for k in _once_more(found):
+        candidate = found[k]
         short = candidate.fitted.score - before.score < FELL_SHORT * 0.5 * candidate.score.gain
         if (_explained(found) and not short) or fitter.case.pool.count > spent:
             continue
-        tick(f"fit with {candidate.name} once more", k, PERSISTENT)
+        tick(f"fit with {candidate.name} once more", 0, 0)
         again = _fit_from_afar(fitter, before, candidate)
         if again.score > candidate.fitted.score:
             found[k] = _candidate(fitter, candidate.score, again, plain)
     return tuple(ranked(found))
+
+
+def _once_more(found: Sequence[Candidate]) -> list[int]:
+    """Which candidates to fit again: the one that promised most, whatever came of it, and the best."""
+    best = list(range(len(found)))[:PERSISTENT]
+    promised = max(range(len(found)), key=lambda k: found[k].score.gain, default=0)
+    return best if promised in best or not found else [promised, *best]
 
 
 def worthwhile(before: Fitted, candidate: Candidate) -> bool:

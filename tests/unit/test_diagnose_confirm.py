@@ -159,3 +159,17 @@ def test_what_left_out_pushes_do_not_confirm_keeps_no_weaker_effect_from_a_try(m
     fitter = SimpleNamespace(case=SimpleNamespace(pool=SimpleNamespace(count=0), problems=range(8)))
     found = confirm.confirm(fitter, SimpleNamespace(reduced_chi2=1.0, score=0.0), scores, lambda *said: None, most=4)
     assert len(found) == tried
+
+
+@pytest.mark.parametrize(
+    ("promised", "again"),
+    [
+        ([900.0, 800.0, 700.0, 600.0], [0, 1]),
+        ([100.0, 800.0, 700.0, 900.0], [3, 0, 1]),  # what came of it may be a fit that went astray
+        ([100.0], [0]),
+        ([], []),
+    ],
+)
+def test_the_effect_that_promised_most_is_tried_again_whatever_came_of_it(promised, again):
+    found = [SimpleNamespace(score=SimpleNamespace(gain=gain)) for gain in promised]
+    assert confirm._once_more(found) == again
