@@ -12,7 +12,7 @@ from physid_drake.effects.effect import Surroundings
 Array = NDArray[np.float64]
 
 FEWEST, MOST = 3, 6  # places along a side
-CLOSE = 1.2  # radii of the object: from further off a fit does not find a patch that is as large as the object
+CLOSE = 1.2  # radii of the object: from further off a fit may not find a patch that is as large as the object
 
 
 def grid_of_places(around: Surroundings) -> tuple[Array, float]:
