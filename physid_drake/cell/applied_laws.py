@@ -22,17 +22,17 @@ class AppliedLaws:
         """Add the laws' impulses over a tick [s] to the object's velocities."""
         if not self._laws and not self._frictions:
             return
-        seen = state.object_state(time)
+        seen = state.object_state(time, span)
         for wrench in total_wrenches(seen, self._laws, self._frictions):
             state.kick(seen.yaw, span * wrench.fx, span * wrench.fy, span * wrench.torque)
             if wrench.tip_x or wrench.tip_y:
                 state.rock(seen.yaw, span * wrench.tip_x, span * wrench.tip_y)
 
-    def are_held(self, state: PlantState, time: float) -> bool:
-        """Whether friction surely holds a resting object against the laws' forces."""
+    def are_held(self, state: PlantState, time: float, span: float) -> bool:
+        """Whether friction surely holds a resting object against the laws' forces over a tick [s]."""
         if not self._laws:
             return True
-        seen = state.object_state(time)
+        seen = state.object_state(time, span)
         limit = float(seen.holding.sum())
         reach = math.sqrt(seen.inertia / seen.mass)
         wrenches = total_wrenches(seen, self._laws, self._frictions)

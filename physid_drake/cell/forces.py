@@ -50,6 +50,7 @@ class ObjectState:
 
     Attributes:
         time: since the rollout's start [s].
+        span: how long the tick is [s]: what a law gives is held for so long.
         p_WBo: x + iy [m].
         v_WBo: x + iy [m/s].
         p_BoBcm_W: from Bo to the centre of mass, x + iy in W [m].
@@ -64,6 +65,7 @@ class ObjectState:
     """
 
     time: float
+    span: float
     p_WBo: complex
     v_WBo: complex
     p_BoBcm_W: complex
@@ -162,17 +164,19 @@ class StateReader:
     p_BBcm: complex
     half_height: float
 
-    def at(self, time: float, X_WB: Sequence[float], V_WB: Sequence[float]) -> ObjectState:
+    def at(self, time: float, span: float, X_WB: Sequence[float], V_WB: Sequence[float]) -> ObjectState:
         """The state.
 
         Args:
             time: since the rollout's start [s].
+            span: how long the tick is that begins then [s].
             X_WB: (7,) quaternion wxyz and position [m].
             V_WB: (6,) angular and linear velocity in W.
         """
         px, py, yaw = planar_pose(*X_WB[:6])
         return ObjectState(
             time=time,
+            span=span,
             p_WBo=complex(px, py),
             v_WBo=complex(V_WB[3], V_WB[4]),
             p_BoBcm_W=self.p_BBcm * complex(math.cos(yaw), math.sin(yaw)),
@@ -248,7 +252,7 @@ class ForceLaw(Protocol):
     """Anything that pushes the object."""
 
     def wrench(self, state: ObjectState) -> Wrench:
-        """The force at a state."""
+        """The mean force over the tick that begins at a state, if nothing else acts on the object."""
         ...
 
 

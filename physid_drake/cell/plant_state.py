@@ -113,10 +113,10 @@ class PlantState:
         py += 2.0 * (j * k - w * i) * above
         return (px, py, pose[2]), (vx + wy * above, vy - wx * above, wz)
 
-    def object_state(self, time: float) -> ObjectState:
-        """The object as force laws see it, at a time since the rollout's start [s]."""
+    def object_state(self, time: float, span: float) -> ObjectState:
+        """The object as force laws see it when a tick of ``span`` [s] begins, ``time`` [s] after the start."""
         q, v = self._q, self._v
-        return self._reader.at(time, self._x[q : q + 7].tolist(), self._x[v : v + 6].tolist())
+        return self._reader.at(time, span, self._x[q : q + 7].tolist(), self._x[v : v + 6].tolist())
 
     def lean(self) -> tuple[float, float, float]:
         """Depth of Bo's foot in the table [m], and how it grows along x and y of B [-]."""

@@ -156,7 +156,8 @@ class Stepper:
             tip = self._hand[k] if self._soft is None else self._soft.place
             if self._tip.gap(*self._state.section(self._height)[0], *tip)[0] <= 1e-6:
                 return False
-        return self._laws.are_held(self._state, k * self._solver.time_step_s)
+        dt = self._solver.time_step_s
+        return self._laws.are_held(self._state, k * dt, dt)
 
     def _skip_rest(self, k: int, count: int) -> int:
         """Nothing happens until the hand comes: go to the last tick before it touches."""

@@ -11,8 +11,12 @@ import numpy as np
 from physid_drake.cell.forces import ForceLaw, ObjectState, Wrench
 from physid_drake.effects.effect import Coordinate, Effect, PushFacts, Surroundings, parameter
 
-TICK = 2e-3  # s: the rollout's longest; a drag is damped as if it acted so long, so that it never drives backwards
 ROLLING_EDGE = 1e-3  # m/s: below it rolling resistance fades, so that it never drives backwards
+
+
+def _mean_decay(share: float) -> float:
+    """Mean of exp(-share t) over t in 0..1: what is left, on the average of a tick, of a speed that decays so."""
+    return -math.expm1(-share) / share if share > 0.0 else 1.0
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -43,11 +47,12 @@ class _ViscousLaw:
     polar: float
 
     def wrench(self, state: ObjectState) -> Wrench:
-        half = 0.5 * TICK * self.coefficient
-        # The impulse is that of the mean speed over the tick: of second order, and stable for any coefficient.
-        fx, fy = (-self.coefficient / (1.0 + half / state.mass) * state.v_WBcm).tolist()
-        turning = self.coefficient * self.polar / (1.0 + half * self.polar / state.inertia)
-        return Wrench(fx=fx, fy=fy, torque=-turning * state.yaw_rate)
+        # The mean over the tick of the exact decay, v exp(-c t / m): never drives backwards, however strong.
+        turning = self.coefficient * self.polar
+        force = self.coefficient * _mean_decay(self.coefficient * state.span / state.mass)
+        torque = turning * _mean_decay(turning * state.span / state.inertia)
+        fx, fy = (-force * state.v_WBcm).tolist()
+        return Wrench(fx=fx, fy=fy, torque=-torque * state.yaw_rate)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -80,7 +85,7 @@ class _QuadraticLaw:
     def wrench(self, state: ObjectState) -> Wrench:
         vx, vy = state.v_WBcm.tolist()
         drag = self.coefficient * math.hypot(vx, vy)
-        factor = -drag / (1.0 + 0.5 * TICK * drag / state.mass)
+        factor = -drag / (1.0 + state.span * drag / state.mass)  # from the exact decay, v / (1 + k v t / m)
         return Wrench(fx=factor * vx, fy=factor * vy, torque=0.0)
 
 
@@ -122,6 +127,6 @@ class _RollingLaw:
         # Across the axis (y of B) it rolls; along the axis it slides.
         across = np.array([math.cos(state.yaw), math.sin(state.yaw)])
         speed = float(across @ state.v_WBcm)
-        edge = max(ROLLING_EDGE, self.share * state.weight / state.mass * TICK)
+        edge = max(ROLLING_EDGE, self.share * state.weight / state.mass * state.span)
         force = -self.share * state.weight * speed / math.hypot(speed, edge)
         return Wrench(fx=force * across[0], fy=force * across[1], torque=0.0)

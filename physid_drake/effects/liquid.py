@@ -12,8 +12,6 @@ from physid_drake.cell.diagram import GRAVITY
 from physid_drake.cell.forces import ForceLaw, ObjectState, Wrench
 from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
 
-TICK = 2e-3  # s: the rollout's longest; a drag is damped as if it acted so long, so that it never drives backwards
-
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Sloshing(Effect):
@@ -95,8 +93,7 @@ class _SloshLaw:
     def __init__(self, mass: float, frequency: float, damping: float, load: float) -> None:
         """``mass`` kg, ``frequency`` rad/s, ``damping`` ratio, ``load`` on the base that moves with the mass [N]."""
         self._mass, self._frequency, self._damping, self._load = mass, frequency, damping, load
-        self._time = math.inf  # before any call
-        self._span = TICK
+        self._time, self._span = math.inf, 0.0  # of the tick that was looked at last; before any call
         # Of the swinging mass: place [m], velocity [m/s]; of the object at the last call: place, velocity, spin.
         self._place = self._velocity = self._from = self._anchor = 0j
         self._spin = 0.0
@@ -106,11 +103,10 @@ class _SloshLaw:
     def wrench(self, state: ObjectState) -> Wrench:
         if state.time < self._time:  # a rollout begins
             self._place, self._velocity = complex(*state.p_WBcm), complex(*state.v_WBcm)
-            self._time, self._span = state.time, TICK
-            self._look_ahead(state)
         elif state.time > self._time:
             self._advance(state, state.time - self._time)
-            self._time = state.time
+        if (state.time, state.span) != (self._time, self._span):
+            self._time, self._span = state.time, state.span
             self._look_ahead(state)
         return self._wrench
 
@@ -120,19 +116,18 @@ class _SloshLaw:
         return self._mass * self._frequency**2 * swing
 
     def _advance(self, state: ObjectState, span: float) -> None:
-        """Move by the tick that has passed."""
-        if span > 2.0 * TICK:  # the object stood still, and the rollout skipped it
+        """Move by what has passed since the last look."""
+        if span > 1.001 * self._span:  # more than its tick: the object stood still, and the rollout skipped it
             start = complex(*state.p_WBcm)
             offset, self._velocity = self._flow(self._place - start, self._velocity, 0.0, span)
-            self._place, self._span = start + offset, TICK
+            self._place = start + offset
             return
         offset, _ = self._flow(self._place - self._from, self._velocity - self._anchor, self._spin, span)
         self._place = self._from + span * self._anchor + offset
         self._velocity -= span * self._force / self._mass
-        self._span = span
 
     def _look_ahead(self, state: ObjectState) -> None:
-        """The mean wrench of the next tick, as long as the last one."""
+        """The mean wrench of the next tick."""
         self._from, self._anchor, self._spin = complex(*state.p_WBcm), complex(*state.v_WBcm), state.yaw_rate
         offset, rate = self._place - self._from, self._velocity - self._anchor
         later, slower = self._flow(offset, rate, self._spin, self._span)

@@ -48,7 +48,7 @@ class EffectForces(LeafSystem):
         """
         LeafSystem.__init__(self)
         self.set_name(NAME)
-        self._reader, self._laws, self._frictions = reader, tuple(laws), tuple(frictions)
+        self._reader, self._tick, self._laws, self._frictions = reader, tick, tuple(laws), tuple(frictions)
         self._body = scene.object.index()
         self.DeclareVectorInputPort("object.state_estimated", 13)
         self.DeclareDiscreteState(5)  # the sum of the laws' wrenches
@@ -62,7 +62,7 @@ class EffectForces(LeafSystem):
 
     def _sample(self, context: Context, discrete: DiscreteValues) -> None:
         x = self.get_input_port().Eval(context).tolist()
-        state = self._reader.at(context.get_time(), x[:7], x[7:])
+        state = self._reader.at(context.get_time(), self._tick, x[:7], x[7:])
         wrenches = total_wrenches(state, self._laws, self._frictions)
         discrete.set_value([sum(parts) for parts in zip(*map(dc.astuple, wrenches), strict=True)])
 

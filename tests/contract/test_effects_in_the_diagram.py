@@ -60,7 +60,7 @@ def test_the_diagram_slides_as_the_rollout_does(effect):
 
 def pressed(built, q):
     """Centre of pressure (2,) of a pose in B [m]."""
-    state = reader_of(built.model.body, built.cell.scene).at(0.0, q.tolist(), [0.0] * 6)
+    state = reader_of(built.model.body, built.cell.scene).at(0.0, 1e-3, q.tolist(), [0.0] * 6)
     return state.loads @ built.cell.scene.support.points / state.loads.sum()
 
 

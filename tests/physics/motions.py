@@ -24,8 +24,9 @@ SLOW = {"speed": 0.02, "until": 1.0, "rise": 0.2, "brake": 0.2}  # a push along 
 
 
 @cache
-def built(geometry, hand, model="point", points=30):
+def built(geometry, hand, model="point", points=30, tick=2e-3):
     config = config_of(model)
+    config.solver.slide_time_step_s = tick
     config.contact.support_points = points
     return Cell(
         geometry.shape, hand_radius=TIP if hand else None, config=config, pressure=geometry.pressure,
@@ -38,12 +39,12 @@ def make(name, **parameters):
 
 
 def slide(*effects, velocity=(0.5, 0.0, 0.0), pose=(0.0, 0.0, 0.0), seconds=1.0, geometry=BOX, order=0,
-          friction=MU, model="point", points=30):  # fmt: skip
+          friction=MU, model="point", points=30, tick=2e-3):  # fmt: skip
     """The motion of an object that is let go with a velocity."""
     start = Start(pose=pose, velocity=velocity)
     push = Rollout(start=start, path=None, begin=0.0, end=seconds, hand_height=None, order=order)
     body = body_of(MASS, friction)
-    motion = roll(lambda g: built(g, False, model, points), geometry, body, push, effects)
+    motion = roll(lambda g: built(g, False, model, points, tick), geometry, body, push, effects)
     assert motion.outcome is Outcome.COMPLETED
     return motion
 
