@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from physid_drake.identify.problem import Noise, noise_of
+from physid_drake.identify.problem import FINEST_POSITION, FINEST_ROTATION, SILENT, Noise, noise_of
 from physid_drake.recording import Push, Recording, rest_segments
 
 Array = NDArray[np.float64]
@@ -94,8 +94,8 @@ def tracker_noise(recording: Recording) -> tuple[TrackerNoise, Noise]:
     """
     plain = noise_of(recording)
     pieces = [(push.object.times[r], push.object.planar[r]) for push in recording.pushes for r in rest_segments(push)]
-    seen_xy = _reml([(t, p[:, k]) for t, p in pieces for k in (0, 1)])
-    seen_yaw = _reml([(t, p[:, 2]) for t, p in pieces])
+    seen_xy = _reml([(t, p[:, k]) for t, p in pieces for k in (0, 1)], FINEST_POSITION)
+    seen_yaw = _reml([(t, p[:, 2]) for t, p in pieces], FINEST_ROTATION)
     warnings: list[str] = []
     position, tau_xy = _chosen("position", plain.position, plain.source["position"], seen_xy, warnings)
     rotation, tau_yaw = _chosen("rotation", plain.rotation, plain.source["rotation"], seen_yaw, warnings)
@@ -129,13 +129,18 @@ def _chosen(
     return value, constant
 
 
-def _reml(pieces: Sequence[tuple[Array, Array]]) -> tuple[float, float] | None:
-    """Standard deviation and correlation time of rests (times, values), each with a mean of its own."""
+def _reml(pieces: Sequence[tuple[Array, Array]], finest: float) -> tuple[float, float] | None:
+    """Standard deviation, at least ``finest``, and correlation time of rests (times, values), each with its mean.
+
+    None where they are too few, or silent: a coarse or filtered stream that stands still tells nothing of its noise.
+    """
     rests = [(t[:LONGEST], v[:LONGEST]) for t, v in pieces if len(t) >= 10]
     if sum(len(t) for t, _ in rests) < FEWEST:
         return None
     interval = float(np.median(np.concatenate([np.diff(t) for t, _ in rests])))
-    spread = math.sqrt(float(np.mean([np.var(v) for _, v in rests]))) or 1e-9
+    spread = math.sqrt(float(np.mean([np.var(v) for _, v in rests])))
+    if spread < SILENT * finest:
+        return None
 
     def cost(x: Array) -> float:
         sigma, rho = spread * math.exp(x[0]), 1.0 / (1.0 + math.exp(-x[1]))
@@ -154,7 +159,7 @@ def _reml(pieces: Sequence[tuple[Array, Array]]) -> tuple[float, float] | None:
     found = minimize(cost, np.array([0.0, -1.5]), method="Nelder-Mead", options={"xatol": 1e-2, "fatol": 1e-2})
     rho = 1.0 / (1.0 + math.exp(-found.x[1]))
     constant = -interval / math.log(rho) if rho > 0.02 else 0.0
-    return spread * math.exp(float(found.x[0])), constant
+    return max(spread * math.exp(float(found.x[0])), finest), constant
 
 
 def _jitter(pushes: Sequence[Push]) -> float:

@@ -129,6 +129,7 @@ class PushFacts:
         polar: mean square distance of the underside's points from its centre [m^2].
         rolling_radius: of a lying cylinder, else None [m].
         region: (2, 2) lower and upper corner of where the object may come [m].
+        hand_axes: (2, 2) the axes of P, as columns, along x and y of W.
     """
 
     order: int
@@ -136,6 +137,7 @@ class PushFacts:
     polar: float
     rolling_radius: float | None = None
     region: Array = dc.field(default_factory=lambda: np.array([[-1.0, -1.0], [1.0, 1.0]]))
+    hand_axes: Array = dc.field(default_factory=lambda: np.eye(2))
 
 
 @dc.dataclass(frozen=True, kw_only=True)

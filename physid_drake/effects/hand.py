@@ -125,7 +125,7 @@ class ActuatorLag(_HandEffect):
 class HandOffset(_HandEffect):
     """The tip is not where its calibration says: an offset in P.
 
-    The axes of P are those of W where the recording has no rotation of the hand.
+    The axes of P are the mean ones of each push; those of W where the recording has no rotation of the hand.
     """
 
     name: ClassVar[str] = "hand_offset"
@@ -151,8 +151,7 @@ class HandOffset(_HandEffect):
 
     def hand(self, path: HandPath, facts: PushFacts) -> HandPath:
         """The path, shifted."""
-        del facts
-        return dc.replace(path, start=path.start + np.array([self.x, self.y]))
+        return dc.replace(path, start=path.start + facts.hand_axes @ np.array([self.x, self.y]))
 
 
 def _fine_times(path: HandPath, end: float) -> Array:

@@ -20,6 +20,8 @@ from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]
 
+SHORT = 1e-4  # s: for differences
+
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Geometry:
@@ -32,7 +34,7 @@ class Geometry:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Rollout:
-    """A push to simulate: start, path, times [s], contact height [m], number in the recording."""
+    """A push to simulate: start, path, times [s], contact height [m], number in the recording, axes of P in W."""
 
     start: Start
     path: HandPath | None
@@ -40,6 +42,7 @@ class Rollout:
     end: float
     hand_height: float | None
     order: int = 0
+    hand_axes: Array = dc.field(default_factory=lambda: np.eye(2))
 
 
 def geometry_with(effects: Sequence[Effect], geometry: Geometry) -> Geometry:
@@ -68,11 +71,9 @@ def roll(
     """
     present = [effect for effect in effects if not effect.is_null]
     cell = build(geometry_with(present, geometry))
-    facts = facts_of(cell, body, _region(cell, body, push), push.order)
+    facts = facts_of(cell, body, _region(cell, body, push), push.order, push.hand_axes)
     body = body_with(present, body, facts)
-    start = push.start
-    for effect in reversed(present):
-        start = dc.replace(start, pose=effect.true_pose(start.pose))
+    start = _true_start(present, push.start)
     path = push.path
     if path is not None:
         for effect in present:
@@ -90,11 +91,30 @@ def roll(
     )
 
 
-def facts_of(cell: Cell, body: Body, region: Array, order: int) -> PushFacts:
-    """What effects may know of a push that comes within a region (2, 2) [m]."""
+def _true_start(effects: Sequence[Effect], start: Start) -> Start:
+    """State of B for one that the tracker reports: a tracked point beside the centre has another velocity, too."""
+
+    def true_pose(time: float) -> Array:
+        x, y, yaw = np.array(start.pose) + time * np.array(start.velocity)
+        pose = float(x), float(y), float(yaw)
+        for effect in reversed(effects):
+            pose = effect.true_pose(pose)
+        return np.array(pose)
+
+    pose = true_pose(0.0)
+    if np.array_equal(pose, start.pose):
+        return start
+    velocity = (true_pose(SHORT) - true_pose(-SHORT)) / (2.0 * SHORT) if any(start.velocity) else np.zeros(3)
+    (x, y, yaw), (vx, vy, spin) = pose.tolist(), velocity.tolist()
+    return dc.replace(start, pose=(x, y, yaw), velocity=(vx, vy, spin))
+
+
+def facts_of(cell: Cell, body: Body, region: Array, order: int, hand_axes: Array | None = None) -> PushFacts:
+    """What effects may know of a push that comes within a region (2, 2) [m]; without ``hand_axes`` P is as W."""
     return PushFacts(
         order=order, mass=body.mass, polar=float(sum(_second_moments(cell))),
         rolling_radius=cell.solid.rolling_radius, region=region,
+        hand_axes=np.eye(2) if hand_axes is None else hand_axes,
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,16 @@ from physid_drake.cell import CellConfig, HandPath, Start
 from physid_drake.cell.hand_fit import fit_hand_paths, stream_std
 from physid_drake.errors import RecordingError
 from physid_drake.recording import Cylinder as CylinderShape
-from physid_drake.recording import Hand, NoiseEstimate, Push, Recording, Shape, estimate_noise, rest_segments
+from physid_drake.recording import (
+    Hand,
+    NoiseEstimate,
+    PoseStream,
+    Push,
+    Recording,
+    Shape,
+    estimate_noise,
+    rest_segments,
+)
 
 Array = NDArray[np.float64]
 
@@ -24,6 +33,14 @@ DEFAULT_ROTATION_STD = 5e-3  # rad
 DEFAULT_HAND_STD = 1e-4  # m
 DEFAULT_FORCE_STD = 0.05  # N
 LARGEST_CORRELATION = 0.98
+UPRIGHT = 0.87  # cosine of 30 degrees: an object that leans more does not stand on its face
+GRIP = 0.5  # of a round tip's radius: so far beyond the object's edge it still touches it nearly as wide as it is
+# A simulation without noise, or a tracker that is quiet at rest: below these the cell's own error is what differs.
+FINEST_POSITION = 1e-5  # m
+FINEST_ROTATION = 1e-4  # rad
+FINEST_HAND = 1e-6  # m
+FINEST_FORCE = 1e-3  # N
+SILENT = 0.1  # of the finest: a rest that is quieter than that tells no noise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,22 +75,24 @@ def noise_of(recording: Recording) -> Noise:
     stated = recording.sensors
     source: dict[str, str] = {}
 
-    def choose(name: str, said: float | None, estimate: float | None, assumed: float, floor: float) -> float:
+    def choose(name: str, said: float | None, estimate: float | None, assumed: float, finest: float) -> float:
         if said is not None:
             source[name] = "stated"
-            return said
-        if estimate is not None and estimate > floor:
+            return max(said, finest)
+        if estimate is not None and estimate > SILENT * finest:
             source[name] = "seen"
-            return estimate
+            return max(estimate, finest)
         source[name] = "assumed"
         return assumed
 
+    place = stated.object_position_std, seen.object_position_std
+    turn = stated.object_rotation_std, seen.object_rotation_std
     correlations = [c for c in (seen.position_autocorrelation, seen.rotation_autocorrelation) if c is not None]
     return Noise(
-        position=choose("position", stated.object_position_std, seen.object_position_std, DEFAULT_POSITION_STD, 1e-6),
-        rotation=choose("rotation", stated.object_rotation_std, seen.object_rotation_std, DEFAULT_ROTATION_STD, 1e-6),
-        hand=choose("hand", stated.hand_position_std, _hand_std(recording), DEFAULT_HAND_STD, 1e-7),
-        force=choose("force", stated.force_std, seen.force_std, DEFAULT_FORCE_STD, 1e-4),
+        position=choose("position", *place, DEFAULT_POSITION_STD, FINEST_POSITION),
+        rotation=choose("rotation", *turn, DEFAULT_ROTATION_STD, FINEST_ROTATION),
+        hand=choose("hand", stated.hand_position_std, _hand_std(recording), DEFAULT_HAND_STD, FINEST_HAND),
+        force=choose("force", stated.force_std, seen.force_std, DEFAULT_FORCE_STD, FINEST_FORCE),
         correlation=float(np.clip(np.mean(correlations), 0.0, LARGEST_CORRELATION)) if correlations else 0.0,
         source=source,
     )
@@ -99,6 +118,7 @@ class PushProblem:
         start_std: (3,) of the start pose [m, m, rad]; (6,) with the velocity where nothing pushes.
         path: the hand's; None without a hand.
         hand_height: of the contact above the table [m].
+        hand_axes: (2, 2) the axes of P, as columns, along x and y of W; their mean over the push.
         times: (n,) of the compared poses [s].
         poses: (n, 3) recorded x, y, yaw.
         force_times: (k,) middles of the force windows [s].
@@ -120,6 +140,7 @@ class PushProblem:
     force_times: Array
     forces: Array
     force_std: Array
+    hand_axes: Array = field(default_factory=lambda: np.eye(2))
     pace: float = 1.0
 
 
@@ -155,20 +176,22 @@ def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[Push
     Raises:
         RecordingError: if the hand passes above the object or an object cannot be compared.
     """
-    hands = {k: push.hand for k, push in enumerate(recording.pushes) if push.hand is not None}
-    fitted = fit_hand_paths([(hand.times, hand.positions[:, :2]) for hand in hands.values()], noise.hand)
-    paths = dict(zip(hands, fitted, strict=True))
-    return tuple(_problem(recording, k, paths.get(k), noise, height) for k in range(len(recording.pushes)))
+    hands = {k: _beside(recording, push, height) for k, push in enumerate(recording.pushes)}
+    moving = {k: hand for k, hand in hands.items() if hand is not None}
+    fitted = fit_hand_paths([(hand.times, hand.positions[:, :2]) for hand in moving.values()], noise.hand)
+    paths = dict(zip(moving, fitted, strict=True))
+    return tuple(_problem(recording, k, hands[k], paths.get(k), noise, height) for k in hands)
 
 
-def _problem(recording: Recording, order: int, path: HandPath | None, noise: Noise, height: float) -> PushProblem:
+def _problem(
+    recording: Recording, order: int, hand: PoseStream | None, path: HandPath | None, noise: Noise, height: float
+) -> PushProblem:
     push = recording.pushes[order]
+    _check_upright(recording, push)
     planar = push.object.planar
-    start, start_std, first = _start_of(push, planar, noise, free=path is None)
-    begin = float(push.object.times[0] if first == 0 else push.object.times[first])
-    compared = (
-        np.arange(len(planar)) > first if push.endpoint_only or path is None else np.ones(len(planar), dtype=bool)
-    )
+    start, start_std = _start_of(push, planar, noise, free=path is None)
+    compared = np.ones(len(planar), dtype=bool)
+    compared[0] = not (push.endpoint_only or path is None)
     force_times, forces, white = _force_windows(push, noise)
     if path is not None:
         told = ~_touching(path, force_times, forces, white, float(start_std[0]))
@@ -177,12 +200,13 @@ def _problem(recording: Recording, order: int, path: HandPath | None, noise: Noi
     return PushProblem(
         name=push.name,
         order=order,
-        begin=begin,
+        begin=float(push.object.times[0]),
         end=push.end_time,
         start=start,
         start_std=start_std,
         path=path,
-        hand_height=_contact_height(recording, push, height),
+        hand_height=_contact_height(recording, hand, height),
+        hand_axes=np.eye(2) if hand is None else _plane_axes(hand.quaternions),
         times=push.object.times[compared].copy(),
         poses=planar[compared].copy(),
         force_times=force_times,
@@ -191,7 +215,22 @@ def _problem(recording: Recording, order: int, path: HandPath | None, noise: Noi
     )
 
 
-def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[Start, Array, int]:
+def _check_upright(recording: Recording, push: Push) -> None:
+    """Refuses an object that lies on another face than the recording says; a lying cylinder may be turned."""
+    shape = recording.object.shape
+    if isinstance(shape, CylinderShape) and shape.axis == "y":
+        return
+    _, x, y, _ = push.object.quaternions[0]
+    cosine = abs(1.0 - 2.0 * float(x * x + y * y))
+    if cosine < UPRIGHT:
+        lean = np.degrees(np.arccos(cosine))
+        raise RecordingError(
+            f"push '{push.name}': the object's z axis is {lean:.0f} degrees from the vertical as the push begins;"
+            " give its shape in a frame B whose z axis points up."
+        )
+
+
+def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[Start, Array]:
     """Start pose from the rest before the motion, or pose and velocity of a free motion from its first samples."""
     sigmas = noise.sigmas
     if free:
@@ -201,11 +240,11 @@ def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[S
         still = planar[rests[0]]
         independent = max(1.0, len(still) * (1.0 - noise.correlation) / (1.0 + noise.correlation))
         pose = still.mean(axis=0)
-        return Start(pose=_triple(pose)), sigmas / np.sqrt(independent), 0
-    return Start(pose=_triple(planar[0])), sigmas.copy(), 0
+        return Start(pose=_triple(pose)), sigmas / np.sqrt(independent)
+    return Start(pose=_triple(planar[0])), sigmas.copy()
 
 
-def _moving_start(push: Push, planar: Array, sigmas: Array) -> tuple[Start, Array, int]:
+def _moving_start(push: Push, planar: Array, sigmas: Array) -> tuple[Start, Array]:
     times = push.object.times
     n = int(min(len(times), max(3, np.searchsorted(times, times[0] + 0.08))))
     if n < 3:
@@ -217,30 +256,56 @@ def _moving_start(push: Push, planar: Array, sigmas: Array) -> tuple[Start, Arra
     coefficients, *_ = np.linalg.lstsq(design, planar[:n], rcond=None)
     spread = np.sqrt(np.diag(np.linalg.pinv(design.T @ design)))
     std = np.concatenate([spread[0] * sigmas, spread[1] * sigmas])
-    return Start(pose=_triple(coefficients[0]), velocity=_triple(coefficients[1])), std, 0
+    return Start(pose=_triple(coefficients[0]), velocity=_triple(coefficients[1])), std
 
 
 def _triple(values: Array) -> tuple[float, float, float]:
     return float(values[0]), float(values[1]), float(values[2])
 
 
-def _contact_height(recording: Recording, push: Push, height: float) -> float:
+def _beside(recording: Recording, push: Push, height: float) -> PoseStream | None:
+    """The hand's stream from where it has come down beside the object to where it lifts off: the longest run of it.
+
+    Raises:
+        RecordingError: if it is never there.
+    """
+    tip, hand = recording.hand, push.hand
+    if tip is None or hand is None:
+        return None
+    z, reach = hand.positions[:, 2], _vertical_reach(tip)
+    beside = (z - max(reach, GRIP * tip.radius) < height) & (z + reach > 0.0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], beside, [False]])))
+    if not len(edges):
+        raise RecordingError(
+            f"push '{push.name}': the hand at z = {np.median(z):.3f} m passes the object, which is {height:.3f} m"
+            " high; correct hand_z_m or the object's size."
+        )
+    longest = int(np.argmax(edges[1::2] - edges[::2]))
+    first, last = int(edges[2 * longest]), int(edges[2 * longest + 1])
+    if last - first < 2 or last - first == len(hand):
+        return hand
+    kept = slice(first, last)
+    return PoseStream(times=hand.times[kept], positions=hand.positions[kept], quaternions=hand.quaternions[kept])
+
+
+def _contact_height(recording: Recording, hand: PoseStream | None, height: float) -> float:
     """Middle of the heights that tip and object share: there a sphere is an upright tip without ambiguity."""
-    hand = recording.hand
-    if hand is None or push.hand is None:
+    if recording.hand is None or hand is None:
         return 0.5 * height
     shape = recording.object.shape
     if isinstance(shape, CylinderShape) and shape.axis == "y":
         return shape.radius
-    centre = float(np.median(push.hand.positions[:, 2]))
-    reach = _vertical_reach(hand)
-    low, high = max(0.0, centre - reach), min(height, centre + reach)
-    if low >= height or high <= 0.0:
-        raise RecordingError(
-            f"push '{push.name}': the hand at z = {centre:.3f} m passes the object, which is {height:.3f} m high;"
-            " correct hand_z_m or the object's size."
-        )
-    return 0.5 * (low + high)
+    centre, reach = float(np.median(hand.positions[:, 2])), _vertical_reach(recording.hand)
+    return 0.5 * float(np.clip(centre - reach, 0.0, height) + np.clip(centre + reach, 0.0, height))
+
+
+def _plane_axes(quaternions: Array) -> Array:
+    """Mean (2, 2) of the upper left part of the rotation matrices of quaternions (n, 4)."""
+    w, x, y, z = quaternions.T
+    along_x = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z)]
+    along_y = [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z)]
+    axes: Array = np.array([along_x, along_y]).mean(axis=2)
+    return axes
 
 
 def _vertical_reach(hand: Hand) -> float:

@@ -77,6 +77,7 @@ def simulate(spec: CellSpec, thetas: ThetaMap, task: Task) -> Motion:
         begin=task.problem.begin,
         end=task.problem.end,
         hand_height=task.problem.hand_height,
+        hand_axes=task.problem.hand_axes,
         order=task.problem.order,
     )
     return roll(lambda geometry: cell_of(spec, geometry), Geometry(shape=spec.shape), body, push, task.effects)
@@ -105,6 +106,8 @@ def predict(spec: CellSpec, thetas: ThetaMap, task: Task) -> Prediction | None:
     first = tracked(motion, np.array([task.problem.begin]), task.effects)[0, 2]
     turns = np.round((task.problem.start.pose[2] - first) / (2 * np.pi))
     poses[:, 2] += 2.0 * np.pi * turns
+    if len(poses) == 1:  # nothing was recorded on the way to it: by how many turns nobody saw
+        poses[:, 2] += 2.0 * np.pi * np.round((task.problem.poses[:, 2] - poses[:, 2]) / (2.0 * np.pi))
     return Prediction(poses=poses, forces=_window_forces(motion, task.problem.force_times))
 
 

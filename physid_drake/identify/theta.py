@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 # Of theta, relative: what the cell's own error (0.3 to 0.4 of a usual tracker's noise) moves an estimate by. Of
 # thirty worlds of MuJoCo, frictions that pushes tell to 0.3 % by their noise alone came out 1 to 2 % off.
 CELL_ERROR = 0.01
+EXACT = 1e-4  # of a mass: a scale is not believed to be better
 UNWEIGHED = 0.8  # standard deviation of the logarithm of a mass that nobody weighed
 LIGHTEST, HEAVIEST = 20.0, 8000.0  # kg/m^3 of the box around an object: foam, steel
 
@@ -150,7 +151,7 @@ def _catalogue(
 def _mass(model: ObjectModel, solid: Solid, default: float, bounds: Sequence[float] | None) -> Parameter:
     """A weighed mass is as well known as the scale says; any other to its order, from foam to steel."""
     if model.mass is not None and model.mass_std is not None:
-        share = model.mass_std / model.mass
+        share = max(model.mass_std / model.mass, EXACT)
         reach = max(1.1, math.exp(6.0 * share))
         return Parameter(name="mass", unit="kg", lower=model.mass / reach, upper=model.mass * reach,
                          prior_mean=model.mass, prior_std=share, scale="log", description="mass")  # fmt: skip

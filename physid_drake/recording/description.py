@@ -234,7 +234,8 @@ def hand_from(top: Section) -> Hand | None:
     stream = section.choice("stream", "measured", "commanded")
     bare = tip == "reflex_sf" and not section.has("radius_m")
     radius = REFLEX_SF_TIP_RADIUS if bare else section.number("radius_m")
-    length = section.maybe_number("length_m")
+    # A sphere's or a fingertip's length says nothing; a capsule's and a cylinder's must be there.
+    length = section.maybe_number("length_m") if tip in ("cylinder", "capsule") else None
     with section.naming():
         return Hand(tip=cast(Tip, tip), radius=radius, length=length, stream=cast(HandStream, stream))
 

@@ -116,8 +116,11 @@ def _read_push(file: Path, name: str, note: str, *, with_hand: bool) -> Push:
             f"{file}: column {HAND_POSITION[0]}: recording.yaml describes a hand, but no row has its "
             "position; fill it, or remove the hand."
         )
-    force = _force_stream(table, warnings) if table.has(FORCE) else None
-    return Push(name=name, object=object_stream, hand=hand, force=force, note=note, warnings=tuple(warnings))
+    force = _force_stream(table, warnings) if with_hand and table.has(FORCE) else None
+    try:
+        return Push(name=name, object=object_stream, hand=hand, force=force, note=note, warnings=tuple(warnings))
+    except RecordingError as error:
+        raise RecordingError(f"{file}: {error}") from error
 
 
 def _read_table(file: Path, with_hand: bool) -> _PushTable:
@@ -141,6 +144,8 @@ def _read_table(file: Path, with_hand: bool) -> _PushTable:
         raise RecordingError(f"{file}: row 1: there are no samples under a header; a push needs at least two rows.")
     table = _PushTable(file=file, columns=header, values=np.array(rows, dtype=np.float64), lines=tuple(lines))
     _check_times(table)
+    if not with_hand:
+        _refuse_hand(table)
     return table
 
 
@@ -200,27 +205,31 @@ def _check_times(table: _PushTable) -> None:
 
 def _check_columns(file: Path, header: tuple[str, ...], with_hand: bool) -> None:
     required = (*OBJECT_POSITION, *OBJECT_QUATERNION, *(HAND_POSITION if with_hand else ()))
-    optional = [FORCE, HAND_QUATERNION] if with_hand else []
-    for group in optional:
+    for group in (FORCE, HAND_QUATERNION) if with_hand else ():
         if any(column in header for column in group):
             required = (*required, *group)
     for column in required:
         if column not in header:
             why = "recording.yaml describes a hand; " if column.startswith("hand") else ""
             raise RecordingError(f"{file}: row 1: column {column}: is missing; {why}add it.")
-    if not with_hand:
-        extra = next((c for c in header if c.startswith(("hand_", "force_"))), None)
-        if extra is not None:
+
+
+def _refuse_hand(table: _PushTable) -> None:
+    """Without a hand, its columns may stand there, but empty."""
+    for column in table.columns:
+        filled = np.flatnonzero(~np.isnan(table.group([column])[:, 0]))
+        if column.startswith(("hand_", "force_")) and len(filled):
             raise RecordingError(
-                f"{file}: row 1: column {extra}: recording.yaml describes no hand; add it there, or "
-                "remove the column."
+                f"{table.file}: row {table.lines[int(filled[0])]}: column {column}: recording.yaml describes no "
+                "hand; add it there, or empty the column."
             )
 
 
 def _pose_stream(
     table: _PushTable, what: str, position: Sequence[str], quaternion: Sequence[str], warnings: list[str]
 ) -> PoseStream | None:
-    turned = table.has(quaternion)
+    # A hand's quaternion may be absent, also as columns that are empty throughout.
+    turned = table.has(quaternion) and not (what == "hand" and np.isnan(table.group(quaternion)).all())
     rows = table.filled([*position, *quaternion] if turned else position)
     if len(rows) == 0:
         return None
@@ -230,7 +239,7 @@ def _pose_stream(
     lines = [table.lines[k] for k in rows]
     if turned:
         _check_norms(table.file, positions, quaternions, lines, quaternion)
-    screened = screen_poses(times, positions, quaternions, lines, what)
+    screened = screen_poses(times, positions, quaternions, lines, what, turned=turned)
     warnings.extend(screened.warnings)
     if not screened.keep.any():
         return None

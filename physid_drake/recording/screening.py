@@ -61,7 +61,9 @@ def find_gaps(times: Array) -> npt.NDArray[np.intp]:
     return np.flatnonzero(intervals > GAP_FACTOR * np.median(intervals))
 
 
-def screen_poses(times: Array, positions: Array, quaternions: Array, rows: Sequence[int], what: str) -> Screened:
+def screen_poses(
+    times: Array, positions: Array, quaternions: Array, rows: Sequence[int], what: str, *, turned: bool = True
+) -> Screened:
     """Screens one stream of poses.
 
     Args:
@@ -70,12 +72,15 @@ def screen_poses(times: Array, positions: Array, quaternions: Array, rows: Seque
         quaternions: (n, 4), w first; all zeros where the tracker lost the body.
         rows: n row numbers for the messages.
         what: "object" or "hand", for the messages.
+        turned: whether the quaternions were recorded; if not, a lost body is one at the origin that is elsewhere
+            at another height.
 
     Returns:
         Which of the n samples to keep, and the warnings.
     """
     warnings: list[str] = []
-    lost = (positions == 0.0).all(axis=1) & (quaternions == 0.0).all(axis=1)
+    at_origin = (positions == 0.0).all(axis=1)
+    lost = at_origin & ((quaternions == 0.0).all(axis=1) if turned else bool((positions[:, 2] != 0.0).any()))
     if lost.any():
         lost_rows = [rows[k] for k in np.flatnonzero(lost).tolist()]
         warnings.append(f"{what}: {describe_rows(lost_rows)}: track lost (all zeros), left out.")

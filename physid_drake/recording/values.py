@@ -58,7 +58,7 @@ def _check_times(times: Array) -> None:
 
 
 def check_positive(name: str, unit: str, *values: float | None) -> None:
-    """Refuses a length, mass or standard deviation that is not a positive, finite number.
+    """Refuses a length, mass or rate that is not a positive, finite number.
 
     Args:
         name: what the values are, for the message.
@@ -71,6 +71,16 @@ def check_positive(name: str, unit: str, *values: float | None) -> None:
     for value in values:
         if value is not None and not (np.isfinite(value) and value > 0.0):
             raise RecordingError(f"{name} must be positive, but got {value!r} {unit}; correct it.")
+
+
+def check_not_negative(name: str, unit: str, value: float | None) -> None:
+    """Refuses a standard deviation that is negative or not finite; 0 is an exact one.
+
+    Raises:
+        RecordingError: if it is.
+    """
+    if value is not None and not (np.isfinite(value) and value >= 0.0):
+        raise RecordingError(f"{name} must not be negative, but got {value!r} {unit}; correct it.")
 
 
 def _check_choice(name: str, got: str, choices: tuple[str, ...]) -> None:
@@ -191,6 +201,11 @@ class Push:
                 f"push {self.name!r}: at least two object poses are needed, but got {len(self.object)}; "
                 "record the pose before and after the push."
             )
+        if self.hand is not None and len(self.hand) < 2:
+            raise RecordingError(
+                f"push {self.name!r}: a hand's path needs at least two samples, but there is {len(self.hand)}; "
+                "record where it was before and after the push."
+            )
         if self.force is not None and self.hand is None:
             raise RecordingError(f"push {self.name!r}: a hand force needs a hand; add the hand's path.")
 
@@ -283,7 +298,7 @@ class ObjectModel:
 
     def __post_init__(self) -> None:
         check_positive("mass_kg", "kg", self.mass)
-        check_positive("mass_std_kg", "kg", self.mass_std)
+        check_not_negative("mass_std_kg", "kg", self.mass_std)
         if self.mass is None and self.mass_std is not None:
             raise RecordingError("mass_std_kg is given without mass_kg; give the mass too, or neither.")
         if self.mass is not None and self.mass_std is None:
@@ -332,10 +347,10 @@ class Sensors:
     force_std: float | None = None
 
     def __post_init__(self) -> None:
-        check_positive("object_position_std_m", "m", self.object_position_std)
-        check_positive("object_rotation_std_rad", "rad", self.object_rotation_std)
-        check_positive("hand_position_std_m", "m", self.hand_position_std)
-        check_positive("force_std_n", "N", self.force_std)
+        check_not_negative("object_position_std_m", "m", self.object_position_std)
+        check_not_negative("object_rotation_std_rad", "rad", self.object_rotation_std)
+        check_not_negative("hand_position_std_m", "m", self.hand_position_std)
+        check_not_negative("force_std_n", "N", self.force_std)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,6 +14,7 @@ from physid_drake.diagnose.values import EffectFinding, Location, Partly
 
 FORMAT = "physid-diagnosis/1"
 DIGITS = 6
+TIMES = ("start_s", "end_s")
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> str:
@@ -96,9 +97,12 @@ def _location(location: Location) -> dict[str, Any]:
 
 
 def _rounded(value: Any) -> Any:
-    """Six significant digits: what comes after them is not knowledge. JSON has no infinity."""
+    """Six significant digits: what comes after them is not knowledge, but in times, whose origin may be far.
+
+    JSON has no infinity.
+    """
     if isinstance(value, dict):
-        return {k: _rounded(v) for k, v in value.items()}
+        return {k: round(v, 4) if k in TIMES else _rounded(v) for k, v in value.items()}
     if isinstance(value, list | tuple):
         return [_rounded(v) for v in value]
     if isinstance(value, float):

@@ -56,3 +56,16 @@ def test_the_first_tracked_pose_is_the_one_the_rollout_was_started_from(effects)
     push = Rollout(start=start, path=None, begin=0.0, end=0.1, hand_height=None)
     motion = roll(lambda g: built(g, False), BOX, body_of(MASS, MU), push, effects)
     np.testing.assert_allclose(tracked(motion, np.zeros(1), effects)[0], start.pose, atol=1e-12)
+
+
+@pytest.mark.parametrize("effects", [
+    (make("tracker_bias", x=0.01, y=-0.02, yaw=0.1),),
+    (make("tracker_bias", x=0.01, yaw=-0.2), make("tracker_scale", ratio=0.9)),
+])  # fmt: skip
+def test_a_spinning_objects_tracked_point_starts_with_the_velocity_that_was_seen(effects):
+    start, times = Start(pose=(0.03, -0.02, 0.3), velocity=(0.2, -0.1, 5.0)), np.array([0.0, 2e-3, 4e-3])
+    push = Rollout(start=start, path=None, begin=0.0, end=0.1, hand_height=None)
+    motion = roll(lambda g: built(g, False), BOX, body_of(MASS, 1e-6), push, effects)
+    seen = tracked(motion, times, effects)
+    velocity = (4.0 * seen[1] - 3.0 * seen[0] - seen[2]) / 4e-3
+    np.testing.assert_allclose(velocity, start.velocity, atol=2e-4)  # measured 4e-5

@@ -30,10 +30,17 @@ def rests(rng, count, length, rho, sigma=2.0):
 
 @pytest.mark.parametrize("rho", [0.0, 0.5, 0.85])
 def test_short_rests_tell_a_slow_noise(rho):
-    sigma, constant = _reml(rests(np.random.default_rng(1), 40, 20, rho))
+    sigma, constant = _reml(rests(np.random.default_rng(1), 40, 20, rho), 1e-5)
     assert sigma == pytest.approx(2.0, rel=0.25 if rho > 0.8 else 0.08)
     found = np.exp(-0.01 / constant) if constant > 0.0 else 0.0
     assert found == pytest.approx(rho, abs=0.12)
+
+
+def test_a_stream_that_stands_still_at_rest_tells_no_noise():
+    still = [(t, 0.0 * v + 0.3) for t, v in rests(np.random.default_rng(1), 10, 20, 0.0)]
+    assert _reml(still, 1e-5) is None
+    faint = [(t, 2e-6 * v) for t, v in rests(np.random.default_rng(1), 10, 20, 0.0, sigma=1.0)]
+    assert _reml(faint, 1e-5)[0] == 1e-5
 
 
 @pytest.fixture(scope="module")
@@ -53,10 +60,31 @@ def test_a_stated_noise_that_the_rests_contradict_is_not_believed(recording):
     assert "position" in noise.warnings[0]
 
 
+@pytest.mark.parametrize("std", [0.0, None])
+def test_a_simulation_without_noise_has_the_finest_or_an_unknown_one(recording, std):
+    pushes = [
+        dc.replace(push, object=dc.replace(push.object, positions=positions, quaternions=quaternions))
+        for push in recording.pushes
+        for positions, quaternions in [_still(push)]
+    ]
+    sensors = dc.replace(recording.sensors, object_position_std=std, object_rotation_std=std)
+    noise, _ = tracker_noise(dc.replace(recording, pushes=tuple(pushes), sensors=sensors))
+    assert noise.known is (std == 0.0) and noise.warnings == ()
+    assert noise.position == pytest.approx(1e-5 if std == 0.0 else 5e-4)
+
+
+def _still(push):
+    """Its poses with every rest at one pose."""
+    positions, quaternions = push.object.positions.copy(), push.object.quaternions.copy()
+    for rest in rest_segments(push):
+        positions[rest], quaternions[rest] = positions[rest][0], quaternions[rest][0]
+    return positions, quaternions
+
+
 def test_a_rest_too_short_for_one_stream_tells_yaw_what_it_tells_of_the_place(recording, monkeypatch):
     # As many samples as two streams (x and y) need together.
     seen = {2: (POSITION_STD, 0.02), 1: None}
-    monkeypatch.setattr(noise_module, "_reml", lambda pieces: seen[len(pieces) // rests_of(recording)])
+    monkeypatch.setattr(noise_module, "_reml", lambda pieces, _: seen[len(pieces) // rests_of(recording)])
     noise, _ = tracker_noise(recording)
     assert noise.correlation_time == (0.02, 0.02)
 

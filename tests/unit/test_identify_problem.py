@@ -118,11 +118,52 @@ def test_the_contact_is_in_the_middle_of_what_tip_and_object_share(recording, ha
     assert first(replace(changed, hand=hand)).hand_height == pytest.approx(want)
 
 
-@pytest.mark.parametrize("z", [0.2, 0.0301, -0.02])
+@pytest.mark.parametrize("z", [0.2, 0.0351, -0.02])
 def test_a_hand_that_passes_the_object_is_refused(recording, z):
     changed = with_pushes(recording, lambda p: replace(p, hand=at_height(p.hand, z)))
     with pytest.raises(RecordingError, match=r"push 'pushes/001.csv': the hand at z = .* passes the object"):
         first(changed)
+
+
+def test_a_round_tip_just_above_the_edge_touches_the_edge(recording):
+    changed = with_pushes(recording, lambda p: replace(p, hand=at_height(p.hand, 0.033)))
+    assert first(changed).hand_height == 0.03
+
+
+def test_a_hand_that_lifts_off_and_goes_back_above_the_object_pushes_as_if_it_had_stayed(recording):
+    def lift(push):
+        s, count = push.hand, 40
+        times = s.times[-1] + 0.01 * np.arange(1, count + 1)
+        back = s.positions[-1] + np.linspace(0.0, 1.0, count)[:, None] * (s.positions[0] - s.positions[-1])
+        up = PoseStream(times=np.concatenate([s.times, times]),
+                        positions=np.vstack([s.positions, back * [1, 1, 0] + [0, 0, 0.2]]),
+                        quaternions=np.vstack([s.quaternions, s.quaternions[-1:].repeat(count, axis=0)]))  # fmt: skip
+        return replace(push, hand=up)
+
+    plain, lifted = first(recording), first(with_pushes(recording, lift))
+    times = np.linspace(plain.begin, lifted.end, 50)
+    assert lifted.end > plain.end and lifted.hand_height == plain.hand_height
+    assert np.array_equal(lifted.path.positions(times), plain.path.positions(times))
+
+
+def test_the_axes_of_the_tip_are_those_of_its_quaternions(recording):
+    assert np.array_equal(first(recording).hand_axes, np.eye(2))
+
+    def turn(push):  # by 0.6 rad, pointing down
+        q = np.tile([0.0, np.cos(0.3), np.sin(0.3), 0.0], (len(push.hand), 1))
+        return replace(push, hand=replace(push.hand, quaternions=q))
+
+    c, s = np.cos(0.6), np.sin(0.6)
+    assert first(with_pushes(recording, turn)).hand_axes == pytest.approx(np.array([[c, s], [s, -c]]))
+
+
+def test_an_object_on_another_face_is_refused(recording):
+    def topple(push):
+        q = np.tile([np.cos(np.pi / 4), np.sin(np.pi / 4), 0.0, 0.0], (len(push.object), 1))
+        return replace(push, object=replace(push.object, quaternions=q))
+
+    with pytest.raises(RecordingError, match="z axis is 90 degrees from the vertical"):
+        first(with_pushes(recording, topple))
 
 
 def test_a_rolling_cylinder_is_touched_at_its_axis(recording):

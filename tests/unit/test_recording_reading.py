@@ -96,7 +96,7 @@ def test_a_name_is_what_was_written_whatever_else_it_looks_like(written, name):
         ("tip: sphere", "tip: capsule", "needs length_m"),
         ("  radius_m: 1e-2\n", "", "hand.radius_m: is required"),
         ("stream: measured", "stream: guessed", "hand.stream"),
-        ("force_std_n: 0.02", "force_std_n: -0.02", "force_std_n must be positive"),
+        ("force_std_n: 0.02", "force_std_n: -0.02", "force_std_n must not be negative"),
         ("force_std_n: 0.02", "force_std: 0.02", "sensors.force_std: unknown key"),
         ("file: pushes/001.csv", "file: ../001.csv", "must lie inside"),
         ("file: pushes/001.csv", "file: /etc/passwd", "must lie inside"),
@@ -135,6 +135,7 @@ BAD_TABLES = {
     "one pose": (ROWS[:2], "at least two object poses"),
     "only the hand's rows": (["0.0,0,0,0,,,,,,,"], "at least two object poses"),
     "no hand sample": ([ROWS[2], "0.3,,,,0.1,0,0,1,0,0,0"], "no row has its position"),
+    "one hand sample": ([ROWS[0], ROWS[2]], "a hand's path needs at least two samples"),
     "short row": ([*ROWS, "0.3,0"], "row 5: has 2 fields"),
     "long row": ([*ROWS, "0.3" + "," * 12], "row 5: has 13 fields"),
     "no rows": ([], "no samples"),
@@ -178,6 +179,33 @@ def test_a_toss_without_a_hand_is_read(written):
     rows = ["0,0.1,0,0.1,1,0,0,0", "1,0.2,0,0.1,1,0,0,0"]
     recording = read_recording(written(yaml=YAML[:start] + YAML[end:], header=header, rows=rows))
     assert recording.hand is None and recording.pushes[0].hand is None
+
+
+def test_columns_that_are_empty_throughout_are_as_good_as_absent(written):
+    start, end = YAML.index("hand:"), YAML.index("sensors:")
+    header = HEADER + ",force_x_n,force_y_n,force_z_n"
+    free = ["0,,,,0.1,0,0.1,1,0,0,0,,,", "1,,,,0.2,0,0.1,1,0,0,0,,,"]
+    recording = read_recording(written(yaml=YAML[:start] + YAML[end:], header=header, rows=free))
+    assert recording.pushes[0].hand is None and recording.pushes[0].force is None
+    header = HEADER + ",hand_qw,hand_qx,hand_qy,hand_qz"
+    turned = read_recording(written(header=header, rows=[row + ",,,," for row in ROWS])).pushes[0].hand
+    assert turned.quaternions.tolist() == [[1, 0, 0, 0]] * 2
+    some = [ROWS[0] + ",1,0,0,0", *(row + ",,,," for row in ROWS[1:])]
+    assert "row 3: column hand_qw: is empty" in refusal(written(header=header, rows=some))
+
+
+def test_an_exact_sensor_has_no_deviation_and_a_sphere_no_length(written):
+    exact = YAML.replace("force_std_n: 0.02", "force_std_n: 0").replace("stream:", "length_m: 0.05\n  stream:")
+    recording = read_recording(written(exact))
+    assert recording.sensors.force_std == 0.0 and recording.hand.length is None
+
+
+def test_a_hand_that_is_lost_is_left_out_also_without_quaternions(written):
+    rows = [*ROWS[:2], "0.15,0,0,0,,,,,,,", "0.17,0.02,0,0.015,,,,,,,", ROWS[2]]
+    push = read_recording(written(rows=rows)).pushes[0]
+    assert push.warnings == ("hand: row 4: track lost (all zeros), left out.",) and len(push.hand) == 3
+    flat = [row.replace("0.015,0.1", "0,0.1").replace("0,0.015,,", "0,0,,") for row in ROWS]
+    assert len(read_recording(written(rows=flat)).pushes[0].hand) == 2  # a planar hand that rests at the origin
 
 
 def test_a_missing_folder_or_description_is_refused(tmp_path):
