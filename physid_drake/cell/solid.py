@@ -12,6 +12,7 @@ from pydrake.geometry import Box as DrakeBox
 from pydrake.geometry import Convex, Mesh, Shape
 from pydrake.geometry import Cylinder as DrakeCylinder
 from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.tree import CalcSpatialInertia, SpatialInertia
 from scipy.spatial import ConvexHull, QhullError
 
 from physid_drake.cell.outline import Disc, Outline, Polygon, rectangle
@@ -144,19 +145,48 @@ def _convex_prism(polygon: Polygon, height: float) -> Convex:
 def _mesh(shape: MeshShape) -> Solid:
     vertices = shape.scale * mesh_vertices(shape.file)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    middle = 0.5 * (low + high)
-    centred = vertices - middle
     height = float(high[2] - low[2])
     if height <= 0.0:
         raise CellError(f"mesh '{shape.file}' is flat: it has no height along z.")
+    centroid, gyration = _volume(shape, vertices)
+    middle = np.array([centroid[0], centroid[1], 0.5 * (low[2] + high[2])])
+    centred = vertices - middle
     hull = _hull(centred[:, :2], shape.file)
     standing = centred[centred[:, 2] < -0.5 * height + max(1e-4, 0.01 * height)]
     underside = _hull(standing[:, :2], shape.file)
-    iyy, _, ixx = second_moments(np.array(hull.vertices))
-    z2 = height**2 / 12.0
     visual = ((Mesh(str(shape.file), shape.scale), RigidTransform(-middle)),)
-    return Solid(outline=hull, underside=underside, height=height, gyration=(ixx + z2, iyy + z2, ixx + iyy),
+    return Solid(outline=hull, underside=underside, height=height, gyration=gyration,
                  rolling_radius=None, faces=_polygon_faces(hull, height), visual=visual)  # fmt: skip
+
+
+def _volume(shape: MeshShape, vertices: Array) -> tuple[Array, tuple[float, float, float]]:
+    """Centroid (3,) [m] of a mesh's volume, and the squared radii of gyration about it [m^2].
+
+    Of its convex hull where its surface does not enclose a volume.
+    """
+    hull = _inertia(Convex(vertices.T, label=shape.file.stem))
+    mesh = _inertia(Mesh(str(shape.file), shape.scale))
+    if hull is None:
+        raise CellError(f"mesh '{shape.file}' has no volume: its vertices lie in a plane.")
+    # A solid fills some of its hull; a surface with holes, or wound both ways, has a meaningless volume.
+    found = mesh if mesh is not None and _is_within(mesh, hull.get_mass(), vertices) else hull
+    x, y, z = found.Shift(found.get_com()).get_unit_inertia().get_moments().tolist()
+    return np.asarray(found.get_com(), dtype=np.float64), (x, y, z)
+
+
+def _is_within(mesh: SpatialInertia, most: float, vertices: Array) -> bool:
+    """Whether a mesh's volume, for which its mass stands, and its centroid can be those of its vertices' solid."""
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    inside = np.all((mesh.get_com() > low) & (mesh.get_com() < high))
+    return bool(inside and 0.02 * most < mesh.get_mass() < 1.001 * most)
+
+
+def _inertia(shape: Shape) -> SpatialInertia | None:
+    """Of a solid of density 1 [kg/m^3], about its origin; None where Drake finds none."""
+    try:
+        return CalcSpatialInertia(shape, 1.0)
+    except (RuntimeError, ValueError):
+        return None
 
 
 def mesh_vertices(file: Path) -> Array:

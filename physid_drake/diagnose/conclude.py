@@ -33,9 +33,7 @@ from physid_drake.diagnose.frictions import friction_trend
 from physid_drake.diagnose.looks import locate
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import regime_gains
-from physid_drake.diagnose.screen import (
-    cosine,
-)
+from physid_drake.diagnose.screen import cosine
 from physid_drake.diagnose.values import (
     Detectable,
     Diagnosis,
@@ -135,9 +133,7 @@ def _location(evidence: Evidence, verdict: str, findings: Sequence[EffectFinding
     if verdict in ("consistent", "underpowered"):
         return None
     found = locate(evidence.case, evidence.plain, evidence.wrenches, np.random.default_rng(seed))
-    if found is None or not findings:
-        return found
-    return dc.replace(found, frame=evidence.steps[0][0].score.kind.frame)
+    return dc.replace(found, frame=evidence.steps[0][0].score.kind.frame) if findings else found
 
 
 def class_of(plain: Fitted, step: Sequence[Candidate]) -> tuple[str, ...]:

@@ -64,7 +64,13 @@ class _Seen:
     coefficients: Array
 
 
-def locate(case: Case, plain: Fitted, wrenches: Sequence[MissingWrench], rng: np.random.Generator) -> Location | None:
+NOWHERE = Location(
+    statement="where the pushes end; of their way too little was recorded to say more", phase=(), dof=(),
+    frame="none", windows=(),
+)  # fmt: skip
+
+
+def locate(case: Case, plain: Fitted, wrenches: Sequence[MissingWrench], rng: np.random.Generator) -> Location:
     """The look that explains most; in no direction where none explains more than the best would by chance.
 
     Args:
@@ -74,7 +80,7 @@ def locate(case: Case, plain: Fitted, wrenches: Sequence[MissingWrench], rng: np
         rng: of the sign flips.
     """
     if not wrenches:
-        return None
+        return NOWHERE
     order = np.array([case.problems[w.push].order for w in wrenches], dtype=np.float64)
     there = tuple(p for p in PHASES if any(w.phase == p for w in wrenches))
     split = [

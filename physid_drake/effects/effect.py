@@ -160,6 +160,8 @@ class Effect:
     frame: ClassVar[str]
     # Of which parameters the null values make the effect vanish.
     amplitudes: ClassVar[tuple[str, ...]]
+    # Parameters that the catalogue does not have.
+    beyond: ClassVar[tuple[str, ...]] = ()
 
     @property
     def is_null(self) -> bool:

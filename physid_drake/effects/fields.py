@@ -70,12 +70,14 @@ class Tether(Effect):
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """Stiffness, the force at the region's middle, and the rest length: linear where the rest length is 0."""
         reach = float(np.max(around.region[1] - around.region[0]))
-        force, most = around.slight, 0.8 * around.friction * around.weight
+        force, most = around.slight, 2.0 * around.friction * around.weight
         return (
             Coordinate(name="stiffness", step=2.0 * force / reach, lower=0.0),
             Coordinate(name="force_x", step=force, lower=-most, upper=most),
             Coordinate(name="force_y", step=force, lower=-most, upper=most),
-            Coordinate(name="rest_length", step=0.02 * reach, lower=0.0, upper=2.0 * reach, std=0.3 * reach),
+            Coordinate(
+                name="rest_length", step=0.02 * reach, lower=0.0, upper=max(2.0 * reach, 1.0), std=0.3 * reach
+            ),
         )
 
     @classmethod

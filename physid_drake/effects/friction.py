@@ -198,7 +198,7 @@ class FrictionPatch(Effect):
         """Log ratio, place, log radius."""
         _, spacing = close_grid_of_places(around)
         return (
-            Coordinate(name="ratio", log=True, step=0.04, lower=-2.0, upper=2.0),
+            Coordinate(name="ratio", log=True, step=0.04, lower=math.log(0.05), upper=math.log(20.0)),
             Coordinate(name="x", step=0.05 * spacing, std=spacing),
             Coordinate(name="y", step=0.05 * spacing, std=spacing),
             Coordinate(name="radius", log=True, step=0.05, lower=math.log(0.005), upper=math.log(1.0), std=0.5),
@@ -252,9 +252,14 @@ class FrictionGradient(Effect):
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """The two slopes."""
         reach = np.maximum(np.abs(around.region).max(axis=0), 0.05)
+        # Where the object goes, some friction is left; where all of it lies on one side of the origin, it may grow.
+        lower = -0.95 / np.maximum(around.region[1], 0.05)
+        upper = 0.95 / np.maximum(-around.region[0], 0.05)
         return tuple(
-            Coordinate(name=name, step=2.0 * SLIGHT_SHARE / r, lower=-0.95 / r, upper=0.95 / r)
-            for name, r in zip(("slope_x", "slope_y"), reach.tolist(), strict=True)
+            Coordinate(name=name, step=2.0 * SLIGHT_SHARE / r, lower=low, upper=high)
+            for name, r, low, high in zip(
+                ("slope_x", "slope_y"), reach.tolist(), lower.tolist(), upper.tolist(), strict=True
+            )
         )
 
     def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:

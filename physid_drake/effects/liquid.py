@@ -33,6 +33,7 @@ class Sloshing(Effect):
     statement: ClassVar[str] = "a part of the mass swings inside the object"
     frame: ClassVar[str] = "object_acceleration"
     amplitudes: ClassVar[tuple[str, ...]] = ("fraction",)
+    beyond: ClassVar[tuple[str, ...]] = ("turning",)
 
     fraction: float = parameter(0.0, "-")
     frequency: float = parameter(4.0, "Hz")

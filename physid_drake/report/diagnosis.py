@@ -11,6 +11,7 @@ from rich.table import Table
 
 from physid_drake.diagnose import Diagnosis
 from physid_drake.diagnose.values import EffectFinding, Location, Partly
+from physid_drake.effects import effect_named
 
 FORMAT = "physid-diagnosis/1"
 DIGITS = 6
@@ -63,16 +64,19 @@ def diagnosis_json(diagnosis: Diagnosis) -> str:
 
 
 def _effect(effect: EffectFinding) -> dict[str, Any]:
+    parameters = {
+        name: {"value": p.value, "unit": p.unit, "ci90": p.ci90, "null": p.null}
+        for name, p in effect.parameters.items()
+    }
+    beyond = {name: parameters.pop(name) for name in effect_named(effect.name).beyond if name in parameters}
     return {
         "name": effect.name,
         "element": effect.element,
         "indistinguishable_from": list(effect.indistinguishable_from),
         "probability": effect.probability,
         "statement": effect.statement,
-        "parameters": {
-            name: {"value": p.value, "unit": p.unit, "ci90": p.ci90, "null": p.null}
-            for name, p in effect.parameters.items()
-        },
+        "parameters": parameters,
+        **({"beyond_the_catalogue": beyond} if beyond else {}),
     }
 
 

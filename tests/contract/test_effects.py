@@ -184,6 +184,7 @@ LEFT_OPEN = {"sloshing": {"turning": ("-", None)}}  # by the catalogue, which fi
 def test_names_elements_parameters_and_units_are_the_catalogues(kind):
     element, parameters = EXPECTED[kind.name]
     parameters = parameters | LEFT_OPEN.get(kind.name, {})
+    assert kind.beyond == tuple(LEFT_OPEN.get(kind.name, {}))
     assert kind.element == element
     assert {name: unit.replace("*", " ").replace("^", "") for name, unit in kind.units().items()} == {
         name: unit for name, (unit, _) in parameters.items()

@@ -129,6 +129,43 @@ def test_a_mesh_of_a_box_is_the_box(box_mesh):
         assert mesh.outline.nearest(*point)[0] == pytest.approx(want.outline.nearest(*point)[0], abs=1e-12)
 
 
+def prism_mesh(file, polygon, height, *, closed=True, caps=None):
+    """An extruded polygon, away from the file's origin; its ends in convex pieces; open at the top if not closed."""
+    n = len(polygon)
+    lines = [f"v {x + 0.3} {y - 0.2} {z}" for z in (0.1, 0.1 + height) for x, y in polygon]
+    caps = caps or [range(1, n + 1)]
+    faces = [" ".join(str(k) for k in reversed(cap)) for cap in caps]
+    faces += [" ".join(str(n + k) for k in cap) for cap in caps if closed]
+    faces += [f"{k} {k % n + 1} {n + k % n + 1} {n + k}" for k in range(1, n + 1)]
+    file.write_text("\n".join([*lines, *(f"f {face}" for face in faces)]) + "\n", encoding="utf-8")
+    return MeshShape(file=file)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("corner", [0.0, 0.05], ids=["right", "isosceles"])
+def test_a_mesh_of_a_triangle_is_the_prism(tmp_path, corner, closed):
+    triangle = np.array([[0.0, 0.0], [0.1, 0.0], [corner, 0.09]])
+    triangle -= triangle.mean(axis=0)
+    want = solid_of(Prism(polygon=tuple(map(tuple, triangle.tolist())), height=0.03))
+    mesh = solid_of(prism_mesh(tmp_path / "triangle.obj", triangle.tolist(), 0.03, closed=closed))
+    assert mesh.gyration == pytest.approx(want.gyration, rel=1e-9)
+    for outline, other in ((mesh.outline, want.outline), (mesh.underside, want.underside)):
+        np.testing.assert_allclose(sorted(outline.vertices), sorted(other.vertices), atol=1e-12)
+
+
+def test_a_mesh_that_is_not_convex_weighs_what_it_encloses(tmp_path):
+    ell = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.02], [0.02, 0.02], [0.02, 0.1], [0.0, 0.1]])
+    solid = solid_of(prism_mesh(tmp_path / "ell.obj", ell.tolist(), 0.03, caps=[(1, 2, 3, 4), (1, 4, 5, 6)]))
+    # Two rectangles of 100 x 20 and 20 x 80 mm: centroids 50, 10 and 10, 60 mm, areas 20 and 16 cm^2.
+    x, y = (20 * 0.05 + 16 * 0.01) / 36, (20 * 0.01 + 16 * 0.06) / 36
+    assert solid.outline.extent() == pytest.approx((-x, -y, 0.1 - x, 0.1 - y))
+    inertia = sum(
+        area * ((a * a + b * b) / 12 + (px - x) ** 2 + (py - y) ** 2)
+        for area, a, b, px, py in ((20, 0.1, 0.02, 0.05, 0.01), (16, 0.02, 0.08, 0.01, 0.06))
+    )
+    assert solid.gyration[2] == pytest.approx(inertia / 36)
+
+
 def test_a_mesh_of_a_box_slides_like_the_box(box_mesh):
     ends = [
         Cell(shape, hand_radius=None, config=config_of("point"))
