@@ -11,6 +11,7 @@ from physid_drake.cell import Body, HandPath, Outcome, Start
 from physid_drake.cell.outline import rectangle
 from physid_drake.cell.soft_tip import Mount, SoftTip
 from physid_drake.cell.touch import Tip as ContactTip
+from physid_drake.effects import PushFacts
 from physid_drake.effects.hand import TIP_SHARE
 from physid_drake.effects.rollout import Rollout, roll
 
@@ -156,6 +157,14 @@ def test_a_hand_offset_along_the_push_brings_the_object_as_much_further():
     plain, _ = push_along_x()
     shifted, _ = push_along_x(make("hand_offset", x=0.003))
     assert at(shifted, 0.3)[0, 0] - at(plain, 0.3)[0, 0] == pytest.approx(0.003, abs=2e-5)  # measured 2e-17 m
+
+
+def test_a_hand_offset_is_along_the_tips_own_axes():
+    _, path = push_along_x()
+    turned = np.array([[0.0, 1.0], [1.0, 0.0]])  # P's x along y of W: a tip that points down, turned by 90 degrees
+    facts = PushFacts(order=0, mass=MASS, polar=1e-3, hand_axes=turned)
+    moved = make("hand_offset", x=0.003, y=0.001).hand(path, facts)
+    np.testing.assert_allclose(moved.start - path.start, [0.001, 0.003], atol=1e-15)
 
 
 def test_a_hand_offset_across_the_push_is_a_push_beside_the_middle():
