@@ -137,7 +137,7 @@ def add_scene(
     grid = FrictionGrid(nx=config.friction_cells[0], ny=config.friction_cells[1])
     support = support_of(solid.underside, grid, config.contact.support_points, height=solid.height, pressure=pressure)
     if solid.rolling_radius is not None:
-        support = _axis_support(solid, support)
+        support = _axis_support(support)
 
     table = _add_table(plant, edge, hydroelastic)
     body, feet, foot_cells = _add_object(plant, solid, support, hydroelastic)
@@ -157,12 +157,11 @@ def add_scene(
     )  # fmt: skip
 
 
-def _axis_support(solid: Solid, support: Support) -> Support:
+def _axis_support(support: Support) -> Support:
     """A lying cylinder stands on its lowest line: keep the quadrature along y only."""
     ys = np.unique(np.round(support.points[:, 1], 12))
     shares = np.array([support.weights[np.isclose(support.points[:, 1], y)].sum() for y in ys])
     cells = np.array([support.cells[np.isclose(support.points[:, 1], y)][0] for y in ys])
-    del solid
     return Support(points=np.column_stack([np.zeros_like(ys), ys]), weights=shares, cells=cells)
 
 
@@ -210,8 +209,8 @@ def _add_object(
     return body, tuple(feet), tuple(foot_cells)
 
 
-def underside_area(outline: Outline) -> float:
-    """Area of an outline [m^2]."""
+def _extent_area(outline: Outline) -> float:
+    """Area of a disc, or of the rectangle about a polygon [m^2]: the scale of the facets, which need not tile it."""
     if isinstance(outline, Disc):
         return math.pi * outline.radius**2
     x0, y0, x1, y1 = outline.extent()
@@ -220,7 +219,7 @@ def underside_area(outline: Outline) -> float:
 
 def facet_areas(support: Support, outline: Outline) -> Array:
     """Areas (n,) of the hydroelastic facets: small, in proportion to the quadrature's weights [m^2]."""
-    return support.weights * underside_area(outline) * FACET_SHARE**2
+    return support.weights * _extent_area(outline) * FACET_SHARE**2
 
 
 def _facets(support: Support, members: tuple[int, ...], outline: Outline) -> Mesh:

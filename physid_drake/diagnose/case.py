@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses as dc
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,12 @@ from physid_drake.effects import Surroundings
 from physid_drake.errors import RecordingError
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
-from physid_drake.identify.problem import Noise, PushProblem, problems_of, spec_of
+from physid_drake.identify.problem import PushProblem, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool
 from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.recording import Recording
 
 Array = NDArray[np.float64]
-Tick = Callable[[str, int, int], None]
 
 # Of the hand between two ticks [m]. Measured on forty drawn pushes against ticks of half a millisecond: 0.02 mm and
 # 0.5 mrad for slow pushes, as much as one millisecond costs for fast ones.
@@ -42,7 +41,6 @@ class Case:
     Attributes:
         recording: the pushes.
         noise: of the tracker.
-        sensors: of all sensors, as the identification takes them.
         problems: one per push.
         nuisances: each push's own unknowns.
         features: what is compared, one per push.
@@ -55,7 +53,6 @@ class Case:
 
     recording: Recording
     noise: TrackerNoise
-    sensors: Noise
     problems: tuple[PushProblem, ...]
     nuisances: tuple[Nuisance, ...]
     features: tuple[PushFeatures, ...]
@@ -125,7 +122,6 @@ def case_of(
     return Case(
         recording=recording,
         noise=noise,
-        sensors=sensors,
         problems=problems,
         nuisances=tuple(nuisance_of(p, UNIT_SCATTER) for p in problems),
         features=tuple(features_of(push, p, noise) for push, p in zip(pushes, problems, strict=True)),
@@ -174,7 +170,6 @@ def _surroundings(recording: Recording, problems: Sequence[PushProblem], thetas:
         pushes=max(p.order for p in problems) + 1,
         has_hand=recording.hand is not None,
         rolls=solid.rolling_radius is not None,
-        interval=float(np.median(np.concatenate([np.diff(push.object.times) for push in recording.pushes]))),
     )
 
 

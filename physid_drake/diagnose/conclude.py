@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,6 @@ from physid_drake.diagnose.values import (
 )
 
 Array = NDArray[np.float64]
-Tick = Callable[[str, int, int], None]
 
 ALIKE = 0.95  # cosine of two projected signatures that these pushes cannot tell apart
 FEWEST_PUSHES = 3

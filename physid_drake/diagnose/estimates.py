@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,6 @@ from physid_drake.effects import Effect
 from physid_drake.identify.theta import cell_error
 
 Array = NDArray[np.float64]
-Tick = Callable[[str, int, int], None]
 
 SAMPLES = 400  # of an effect's chart, for the intervals of its parameters
 JOINT_SAMPLES = 2000  # of theta and all charts, for how the estimates vary together

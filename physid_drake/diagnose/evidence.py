@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses as dc
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,6 @@ from physid_drake.diagnose.screen import Screening, Signature
 from physid_drake.diagnose.values import NextPush
 
 Array = NDArray[np.float64]
-Tick = Callable[[str, int, int], None]
 
 # The cell's own error that guard, floor and tolerances leave: cost per degree of freedom where nothing is missing.
 SLACK = 1.15

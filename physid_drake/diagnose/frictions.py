@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.linear import LinearPush, own_unknowns
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import speed_of
-
-Array = NDArray[np.float64]
 
 FEWEST = 6  # pushes that tell their friction
 TOLD = 0.5  # of a friction's spread: a push that leaves more of it does not tell it

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.confirm import push_scores, standard_error
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import RegimeGain
-
-Array = NDArray[np.float64]
 
 FEWEST = 3  # pushes of a regime
 FASTER = 2.0  # the median of the fast over that of the slow pushes: less is one regime

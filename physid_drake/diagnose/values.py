@@ -94,7 +94,17 @@ class RegimeGain:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class FitQuality:
-    """How well pushes are predicted that were left out of the fit, before and after; lengths in m, angles in rad."""
+    """How well pushes are predicted that were left out of the fit, by the plain cell and with what was found.
+
+    Attributes:
+        rms_before, rms_after: root mean square errors, in standard deviations of the measurement.
+        position_before, position_after: of the place of B [m].
+        rotation_before, rotation_after: of its yaw [rad].
+        log_score_gain: gain in log predictive density over all pushes [nats], and its standard error over pushes.
+        log_score_gain_se: that standard error [nats].
+        per_push: name, error before and after in standard deviations, of each.
+        regimes: gains where fit and test are of different kinds of pushes.
+    """
 
     rms_before: float
     rms_after: float
@@ -110,7 +120,15 @@ class FitQuality:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class ThetaEstimate:
-    """One parameter of theta; value None where these pushes cannot tell it."""
+    """One parameter of theta.
+
+    Attributes:
+        value: with what was found in the model; None where these pushes cannot tell it.
+        unit: of the value.
+        ci90: 90 % interval; None where there is no value.
+        identifiable: whether these pushes tell it.
+        before: the plain cell's estimate; its prior's where these pushes cannot tell it.
+    """
 
     value: float | None
     unit: str
@@ -121,7 +139,16 @@ class ThetaEstimate:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Ranked:
-    """One effect in the ranking: gain of the score test, held-out gain if it was fitted, and why it lost."""
+    """One effect in the ranking.
+
+    Attributes:
+        name: as in the catalogue.
+        gain: of its score test: twice the gain in log likelihood [nats].
+        p_value: of that gain, for all looks at the catalogue.
+        held_out_gain: of the fitted effect, in log predictive density of left-out pushes [nats]; None if not fitted.
+        held_out_se: its standard error over pushes.
+        why: it was found, or lost.
+    """
 
     name: str
     gain: float
@@ -133,7 +160,14 @@ class Ranked:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Detectable:
-    """The smallest effect that these pushes would have shown: parameter, value, unit, motion in sigmas."""
+    """The smallest effect that these pushes would have shown.
+
+    Attributes:
+        name, parameter: of the effect.
+        value: the smallest that would have been seen; of several parameters, the one named, the others at rest.
+        unit: of the value.
+        sigmas: how far such an effect moves the object, in standard deviations of the tracker.
+    """
 
     name: str
     parameter: str
@@ -144,7 +178,14 @@ class Detectable:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class NextPush:
-    """The push that would tell the rivals apart, or that would teach most."""
+    """The push that would tell the rivals apart, or that would teach most.
+
+    Attributes:
+        direction_deg: of the hand's way in W.
+        speed_mps: of the hand.
+        contact_offset_m: of the hand's line from the centre of B, to its left.
+        settles_with_probability: that it tells which rival is right.
+    """
 
     direction_deg: float
     speed_mps: float
@@ -154,7 +195,30 @@ class NextPush:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Diagnosis:
-    """The answer."""
+    """The answer.
+
+    Attributes:
+        recording: its name.
+        verdict: ``consistent``, ``explained``, ``ambiguous``, ``unexplained`` or ``underpowered``.
+        sentence: the verdict for a person.
+        p_value: of the plain cell: that noise and scatter alone would leave as much.
+        alpha: false-alarm rate that was asked for.
+        effects: that were found, in the order in which they were; empty unless explained or ambiguous.
+        location: of the mismatch; None where there is none.
+        fit: of pushes that were left out.
+        theta: by parameter.
+        next_push: None where none would help, or nothing pushes.
+        seed: of all that is drawn.
+        ranking: the catalogue, best first.
+        detectable: the smallest effects that would have been seen.
+        left: what remains, in words.
+        partly: what takes a part of an unexplained mismatch away.
+        reduced_chi2_before, reduced_chi2_after: cost per degree of freedom, plain and with what was found.
+        friction_scatter: of the last model's friction, push to push, relative.
+        noise: ``position_m``, ``rotation_rad``, ``correlation_time_s`` (of both), ``jitter_s`` that were used.
+        warnings: what was found odd, one line each.
+        rollouts: how many were made.
+    """
 
     recording: str
     verdict: str

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import Body, HandPath
+from physid_drake.cell.diagram import GRAVITY
 from physid_drake.cell.forces import ForceLaw, FrictionLaw
 from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.support import PressureGrid
@@ -39,7 +40,6 @@ class Surroundings:
         pushes: how many.
         has_hand: whether something pushes.
         rolls: whether the object is a lying cylinder.
-        interval: of the object's samples [s].
     """
 
     mass: float
@@ -51,12 +51,11 @@ class Surroundings:
     pushes: int
     has_hand: bool
     rolls: bool
-    interval: float
 
     @property
     def weight(self) -> float:
         """N."""
-        return 9.81 * self.mass
+        return GRAVITY * self.mass
 
     @property
     def radius(self) -> float:

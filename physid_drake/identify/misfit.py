@@ -41,12 +41,6 @@ def _decorrelate(times: Array, residual: Array, correlation: float) -> Array:
     return result
 
 
-def rms_sigmas(problem: PushProblem, noise: Noise, prediction: Prediction) -> float:
-    """Root mean square misfit in standard deviations; poses and forces count alike, sample by sample."""
-    residual = whitened_residual(problem, noise, prediction)
-    return float(np.sqrt(np.mean(residual**2)))
-
-
 @dataclass(frozen=True, kw_only=True)
 class Whitener:
     """Marginalises a push's own unknowns: residual r has covariance I + J P J^T, P their prior variances.

@@ -6,13 +6,11 @@ import dataclasses as dc
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from physid_drake.cell import HandPath
 from physid_drake.cell.outline import Outline
 from physid_drake.errors import ConfigError
 
-Array = NDArray[np.float64]
 Pose = tuple[float, float, float]
 
 LEAD = 0.1  # s at rest before the hand moves

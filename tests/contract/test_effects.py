@@ -116,7 +116,7 @@ def around(rolls):
     return Surroundings(
         mass=MASS, friction=MU, size=np.array([0.066, 0.1] if rolls else [0.1, 0.08]),
         height=0.066 if rolls else 0.06, region=np.array([places.min(axis=0), places.max(axis=0)]), top_speed=0.4,
-        pushes=3, has_hand=True, rolls=rolls, interval=0.01,
+        pushes=3, has_hand=True, rolls=rolls,
     )  # fmt: skip
 
 

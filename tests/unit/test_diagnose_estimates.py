@@ -14,7 +14,7 @@ from physid_drake.space import Parameter, ParameterSpace
 
 AROUND = Surroundings(
     mass=0.2, friction=0.3, size=np.array([0.12, 0.05]), height=0.03, region=np.array([[-0.5, -0.5], [0.5, 0.5]]),
-    top_speed=0.5, pushes=10, has_hand=True, rolls=False, interval=0.01,
+    top_speed=0.5, pushes=10, has_hand=True, rolls=False,
 )  # fmt: skip
 CASE = SimpleNamespace(thetas=SimpleNamespace(space=SimpleNamespace(names=("support_friction",))), around=AROUND)
 

@@ -11,7 +11,7 @@ from physid_drake.effects import Surroundings, effect_named
 
 AROUND = Surroundings(
     mass=0.2, friction=0.3, size=np.array([0.12, 0.05]), height=0.03, region=np.array([[-0.5, -0.5], [0.5, 0.5]]),
-    top_speed=0.5, pushes=10, has_hand=True, rolls=False, interval=0.01,
+    top_speed=0.5, pushes=10, has_hand=True, rolls=False,
 )  # fmt: skip
 DRAG, BOUNCE = effect_named("viscous_drag"), effect_named("restitution")
 

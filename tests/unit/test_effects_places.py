@@ -10,7 +10,7 @@ from physid_drake.effects.places import CLOSE, FEWEST, MOST, close_grid_of_place
 def around(size, region):
     return Surroundings(
         mass=0.3, friction=0.3, size=np.array(size), height=0.05, region=np.array(region), top_speed=0.5, pushes=10,
-        has_hand=True, rolls=False, interval=0.01,
+        has_hand=True, rolls=False,
     )  # fmt: skip
 
 

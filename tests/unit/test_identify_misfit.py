@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from runs import shipped_pushes
 
-from physid_drake.identify.misfit import Whitener, model_error_columns, rms_sigmas, whitened_residual
+from physid_drake.identify.misfit import Whitener, model_error_columns, whitened_residual
 from physid_drake.identify.nuisance import MODEL_ERROR
 from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems_of
 from physid_drake.identify.rollouts import Prediction
@@ -76,8 +76,6 @@ def test_the_residual_holds_poses_by_axis_and_then_forces_by_axis(problem):
     poses = np.outer(np.ones(4), [1.0, 2.0, 3.0]) * noise().sigmas
     residual = whitened_residual(one, noise(), Prediction(poses=poses, forces=np.array([[0.1, 0.2], [0.3, 0.4]])))
     np.testing.assert_allclose(residual, [1] * 4 + [2] * 4 + [3] * 4 + [1, 3, 2, 4])
-    prediction = Prediction(poses=poses, forces=np.array([[0.1, 0.2], [0.3, 0.4]]))
-    assert rms_sigmas(one, noise(), prediction) == pytest.approx(np.sqrt(np.mean(residual**2)))
 
 
 def test_a_perfect_prediction_has_no_residual(problem):
