@@ -71,16 +71,17 @@ def _plain(value: Any) -> Any:
     return [list(row) for row in value] if isinstance(value, tuple) else value
 
 
-def _turned(effect: Effect, values: Sequence[Any]) -> Array:
-    """Draws of an axis, turned to within a quarter turn of the value [rad]."""
-    here = float(effect.angle)  # type: ignore[attr-defined]
-    return np.asarray(here + (np.asarray(values) - here + 0.5 * math.pi) % math.pi - 0.5 * math.pi)
+def _near(effect: Effect, name: str, values: Sequence[Any]) -> Array:
+    """Draws of a parameter; of a periodic one, those within half a period of the effect's value."""
+    drawn, period = np.asarray(values, dtype=np.float64), effect.periods()[name]
+    if period is None:
+        return drawn
+    here = float(getattr(effect, name))
+    return np.asarray(here + (drawn - here + 0.5 * period) % period - 0.5 * period)
 
 
 def _interval(effect: Effect, name: str, values: Sequence[Any]) -> Any:
-    if name == "angle":
-        return [float(q) for q in np.quantile(_turned(effect, values), [0.05, 0.95])]
-    low, high = np.quantile(np.asarray(values, dtype=np.float64), [0.05, 0.95], axis=0)
+    low, high = np.quantile(_near(effect, name, values), [0.05, 0.95], axis=0)
     return [low.tolist(), high.tolist()]
 
 
@@ -133,7 +134,7 @@ def correlation_of(case: Case, fitted: Fitted) -> tuple[tuple[str, ...], Array]:
         for name in here.units():
             if isinstance(getattr(here, name), float):
                 values = [getattr(effect, name) for effect in effects]
-                drawn[f"{here.name}.{name}"] = _turned(here, values) if name == "angle" else np.array(values)
+                drawn[f"{here.name}.{name}"] = _near(here, name, values)
     varying = {name: values for name, values in drawn.items() if np.ptp(values) > 0.0}
     scores = [stats.norm.ppf((stats.rankdata(v) - 0.5) / len(v)) for v in varying.values()]
     return tuple(varying), np.atleast_2d(np.corrcoef(scores)) if scores else np.zeros((0, 0))

@@ -217,15 +217,10 @@ def _empty_signature(fitter: Fitter, kind: type[Effect], family: Family) -> Sign
 
 
 def _reaches(fitter: Fitter, kind: type[Effect], family: Family, i: int) -> bool:
-    """Whether an effect in one place can be felt in a push: a patch that the object never covers cannot."""
-    if kind.name != "friction_patch":
-        return True
-    patch = kind.at(np.array(family.point), fitter.case.around)
+    """Whether an effect in one place can be felt in a push."""
     problem, around = fitter.case.problems[i], fitter.case.around
     places = np.vstack([np.array(problem.start.pose[:2]), problem.poses[:, :2]])
-    away = np.hypot(places[:, 0] - getattr(patch, "x"), places[:, 1] - getattr(patch, "y"))  # noqa: B009
-    half_diagonal = 0.5 * float(np.hypot(*around.size))
-    return bool(away.min() < getattr(patch, "radius") * 1.3 + half_diagonal + 0.02)  # noqa: B009
+    return kind.at(np.array(family.point), around).reaches(places, around)
 
 
 def tolerances(case: Case, found: Sequence[Signature]) -> tuple[Array, ...]:

@@ -21,9 +21,9 @@ Array = NDArray[np.float64]
 Pose = tuple[float, float, float]
 
 
-def parameter(null: Any, unit: str) -> Any:
-    """A field of an effect: its null value, which is its default, and its unit."""
-    return dc.field(default=null, metadata={"unit": unit})
+def parameter(null: Any, unit: str, period: float | None = None) -> Any:
+    """A field of an effect: its null value, which is its default, its unit, and its period (pi for an axis)."""
+    return dc.field(default=null, metadata={"unit": unit, "period": period})
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -176,6 +176,16 @@ class Effect:
     def nulls(cls) -> dict[str, Any]:
         """Null value of each amplitude; None for what shapes the effect."""
         return {f.name: f.default if f.name in cls.amplitudes else None for f in dc.fields(cls)}
+
+    @classmethod
+    def periods(cls) -> dict[str, float | None]:
+        """Period of each parameter; None for what is not periodic."""
+        return {f.name: f.metadata["period"] for f in dc.fields(cls)}
+
+    def reaches(self, places: Array, around: Surroundings) -> bool:
+        """Whether an object that was at places (n, 2) [m] may have felt it."""
+        del places, around
+        return True
 
     # Chart.
 

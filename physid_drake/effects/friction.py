@@ -17,6 +17,7 @@ from physid_drake.effects.places import close_grid_of_places
 
 Array = NDArray[np.float64]
 SLIGHT_SHARE = 0.015  # of the friction
+WIDER, NEARBY = 1.3, 0.02  # times a patch's radius, and m: a fit may move its edge by so much
 
 
 def _along(state: ObjectState, share: Array) -> Array:
@@ -112,7 +113,7 @@ class _Anisotropic(Effect):
     fixed_in_object: ClassVar[bool]
 
     ratio: float = parameter(1.0, "-")
-    angle: float = parameter(0.0, "rad")
+    angle: float = parameter(0.0, "rad", period=math.pi)
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
@@ -209,6 +210,11 @@ class FrictionPatch(Effect):
         """A grid of places, with a radius that covers the gaps between them."""
         places, spacing = close_grid_of_places(around)
         return tuple(Family(point=(0.0, float(x), float(y), math.log(0.6 * spacing)), free=(0,)) for x, y in places)
+
+    def reaches(self, places: Array, around: Surroundings) -> bool:
+        """Whether a corner of the object may have been on the patch, which a fit may still make a little larger."""
+        away = np.hypot(places[:, 0] - self.x, places[:, 1] - self.y)
+        return bool(away.min() < WIDER * self.radius + 0.5 * float(np.hypot(*around.size)) + NEARBY)
 
     def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:
         """The law."""
