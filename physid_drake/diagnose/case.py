@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 # 0.5 mrad for slow pushes, as much as one millisecond costs for fast ones.
 TRAVEL_PER_TICK = 2.5e-4
 PACES = (1.0, 1.5, 2.0, 3.0, 4.0)
+SLOW = 0.03  # m/s: a hand that is never faster
+LONGEST_TICK = 2e-2  # s, for slow hands: within 0.08 mm and 0.6 mrad of ticks of 1 ms (benchmarks/slow_pushes.py)
+MOST_SLIDE_TICK = 0.05  # s
 MOST_PUSHES = 24  # more take longer and tell little more
 UNIT_SCATTER = 0.025  # of friction, push to push: the columns' unit and the median of its prior
 LEAST_MOTION = 6.0  # standard deviations: an object that moves less in every push does not move
@@ -130,6 +133,34 @@ def case_of(
         around=_surroundings(recording, problems, thetas),
         config=config,
     )
+
+
+def cell_config(recording: Recording, *, contact: str = "point", time_step: float | None = None) -> CellConfig:
+    """The cell in which a recording is diagnosed.
+
+    Args:
+        recording: whose hand may be slow: then ticks are longer than 1 ms.
+        contact: ``point`` or ``hydroelastic``.
+        time_step: tick with the hand [s]; None chooses it.
+    """
+    config = CellConfig()
+    config.contact.model = contact
+    config.solver.time_step_s = time_step or _tick(recording)
+    config.solver.slide_time_step_s = max(config.solver.slide_time_step_s, config.solver.time_step_s)
+    if time_step is not None:
+        config.solver.slide_time_step_s = min(MOST_SLIDE_TICK, 2.0 * time_step)
+    return config
+
+
+def _tick(recording: Recording) -> float:
+    """1 ms; longer where the hand goes less than a tenth of a millimetre in it."""
+    fastest = 0.0
+    for push in recording.pushes:
+        if push.hand is None or len(push.hand) < 3:
+            return 1e-3
+        steps = np.linalg.norm(np.diff(push.hand.positions[:, :2], axis=0), axis=1)
+        fastest = max(fastest, float(np.quantile(steps / np.diff(push.hand.times), 0.95)))
+    return float(np.clip(1e-4 / max(fastest, 1e-6), 1e-3, LONGEST_TICK)) if fastest < SLOW else 1e-3
 
 
 def _floored(problem: PushProblem) -> PushProblem:

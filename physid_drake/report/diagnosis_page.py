@@ -12,6 +12,8 @@ from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 
+from physid_drake.diagnose import Evidence
+from physid_drake.diagnose.leaving import predicted
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.values import Diagnosis, EffectFinding, ParameterEstimate, ThetaEstimate
 from physid_drake.recording import Recording
@@ -48,6 +50,24 @@ MEANING = {
 PHASES = {"contact": "while it is pushed", "free_slide": "in its free slide"}
 DOFS = {"along_motion": "along the motion", "across_motion": "across the motion", "rotation": "in rotation"}
 MOST_ERRORS, MOST_STRIPS, MOST_RANKED = 4, 8, 8  # shown before the reader asks for more
+
+
+def shown_pushes(diagnosis: Diagnosis, evidence: Evidence) -> list[ShownPush]:
+    """All pushes, recorded and as the models before and after have them."""
+    case, pushes = evidence.case, []
+    for i, problem in enumerate(case.problems):
+        free = (w.start for w in evidence.wrenches if w.push == i and w.phase == "free_slide")
+        pushes.append(
+            ShownPush(
+                name=problem.name,
+                times=case.features[i].middles,
+                recorded=case.features[i].poses(case.features[i].recorded),
+                before=predicted(evidence, evidence.nearest, i),
+                after=predicted(evidence, evidence.final, i) if diagnosis.effects else None,
+                released=next(free, None),
+            )
+        )
+    return pushes
 
 
 def diagnosis_page(

@@ -12,7 +12,7 @@ from worlds import endpoints, pushes_of, recorded, slides
 
 from physid_drake import load_model
 from physid_drake.cell import CellConfig
-from physid_drake.diagnose import case_of, diagnose
+from physid_drake.diagnose import case_of, diagnose, model_of
 from physid_drake.diagnose.memory import Memory
 from physid_drake.errors import RecordingError
 from physid_drake.identify.config import ThetaConfig
@@ -20,7 +20,7 @@ from physid_drake.plan import Situation
 from physid_drake.plan.draws import draws_of
 from physid_drake.recording import Sensors
 from physid_drake.report.diagnosis import diagnosis_json
-from physid_drake.run_diagnose import model_of, show
+from physid_drake.run_diagnose import show
 
 ERASER = OBJECTS["eraser"]
 THETA = Theta(support_friction=0.3, hand_friction=0.25)

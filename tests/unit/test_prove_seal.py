@@ -116,12 +116,11 @@ def note(event, arguments):
         seen.append(os.path.realpath(os.fsdecode(arguments[0])))
 sys.addaudithook(note)
 from pathlib import Path
-from physid_drake.diagnose import case_of
+from physid_drake.diagnose import case_of, cell_config
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.recording import read_recording
-from physid_drake.run_diagnose import cell_config
 recording = read_recording(Path(sys.argv[1]))
-case = case_of(recording, cell_config(recording, "point", None), ThetaConfig(), jobs=1)
+case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=1)
 for path in seen:
     print(path)
 """

@@ -1,0 +1,49 @@
+"""The model that leaves a diagnosis, and what it predicts."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.diagnose.estimates import correlation_of
+from physid_drake.diagnose.evidence import Evidence
+from physid_drake.diagnose.model import Fitted
+from physid_drake.diagnose.values import Diagnosis
+from physid_drake.model import Correlation, Model
+
+Array = NDArray[np.float64]
+
+
+def fit_that_leaves(diagnosis: Diagnosis, evidence: Evidence) -> Fitted:
+    """The fit with the effects if they were found, else the plain cell where it predicts best."""
+    return evidence.final if diagnosis.effects else evidence.nearest
+
+
+def predicted(evidence: Evidence, fitted: Fitted, i: int) -> Array:
+    """Window means (w, 3) [m, m, rad] of push i, its own unknowns at zero and without the diagnosis' tolerances."""
+    features, push, own = evidence.case.features[i], fitted.pushes[i], fitted.own_dimension
+    return features.poses(features.recorded - push.residual + push.shared[:, :own] @ fitted.solution.beta[:own])
+
+
+def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
+    """The model that leaves, as ``model.yaml`` has it: with the effects if they were found, else plain."""
+    case, fitted = evidence.case, fit_that_leaves(diagnosis, evidence)
+    state, spec = fitted.state, case.pool.spec
+    intervals: dict[str, object] = {
+        f"theta.{name}": list(t.ci90) for name, t in diagnosis.theta.items() if t.ci90 is not None
+    }
+    for effect in diagnosis.effects:
+        intervals |= {f"{effect.name}.{name}": p.ci90 for name, p in effect.parameters.items()}
+    names, matrix = correlation_of(case, fitted)
+    kept = [k for k, name in enumerate(names) if name in intervals]
+    return Model(
+        recording=case.recording.name,
+        shape=spec.shape,
+        hand_radius=spec.hand_radius,
+        table=spec.table,
+        config=spec.config,
+        body=case.thetas.body(np.asarray(case.thetas.space.from_unit(state.u))),
+        effects=tuple(e.effect(case) for e in state.effects) if diagnosis.effects else (),
+        intervals=intervals,
+        correlation=Correlation.of([names[k] for k in kept], matrix[np.ix_(kept, kept)]),
+    )
