@@ -18,7 +18,7 @@ class RunFolder:
 
     @classmethod
     def open(
-        cls, path: Path, configuration: str, *, name: str = "config.yaml", state: str = "belief.npz"
+        cls, path: Path, configuration: str, *, name: str = "config.yaml", state: str | None = "belief.npz"
     ) -> RunFolder:
         """Make the folder, or go on in one; the state of a run with another configuration is dropped.
 
@@ -26,7 +26,7 @@ class RunFolder:
             path: of the folder.
             configuration: text that says what the run is; kept in the folder.
             name: of the file that keeps it.
-            state: of the file that an interrupted run goes on from.
+            state: of the file that an interrupted run goes on from; None if it cannot.
 
         Raises:
             OutputError: if it cannot be written.
@@ -35,7 +35,7 @@ class RunFolder:
         try:
             path.mkdir(parents=True, exist_ok=True)
             config = path / name
-            if config.exists() and config.read_text(encoding="utf-8") != configuration:
+            if state is not None and config.exists() and config.read_text(encoding="utf-8") != configuration:
                 folder.forget(state)
         except (OSError, UnicodeDecodeError) as error:
             raise OutputError(f"output folder '{path}': cannot be written: {error}.") from error

@@ -26,7 +26,7 @@ from physid_drake.report.plan_page import plan_page, plan_png
 from physid_drake.report.progress import progress_bar
 from physid_drake.run_folder import RunFolder
 
-BUDGETS = {1: 24, 3: 48, 4: 64}  # settings tried, by the number of settings
+FEWEST_TRIALS, TRIALS_PER_SETTING = 24, 16  # of a search
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -66,14 +66,14 @@ def run(arguments: argparse.Namespace) -> int:
         made = plan(
             model, policy, DistanceToGoal(goal=goal), situation=Situation(start=start, order=learnt.pushes),
             rng=np.random.default_rng(_seed(arguments.seed)),
-            budget=BUDGETS[policy.space.dimension] if arguments.budget is None else arguments.budget,
+            budget=_budget(policy.space.dimension) if arguments.budget is None else arguments.budget,
             search=arguments.search, draws=arguments.draws, risk=arguments.risk, tolerance=arguments.tolerance,
             friction_scatter=learnt.friction_scatter, scatter_freedom=learnt.scatter_freedom, tick=tick,
         )  # fmt: skip
     with_effects = outcome_under(made, full) if arguments.plain and full.effects else None
     folder = RunFolder.open(
         arguments.out or Path("plans") / model.recording, json.dumps(_settings(arguments), indent=2) + "\n",
-        name="settings.json", state="none",
+        name="settings.json", state=None,
     )  # fmt: skip
     write(folder, made, seed=arguments.seed, with_effects=with_effects)
     console.print(plan_table(made, with_effects=with_effects))
@@ -82,6 +82,11 @@ def run(arguments: argparse.Namespace) -> int:
     names = ["plan.json", *push_files(made), "plan.png", "page.html"]
     console.print(f"written: {', '.join(names)} in {folder.path}")
     return 0
+
+
+def _budget(settings: int) -> int:
+    """Trials of a search over so many settings."""
+    return max(FEWEST_TRIALS, TRIALS_PER_SETTING * settings)
 
 
 def write(

@@ -47,6 +47,9 @@ from physid_drake.diagnose.values import (
 Array = NDArray[np.float64]
 
 ALIKE = 0.95  # cosine of two projected signatures that these pushes cannot tell apart
+SURELY = 3.0  # standard errors of a difference of gains: signatures that are alike need more than others
+SCORE_ERROR = 2.0  # nats: of a difference of gains, beside its standard error
+CHANCE = 0.05  # of all looks: what explains no more is not worth a word
 FEWEST_PUSHES = 3
 GOOD_PART = 0.25  # of the squared error: less is not worth a word
 NO_WORSE = 1.1  # times the plain model's error of pushes left out: a model with more of it is none
@@ -146,7 +149,7 @@ def class_of(plain: Fitted, step: Sequence[Candidate]) -> tuple[str, ...]:
             and abs(cosine(plain, best.score, other.score)) > ALIKE
         ):
             difference = best.gains - other.gains
-            if difference.sum() < 3.0 * standard_error(difference):
+            if difference.sum() < SURELY * standard_error(difference):
                 close.add(other.name)
     return tuple(sorted(close))
 
@@ -170,7 +173,7 @@ def _probability(step: Sequence[Candidate], others: set[str]) -> float:
             continue
         difference = best.gains - other.gains
         # Some error of the scores themselves, so that few pushes do not make sure.
-        spread = math.hypot(standard_error(difference), 2.0)
+        spread = math.hypot(standard_error(difference), SCORE_ERROR)
         deficit = float(difference.sum())
         if other.coordinates > best.coordinates:  # a little better for being more complicated is not likelier
             deficit = max(0.0, deficit)
@@ -289,7 +292,7 @@ def _why_not_fitted(name: str, evidence: Evidence) -> str:
     score = evidence.screening.score_of(name)
     if score is None or not score.kept:
         return "would have to act the other way round"
-    chance = evidence.screening.looks * math.exp(score.log_p) > 0.05
+    chance = evidence.screening.looks * math.exp(score.log_p) > CHANCE
     return "explains no more than chance would" if chance else "explains far less"
 
 

@@ -29,6 +29,7 @@ LEAST = 4.0  # nats of held-out gain
 CERTAIN = 40.0  # nats of held-out gain, the best push not counted
 UNLIKELY = 0.05  # of the signed-rank test of held-out gains
 BOUND = 10.0  # nats: no push counts more, for or against
+CLOSE = 1.5  # nats: gains that differ by less tell no rivals apart, however sure
 STUCK = 1.6  # cost per degree of freedom after which a fit is tried again from elsewhere
 FELL_SHORT = 0.8  # of the gain that the score test promised: such a fit is tried again too
 PERSISTENT = 2  # candidates that are worth that, where none explains the pushes
@@ -251,6 +252,6 @@ def rivals(best: Candidate, others: Sequence[Candidate]) -> tuple[Candidate, ...
         if other is best or not other.accepted or out_of_question(best, other):
             continue
         difference = best.gains - other.gains
-        if difference.sum() < max(SURE * standard_error(difference), 1.5):
+        if difference.sum() < max(SURE * standard_error(difference), CLOSE):
             close.append(other)
     return tuple(close)
