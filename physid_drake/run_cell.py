@@ -30,7 +30,7 @@ from physid_drake.report.page import result_page
 from physid_drake.report.plan import plan_table, push_files
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.result import result_json
-from physid_drake.report.stage import Scene, Stage
+from physid_drake.report.stage import ShownMotion, Stage
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
 from physid_drake.run_diagnose import ALPHA, STATE, recording_folder, run_case, show, write
 from physid_drake.run_folder import RunFolder
@@ -214,7 +214,7 @@ def _learner(identifier: Identifier, scenario: Scenario, recording: Recording, b
     )  # fmt: skip
 
 
-def _scenes(result: Identification, identifier: Identifier, recording: Recording) -> list[Scene]:
+def _scenes(result: Identification, identifier: Identifier, recording: Recording) -> list[ShownMotion]:
     """Held-out pushes first, as the model predicts them: with nothing of their own fitted."""
     by_name = {problem.name: problem for problem in identifier.problems}
     names = [*result.held_out, *result.training][:SHOWN]
@@ -223,7 +223,7 @@ def _scenes(result: Identification, identifier: Identifier, recording: Recording
         problem = by_name[push.name]
         nuisance = nuisance_of(problem, 0.01)
         task = Task(problem=problem, theta=result.theta, nuisance=nuisance, values=0.0 * nuisance.stds)
-        scenes.append(Scene(push=push, motion=simulate(identifier.pool.spec, identifier.thetas, task)))
+        scenes.append(ShownMotion(push=push, motion=simulate(identifier.pool.spec, identifier.thetas, task)))
     return scenes
 
 

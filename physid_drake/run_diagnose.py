@@ -22,7 +22,7 @@ from physid_drake.recording import read_recording
 from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
 from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
 from physid_drake.report.progress import progress_bar
-from physid_drake.report.stage import Scene, Stage
+from physid_drake.report.stage import ShownMotion, Stage
 from physid_drake.resources import shipped
 from physid_drake.run_folder import RunFolder
 
@@ -140,7 +140,7 @@ def staged(diagnosis: Diagnosis, evidence: Evidence, meshcat: Meshcat | None = N
     scenes = []
     for i in range(min(SHOWN, len(case.problems))):
         task = evidence.fitter.task(state, i, own=0.0 * state.own[i])
-        scenes.append(Scene(push=case.recording.pushes[i], motion=simulate(case.pool.spec, case.thetas, task)))
+        scenes.append(ShownMotion(push=case.recording.pushes[i], motion=simulate(case.pool.spec, case.thetas, task)))
     stage.play(scenes)
     stage.show_missing(evidence.wrenches, unit_force=0.1 * case.around.friction * case.around.weight)
     return stage.meshcat

@@ -15,7 +15,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 
 from physid_drake.errors import CellError
-from physid_drake.recording.values import Tip
+from physid_drake.recording.values import TipShape
 from physid_drake.resources import shipped
 
 _LONG = ("cylinder", "capsule")
@@ -58,7 +58,7 @@ def _check_angles(name: str, angles: tuple[float, ...], largest: float, fingers:
 
 
 def hand_model_sdf(
-    tip: Tip,
+    tip: TipShape,
     radius: float,
     length: float | None = None,
     preshape: Preshape | None = None,
@@ -78,8 +78,10 @@ def hand_model_sdf(
         CellError: if the tip is unknown, a size is missing, superfluous or not positive, or a pre-shape is
             given for a tip that has no fingers.
     """
-    if tip not in get_args(Tip):
-        raise CellError(f"hand: tip must be one of {', '.join(get_args(Tip))}, but got {tip!r}; choose one of them.")
+    if tip not in get_args(TipShape):
+        raise CellError(
+            f"hand: tip must be one of {', '.join(get_args(TipShape))}, but got {tip!r}; choose one of them."
+        )
     _check_size(tip, "radius", radius)
     if tip in _LONG:
         _check_size(tip, "length", length)
@@ -111,7 +113,7 @@ def _templates() -> Environment:
 def add_hand_visual(
     plant: MultibodyPlant,
     link: RigidBody,
-    tip: Tip,
+    tip: TipShape,
     radius: float,
     length: float | None = None,
     preshape: Preshape | None = None,

@@ -36,7 +36,7 @@ class Mount:
     mass: float
 
 
-class Push(NamedTuple):
+class TipImpulse(NamedTuple):
     """Impulse of the tip on the object over a tick in W [N s], and its angular one about Bcm [N m s]."""
 
     jx: float
@@ -95,7 +95,7 @@ class SoftTip:
         ey, uy = flow.free(ey, self.velocity[1], velocity[1])
         self.place, self.velocity = [goal[0] - ex, goal[1] - ey], (ux, uy)
 
-    def step(self, touch: Touch, goal: list[float], velocity: Plane, span: float) -> Push | None:
+    def step(self, touch: Touch, goal: list[float], velocity: Plane, span: float) -> TipImpulse | None:
         """Move over a tick beside the object; returns what it gives to the object, if it touches.
 
         Args:
@@ -143,7 +143,7 @@ class SoftTip:
         spin = mx * jy - my * jx
         gain = spin / inertia
         self._last = (span, touch.twist, (jx / body.mass + gain * by, jy / body.mass - gain * bx, gain))
-        return Push(jx, jy, spin) if jn > 0.0 else None
+        return TipImpulse(jx, jy, spin) if jn > 0.0 else None
 
     def _stretch(self, goal: list[float], velocity: Plane, span: float) -> Plane:
         """From the tip to the mount at the start of a tick [m]."""

@@ -20,7 +20,7 @@ from physid_drake.cell.hand_path import HandPath
 from physid_drake.cell.motion import Log, Motion, Outcome, Start
 from physid_drake.cell.plant_state import PlantState
 from physid_drake.cell.setters import Body
-from physid_drake.cell.soft_tip import Mount, Push, SoftTip
+from physid_drake.cell.soft_tip import Mount, SoftTip, TipImpulse
 from physid_drake.cell.touch import HandMove, Planar, Tip, Touch, blow
 
 Array = NDArray[np.float64]
@@ -267,7 +267,7 @@ class Stepper:
 
     # Drake's step.
 
-    def _step_free(self, end: float, begin: float, push: Push | None = None) -> None:
+    def _step_free(self, end: float, begin: float, push: TipImpulse | None = None) -> None:
         """Advance from ``begin`` to ``end`` [s] without Drake's hand; ``push`` is what a sprung tip gives."""
         span, old, force = end - begin, self._state.twist(), (0.0, 0.0, 0.0)
         if push is not None:
@@ -316,7 +316,7 @@ class Stepper:
             raise FloatingPointError("the object left")
         return before, after
 
-    def _take(self, push: Push) -> None:
+    def _take(self, push: TipImpulse) -> None:
         """Give the object a sprung tip's impulse, at the tip's height."""
         yaw = self._state.section(self._height)[0][2]
         self._state.kick(yaw, push.jx, push.jy, push.spin)

@@ -36,7 +36,7 @@ from physid_drake.experiments.learning import (
     plain_task,
     search_trials,
 )
-from physid_drake.experiments.values import Cell, Panel, Record, Result, Table, Tick, mean_and_deviation, series_of
+from physid_drake.experiments.values import Entry, Panel, Record, Result, Table, Tick, mean_and_deviation, series_of
 from physid_drake.identify import ThetaConfig
 from physid_drake.identify.problem import PushProblem
 from physid_drake.identify.rollouts import predict
@@ -181,7 +181,7 @@ class MitPushes:
         """Errors against budget, and all tables beside the published models."""
         main, others = records[: self.folds], records[self.folds :]
         columns = ("model", "trials", "mm", "+- mm", "deg", "+- deg", "median mm", "median deg")
-        rows: list[tuple[Cell, ...]] = []
+        rows: list[tuple[Entry, ...]] = []
         for (unknown, _), method in zip(TRIED, main[0]["methods"], strict=True):
             for count in counts(self.budget):
                 # The best theta stays the best where no more trials were made.

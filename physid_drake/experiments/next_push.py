@@ -15,7 +15,7 @@ import numpy as np
 from physid_drake.experiments.learning import LEAST_SQUARES, Learner
 from physid_drake.experiments.values import (
     Array,
-    Cell,
+    Entry,
     Panel,
     Record,
     Result,
@@ -125,7 +125,7 @@ class NextPush:
         counts = [float(k) for k in range(1, self.pushes + 1)]
         kinds = {"support_friction": "support friction [%]", "hand_friction": "hand friction [%]",
                  "mm": "error of the end [mm]", "deg": "error [deg]"}  # fmt: skip
-        rows: list[tuple[Cell, ...]] = []
+        rows: list[tuple[Entry, ...]] = []
         for name in CHOOSERS:
             for k in range(self.pushes):
                 spreads = [mean_and_deviation([r[name][kind][k] for r in records]) for kind in kinds]

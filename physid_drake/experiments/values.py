@@ -19,7 +19,7 @@ Record = dict[str, Any]
 Tick = Callable[[str, int, int], None]
 """Told a stage, steps done and steps in all."""
 
-Cell = str | float | int | None
+Entry = str | float | int | None
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ class Table:
     name: str
     title: str
     columns: tuple[str, ...]
-    rows: tuple[tuple[Cell, ...], ...]
+    rows: tuple[tuple[Entry, ...], ...]
 
     def __post_init__(self) -> None:
         wrong = next((row for row in self.rows if len(row) != len(self.columns)), None)

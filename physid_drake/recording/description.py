@@ -26,7 +26,7 @@ from physid_drake.recording.values import (
     Sensors,
     Shape,
     Table,
-    Tip,
+    TipShape,
 )
 
 FORMAT: Final = "physid-recording/1"
@@ -237,7 +237,7 @@ def hand_from(top: Section) -> Hand | None:
     # A sphere's or a fingertip's length says nothing; a capsule's and a cylinder's must be there.
     length = section.maybe_number("length_m") if tip in ("cylinder", "capsule") else None
     with section.naming():
-        return Hand(tip=cast(Tip, tip), radius=radius, length=length, stream=cast(HandStream, stream))
+        return Hand(tip=cast(TipShape, tip), radius=radius, length=length, stream=cast(HandStream, stream))
 
 
 def sensors_from(top: Section) -> Sensors:

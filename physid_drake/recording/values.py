@@ -18,7 +18,7 @@ from physid_drake.errors import RecordingError
 from physid_drake.recording.outlines import check_polygon
 
 Array: TypeAlias = npt.NDArray[np.float64]
-Tip = Literal["cylinder", "sphere", "capsule", "reflex_sf"]
+TipShape = Literal["cylinder", "sphere", "capsule", "reflex_sf"]
 HandStream = Literal["measured", "commanded"]
 CylinderAxis = Literal["z", "y"]
 
@@ -320,13 +320,13 @@ class Table:
 class Hand:
     """The hand's tip: its shape, radius and (cylinder, capsule) length in m, and what its stream is."""
 
-    tip: Tip
+    tip: TipShape
     radius: float = REFLEX_SF_TIP_RADIUS
     length: float | None = None
     stream: HandStream = "measured"
 
     def __post_init__(self) -> None:
-        _check_choice("tip", self.tip, get_args(Tip))
+        _check_choice("tip", self.tip, get_args(TipShape))
         _check_choice("stream", self.stream, get_args(HandStream))
         check_positive("radius_m", "m", self.radius)
         check_positive("length_m", "m", self.length)

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from rich.table import Table as RichTable
 
-from physid_drake.experiments.values import Cell, Panel, Result, Table
+from physid_drake.experiments.values import Entry, Panel, Result, Table
 from physid_drake.report.svg import AFTER, BEFORE, CONTACT, FREE, INK, MUTED
 
 COLOURS = (AFTER, BEFORE, CONTACT, FREE, INK)
@@ -113,11 +113,11 @@ def _negative(panel: Panel) -> bool:
     return any(m < 0.0 for s in panel.series for m in s.mean)
 
 
-def _unknown(value: Cell) -> bool:
+def _unknown(value: Entry) -> bool:
     return value is None or (isinstance(value, float) and not math.isfinite(value))
 
 
-def _text(value: Cell) -> str:
+def _text(value: Entry) -> str:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return "-"
     return f"{value:.3g}" if isinstance(value, float) and abs(value) < 100.0 else (

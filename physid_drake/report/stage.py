@@ -49,7 +49,7 @@ _kept: list[Meshcat] = []
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scene:
+class ShownMotion:
     """One push to be shown: what was recorded and what was simulated."""
 
     push: Push
@@ -105,7 +105,7 @@ class Stage:
         self._root.SetTime(0.0)
         self._diagram.ForcedPublish(self._root)
 
-    def play(self, scenes: Sequence[Scene]) -> list[tuple[str, float]]:
+    def play(self, scenes: Sequence[ShownMotion]) -> list[tuple[str, float]]:
         """Record all pushes one after the other as an animation.
 
         Returns:
@@ -124,7 +124,7 @@ class Stage:
         self.meshcat.PublishRecording()
         return marks
 
-    def _play_one(self, scene: Scene, clock: float, speed: float) -> float:
+    def _play_one(self, scene: ShownMotion, clock: float, speed: float) -> float:
         push = scene.push
         span = push.duration + PAUSE
         for k in range(max(2, round(span / speed * FRAMES_PER_SECOND))):
@@ -134,7 +134,7 @@ class Stage:
             self._diagram.ForcedPublish(self._root)
         return clock + span / speed
 
-    def _trace(self, scene: Scene) -> None:
+    def _trace(self, scene: ShownMotion) -> None:
         """Paths on the table: recorded and simulated."""
         name = scene.push.name.replace("/", "_")
         lift = np.array([[0.0], [0.0], [2e-3]])
