@@ -16,6 +16,7 @@ from scipy.special import roots_jacobi
 
 from physid_drake.cell.outline import Disc, Outline, Polygon
 from physid_drake.errors import TippedError
+from physid_drake.recording import polygon_centroid
 
 Array = NDArray[np.float64]
 
@@ -182,7 +183,7 @@ def _fan_points(polygon: Polygon, points: int) -> tuple[Array, Array]:
     order = max(4 if len(vertices) == 3 else 3, round(math.sqrt(points / len(vertices))))
     u, wu = _radial_gauss(order)
     v, wv = _composite_gauss(0.0, 1.0, 1, order)
-    centre = _centroid(vertices)
+    centre = polygon_centroid(vertices)
     places, weights = [], []
     for a, b in zip(vertices, np.roll(vertices, -1, axis=0), strict=True):
         area = 0.5 * abs((a - centre)[0] * (b - centre)[1] - (a - centre)[1] * (b - centre)[0])
@@ -217,7 +218,7 @@ def _cell_points(outline: Outline, grid: FrictionGrid, fewest: int) -> tuple[Arr
 
 def _moment_points(vertices: Array) -> Array:
     """Four points (4, 2) that share a polygon's centroid and second moments, on its principal axes."""
-    centre = _centroid(vertices)
+    centre = polygon_centroid(vertices)
     xx, xy, yy = second_moments(vertices - centre)
     values, axes = np.linalg.eigh(np.array([[xx, xy], [xy, yy]]))
     # A hair inside: in a triangle the points would lie on its edge, where the next friction cell begins.
@@ -267,14 +268,6 @@ def _clipped(vertices: Array, window: tuple[float, float, float, float]) -> Arra
 def _area(vertices: Array) -> float:
     following = np.roll(vertices, -1, axis=0)
     return 0.5 * abs(float((vertices[:, 0] * following[:, 1] - vertices[:, 1] * following[:, 0]).sum()))
-
-
-def _centroid(vertices: Array) -> Array:
-    """Centroid (2,) of a polygon's area, vertices (n, 2) counter-clockwise."""
-    following = np.roll(vertices, -1, axis=0)
-    cross = vertices[:, 0] * following[:, 1] - vertices[:, 1] * following[:, 0]
-    centre: Array = ((vertices + following) * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
-    return centre
 
 
 def rest_depths(support: Support, p_BBcm: Array, mean_depth: float) -> tuple[Array, Array]:

@@ -20,7 +20,7 @@ from physid_drake.prove.mujoco_world import PushWorld
 from physid_drake.prove.shapes import height_of
 from physid_drake.prove.world_plan import HandPath as WorldPath
 from physid_drake.prove.world_plan import Plan
-from physid_drake.recording import Box, Cylinder, Hand, ObjectModel, PoseStream, Push, Recording, Sensors, Table
+from physid_drake.recording import Box, Cylinder, Hand, ObjectModel, Push, Recording, Sensors, Table, planar_poses
 
 Array = NDArray[np.float64]
 Pose = tuple[float, float, float]
@@ -139,18 +139,11 @@ class HiddenRobot:
     def _recorded(self, times: Array, poses: Array, tips: Array) -> Push:
         seen = poses + self._rng.standard_normal(poses.shape) * self._object_std()
         hand = tips + (self._sensors.hand_position_std or 0.0) * self._rng.standard_normal(tips.shape)
-        half, zeros = 0.5 * seen[:, 2], np.zeros(len(seen))
+        flat = np.column_stack([hand, np.zeros(len(hand))])
         return Push(
             name=f"pushes/{self._pushes:03d}.csv", force=None,
-            object=PoseStream(
-                times=times,
-                positions=np.column_stack([seen[:, :2], np.full(len(seen), 0.5 * height_of(self.world.shape))]),
-                quaternions=np.column_stack([np.cos(half), zeros, zeros, np.sin(half)]),
-            ),
-            hand=PoseStream(
-                times=times, positions=np.column_stack([hand, np.full(len(hand), self.world.tip_height)]),
-                quaternions=np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1)),
-            ),
+            object=planar_poses(times, seen, 0.5 * height_of(self.world.shape)),
+            hand=planar_poses(times, flat, self.world.tip_height),
         )  # fmt: skip
 
 

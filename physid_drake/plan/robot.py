@@ -12,7 +12,7 @@ from physid_drake.errors import ConfigError
 from physid_drake.model import Model
 from physid_drake.plan.trajectory import Ending, Situation, hand_height_of, path_of, trajectory_of
 from physid_drake.policies import PlannedPush, hand_samples
-from physid_drake.recording import PoseStream, Push, Sensors
+from physid_drake.recording import PoseStream, Push, Sensors, planar_poses
 
 Array = NDArray[np.float64]
 Pose = tuple[float, float, float]
@@ -94,10 +94,4 @@ class SimulatedRobot:
 
     def _object(self, times: Array, poses: Array) -> PoseStream:
         seen = poses + self._rng.standard_normal(poses.shape) * self._object_std()
-        half, zeros = 0.5 * seen[:, 2], np.zeros(len(seen))
-        height = hand_height_of(self._hidden, Situation(start=self._pose))
-        return PoseStream(
-            times=times,
-            positions=np.column_stack([seen[:, :2], np.full(len(seen), height)]),
-            quaternions=np.column_stack([np.cos(half), zeros, zeros, np.sin(half)]),
-        )
+        return planar_poses(times, seen, hand_height_of(self._hidden, Situation(start=self._pose)))

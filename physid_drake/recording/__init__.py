@@ -1,6 +1,7 @@
 """Recordings: what was measured, how it is read and written, and what it says about its own noise."""
 
 from physid_drake.recording.outlines import outline_distance, polygon_centroid
+from physid_drake.recording.planar import planar_poses
 from physid_drake.recording.reading import read_recording
 from physid_drake.recording.statistics import (
     NoiseEstimate,
@@ -44,6 +45,7 @@ __all__ = [
     "Table",
     "estimate_noise",
     "outline_distance",
+    "planar_poses",
     "polygon_centroid",
     "read_recording",
     "rest_segments",

@@ -15,6 +15,7 @@ from jinja2 import Environment, StrictUndefined
 from physid_drake.diagnose import Evidence
 from physid_drake.diagnose.leaving import predicted
 from physid_drake.diagnose.localise import MissingWrench
+from physid_drake.diagnose.looks import SAID
 from physid_drake.diagnose.values import Diagnosis, EffectFinding, ParameterEstimate, ThetaEstimate
 from physid_drake.recording import Recording
 from physid_drake.report.diagnosis_figures import (
@@ -47,7 +48,6 @@ MEANING = {
     "unexplained": "The mismatch is real, and no effect of the catalogue brings it down to noise.",
     "underpowered": "These pushes are too few, or move too little, to show an effect of ordinary size.",
 }
-PHASES = {"contact": "while it is pushed", "free_slide": "in its free slide"}
 DOFS = {"along_motion": "along the motion", "across_motion": "across the motion", "rotation": "in rotation"}
 MOST_ERRORS, MOST_STRIPS, MOST_RANKED = 4, 8, 8  # shown before the reader asks for more
 
@@ -113,7 +113,7 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "meaning": MEANING.get(diagnosis.verdict, ""),
         "pushes": len(recording.pushes),
         "found": [_finding(e, k, view) for k, e in enumerate(diagnosis.effects)],
-        "phases": [] if diagnosis.location is None else [PHASES.get(p, p) for p in diagnosis.location.phase],
+        "phases": [] if diagnosis.location is None else [SAID.get(p, p) for p in diagnosis.location.phase],
         "dofs": [] if diagnosis.location is None else [DOFS.get(x, x) for x in diagnosis.location.dof],
         "frame": "" if diagnosis.location is None else _frame(diagnosis.location.frame),
         "views": views_from_above(view),

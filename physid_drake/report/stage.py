@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.common.eigen_geometry import Quaternion
 from pydrake.geometry import (
     Box,
     Cylinder,
@@ -241,14 +242,4 @@ def _hand_at(push: Push, time: float) -> RigidTransform | None:
 
 
 def _transform(quaternion: Array, position: Array) -> RigidTransform:
-    w, x, y, z = quaternion / np.linalg.norm(quaternion)
-    R = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    X = np.eye(4)
-    X[:3, :3], X[:3, 3] = R, position
-    return RigidTransform(X)
+    return RigidTransform(Quaternion(quaternion / np.linalg.norm(quaternion)), position)

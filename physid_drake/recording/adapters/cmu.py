@@ -37,8 +37,9 @@ from typing import Final
 import numpy as np
 
 from physid_drake.errors import RecordingError
-from physid_drake.recording.adapters.planar import drawn, planar_poses, source_files, turned
+from physid_drake.recording.adapters.sources import drawn, source_files
 from physid_drake.recording.outlines import outline_distance
+from physid_drake.recording.planar import planar_poses, turned
 from physid_drake.recording.reading import read_recording
 from physid_drake.recording.values import (
     Array,

@@ -25,7 +25,8 @@ from typing import Final
 import numpy as np
 
 from physid_drake.errors import RecordingError
-from physid_drake.recording.adapters.planar import drawn, planar_poses
+from physid_drake.recording.adapters.sources import drawn
+from physid_drake.recording.planar import planar_poses
 from physid_drake.recording.reading import read_recording
 from physid_drake.recording.statistics import estimate_noise
 from physid_drake.recording.values import Array, Box, ObjectModel, PoseStream, Push, Recording, Sensors, Table

@@ -28,8 +28,9 @@ from physid_drake.recording.adapters.mit_shapes import (
     published_object,
 )
 from physid_drake.recording.adapters.mit_streams import read_push
-from physid_drake.recording.adapters.planar import drawn, planar_poses, source_files, turned
+from physid_drake.recording.adapters.sources import drawn, source_files
 from physid_drake.recording.description import read_text
+from physid_drake.recording.planar import planar_poses, turned
 from physid_drake.recording.reading import read_recording
 from physid_drake.recording.values import Hand, HandStream, ObjectModel, Push, Recording, Sensors, Table
 from physid_drake.recording.writing import write_recording

@@ -11,8 +11,8 @@ import numpy as np
 
 from physid_drake.errors import RecordingError
 from physid_drake.recording.adapters.mit_shapes import THICKNESS, TIP_RADIUS, PublishedObject
-from physid_drake.recording.adapters.planar import planar_poses, turned
 from physid_drake.recording.outlines import outline_distance
+from physid_drake.recording.planar import planar_poses, turned
 from physid_drake.recording.screening import describe_rows, gap_warnings
 from physid_drake.recording.values import Array, ForceStream, Push
 

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import numpy.typing as npt
 
-from physid_drake.errors import RecordingError
 from physid_drake.recording.reading import unit_quaternions
 from physid_drake.recording.values import Array, PoseStream
 
@@ -37,31 +34,3 @@ def turned(yaw: npt.ArrayLike, vectors: npt.ArrayLike) -> Array:
     x, y = np.asarray(vectors, dtype=np.float64).T
     angle = np.asarray(yaw, dtype=np.float64)
     return np.column_stack([np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y])
-
-
-def source_files(source: Path, *suffixes: str) -> list[Path]:
-    """The source itself, or the files with these suffixes in the source folder, sorted by name.
-
-    Raises:
-        RecordingError: if there is none.
-    """
-    source = Path(source)
-    if source.is_file():
-        return [source]
-    files = sorted(f for f in source.iterdir() if f.suffix.lower() in suffixes) if source.is_dir() else []
-    if not files:
-        raise RecordingError(f"{source}: no {' or '.join(suffixes)} file here; give one, or the folder with them.")
-    return files
-
-
-def drawn(count: int, limit: int | None, rng: np.random.Generator) -> list[int]:
-    """Indices below ``count`` in order: all, or ``limit`` of them drawn at random.
-
-    Raises:
-        RecordingError: if ``limit`` is below 1.
-    """
-    if limit is None:
-        return list(range(count))
-    if limit < 1:
-        raise RecordingError(f"limit must be at least 1, but got {limit}; leave it out to convert all pushes.")
-    return sorted(int(k) for k in rng.choice(count, size=min(limit, count), replace=False))
