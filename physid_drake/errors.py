@@ -18,11 +18,15 @@ class TippedError(ParameterError):
 
 
 class ConfigError(PhysidError, ValueError):
-    """A configuration cannot be read; the message names the file and the key."""
+    """What was asked for cannot be done: the message names the key of a file, the flag, the model or the goal."""
 
 
 class CellError(PhysidError, ValueError):
     """A cell cannot be built as asked: a mesh that does not load, a shape Drake cannot represent."""
+
+
+class RobotError(PhysidError, RuntimeError):
+    """A robot cannot push: the object is lost, or its world broke down."""
 
 
 class OutputError(PhysidError, OSError):

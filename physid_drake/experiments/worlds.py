@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from physid_drake.cell import Body, CellConfig
 from physid_drake.cell.solid import solid_of
-from physid_drake.errors import ConfigError
+from physid_drake.errors import RobotError
 from physid_drake.model import Model
 from physid_drake.policies import PlannedPush
 from physid_drake.prove.mujoco_world import PushWorld
@@ -98,10 +98,11 @@ class HiddenRobot:
         """Make a push aimed at where the object is seen, and record it until the object rests.
 
         Raises:
-            ConfigError: if the object is lost, or the hand would pass it.
+            RobotError: if the object is lost.
+            ConfigError: if the hand would pass it.
         """
         if self.lost:
-            raise ConfigError("hidden world: the object was lost in the last push; put it back first.")
+            raise RobotError("hidden world: the object was lost in the last push; put it back first.")
         path = push.path(self.see(), solid_of(self.world.shape).outline, self.world.tip_radius)
         factor = max(0.5, 1.0 + self._scatter * float(self._rng.standard_normal()))
         motion = self._simulation.run(

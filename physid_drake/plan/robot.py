@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.errors import ConfigError
+from physid_drake.errors import RobotError
 from physid_drake.model import Model
 from physid_drake.plan.trajectory import Ending, Situation, hand_height_of, path_of, trajectory_of
 from physid_drake.policies import PlannedPush, hand_samples
@@ -62,15 +62,15 @@ class SimulatedRobot:
         """Push, record at 100 Hz until the object has rested for 0.2 s, and leave the object there.
 
         Raises:
-            ConfigError: if the object is lost, or the rollout diverges.
+            RobotError: if the object is lost, or the rollout diverges.
         """
         if self.ending not in (Ending.AT_REST, Ending.MOVING):
-            raise ConfigError(f"robot: the object {self.ending.value} in the last push; put it back first.")
+            raise RobotError(f"robot: the object {self.ending.value} in the last push; put it back first.")
         situation = Situation(start=self._pose, order=self._pushes)
         path = path_of(self._hidden, push, self.see())
         trajectory = trajectory_of(self._hidden, (push,), situation, path=path)
         if trajectory.ending is Ending.DIVERGED:
-            raise ConfigError("robot: the hidden world's rollout diverged.")
+            raise RobotError("robot: the hidden world's rollout diverged.")
         self._pushes += 1
         self.ending = trajectory.ending
         x, y, yaw = trajectory.end.tolist()

@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from physid_drake.errors import ConfigError
+from physid_drake.errors import RobotError
 from physid_drake.experiments.learning import Learner
 from physid_drake.experiments.mit_pushes import PLAYED_SPEED, TICK, played
 from physid_drake.experiments.motion_prediction import MotionPrediction
@@ -69,7 +69,7 @@ def test_an_object_that_left_the_table_must_be_put_back():
     push = PlannedPush(direction=0.0, speed=0.3, travel=0.12)
     robot.execute(push)
     assert robot.lost
-    with pytest.raises(ConfigError, match="put it back"):
+    with pytest.raises(RobotError, match="put it back"):
         robot.execute(push)
     robot.put((0.0, 0.0, 0.0))
     assert not robot.lost

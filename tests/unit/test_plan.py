@@ -13,7 +13,7 @@ from runs import coarse_identifier
 from twin import body_of
 
 from physid_drake.cell import SolverConfig
-from physid_drake.errors import ConfigError
+from physid_drake.errors import ConfigError, RobotError
 from physid_drake.identify import SearchConfig, ThetaConfig
 from physid_drake.plan import DistanceToGoal, Ending, SimulatedRobot, Situation, plan
 from physid_drake.plan.story import outcome_under
@@ -187,5 +187,5 @@ def test_a_robot_whose_object_fell_asks_for_it_back():
     robot = SimulatedRobot(MODEL, start=START, sensors=Sensors(), rng=np.random.default_rng(0))
     robot.execute(PlannedPush(direction=0.0, speed=1.0, travel=0.45))
     assert robot.ending is Ending.FELL
-    with pytest.raises(ConfigError, match="put it back"):
+    with pytest.raises(RobotError, match="put it back"):
         robot.execute(PlannedPush(direction=0.0, speed=0.1, travel=0.1))
