@@ -1,6 +1,7 @@
 """How the cell is simulated. Plain data, so that Drake's ``yaml_load_typed`` reads it; no checks live here."""
 
 import dataclasses as dc
+from typing import Self
 
 
 @dc.dataclass
@@ -49,6 +50,12 @@ class SolverConfig:
     impact_law: bool = True
     drift_feedforward: bool = True
     trapezoid_slide: bool = True
+
+    def scaled(self, factor: float) -> Self:
+        """The same with all ticks ``factor`` times as long."""
+        return dc.replace(
+            self, time_step_s=factor * self.time_step_s, slide_time_step_s=factor * self.slide_time_step_s
+        )
 
 
 @dc.dataclass

@@ -59,7 +59,8 @@ def numerics(case: Case, state: State) -> tuple[Array, ...]:
     fitter = Fitter(case)
     base = fitter.vectors([fitter.task(state, i) for i in range(len(case.problems))])
     columns: list[list[Array]] = [[] for _ in case.problems]
-    for config in (_half_step(case.config), _other_contact(case.config)):
+    half_step = dc.replace(case.config, solver=case.config.solver.scaled(0.5))
+    for config in (half_step, _other_contact(case.config)):
         pool = RolloutPool(spec_of(case.recording, config), case.thetas, jobs=case.pool.jobs)
         other = Fitter(dc.replace(case, pool=pool))
         vectors = other.vectors([other.task(state, i) for i in range(len(case.problems))])
@@ -69,14 +70,6 @@ def numerics(case: Case, state: State) -> tuple[Array, ...]:
     return tuple(np.column_stack(own) for own in columns)
 
 
-def _half_step(config: CellConfig) -> CellConfig:
-    solver = config.solver
-    halved = dc.replace(
-        solver, time_step_s=0.5 * solver.time_step_s, slide_time_step_s=0.5 * solver.slide_time_step_s
-    )  # fmt: skip
-    return dc.replace(config, solver=halved)
-
-
 def _other_contact(config: CellConfig) -> CellConfig:
     other = "point" if config.contact.model == "hydroelastic" else "hydroelastic"
     return dc.replace(config, contact=dc.replace(config.contact, model=other))
@@ -84,11 +77,7 @@ def _other_contact(config: CellConfig) -> CellConfig:
 
 def coarse(case: Case) -> Case:
     """The case on ticks twice as long: good enough for what a small change does, and twice as fast."""
-    solver = case.config.solver
-    doubled = dc.replace(
-        solver, time_step_s=2.0 * solver.time_step_s, slide_time_step_s=2.0 * solver.slide_time_step_s
-    )  # fmt: skip
-    config = dc.replace(case.config, solver=doubled)
+    config = dc.replace(case.config, solver=case.config.solver.scaled(2.0))
     return dc.replace(case, pool=RolloutPool(spec_of(case.recording, config), case.thetas, jobs=case.pool.jobs))
 
 
