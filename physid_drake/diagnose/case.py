@@ -19,7 +19,7 @@ from physid_drake.identify.nuisance import Nuisance, nuisance_of
 from physid_drake.identify.problem import PushProblem, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool
 from physid_drake.identify.theta import ThetaMap, theta_map
-from physid_drake.recording import Recording
+from physid_drake.recording import Recording, thinned
 
 Array = NDArray[np.float64]
 
@@ -106,6 +106,7 @@ def case_of(
     """
     if not recording.pushes:
         raise RecordingError(f"recording '{recording.name}': there is no push to diagnose; record at least three.")
+    recording = thinned(recording)
     noise, sensors = tracker_noise(recording)
     orders = np.unique(
         np.linspace(0, len(recording.pushes) - 1, min(most, len(recording.pushes))).round().astype(int)

@@ -23,7 +23,7 @@ from physid_drake.identify.polish import Polished, Polisher
 from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, cell_error, theta_map
-from physid_drake.recording import Recording
+from physid_drake.recording import Recording, thinned
 from physid_drake.search import SearchResult, search_minimum, search_named
 from physid_drake.space import ParameterSpace
 
@@ -152,8 +152,9 @@ class Identifier:
         """
         solid = solid_of(recording.object.shape)
         self.recording = recording
-        self.noise = noise_of(recording)
-        self.problems = problems_of(recording, self.noise, solid.height)
+        short = thinned(recording)
+        self.noise = noise_of(short)
+        self.problems = problems_of(short, self.noise, solid.height)
         free = theta_map(
             recording.object, solid, (cell.friction_cells[0], cell.friction_cells[1]), theta,
             cell.default_mass_kg,

@@ -22,7 +22,7 @@ from physid_drake.identify.polish import SCATTER_PUSHES, Polished, new_scatter, 
 from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, theta_map
-from physid_drake.recording import Push, Recording
+from physid_drake.recording import Push, Recording, thinned
 from physid_drake.search import SearchResult, search_minimum, search_named
 from physid_drake.space import ParameterSpace
 
@@ -155,10 +155,9 @@ class OnlineIdentifier:
         count = len(belief.foreseen)
         rng = np.random.default_rng([self._seed, count])
         # The noise is what sensors state, or what the first push shows: weights must not change under the terms.
-        noise = belief.noise or noise_of(dc.replace(self._recording, pushes=(push,)))
-        problem = dc.replace(
-            problems_of(dc.replace(self._recording, pushes=(push,)), noise, self._height)[0], order=count
-        )
+        alone = thinned(dc.replace(self._recording, pushes=(push,)))
+        noise = belief.noise or noise_of(alone)
+        problem = dc.replace(problems_of(alone, noise, self._height)[0], order=count)
         expected = self._predicted(problem, [belief.theta])[0]
         found = self._search(belief, problem, noise, rng)
         if found.stop_reason == "interrupted":

@@ -10,6 +10,7 @@ from physid_drake.recording.statistics import (
     rest_segments,
     summarise,
 )
+from physid_drake.recording.thinning import thinned
 from physid_drake.recording.values import (
     Box,
     Cylinder,
@@ -50,5 +51,6 @@ __all__ = [
     "read_recording",
     "rest_segments",
     "summarise",
+    "thinned",
     "write_recording",
 ]

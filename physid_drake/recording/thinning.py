@@ -1,0 +1,71 @@
+"""Long streams made short: what a fit of a second of motion needs of a log of minutes, or of a fast one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from physid_drake.recording.statistics import rest_segments
+from physid_drake.recording.values import Array, ForceStream, PoseStream, Push, Recording
+
+MOST_SAMPLES: Final = 1500
+"""Of a stream in one push. Covariances and candidate knots of a hand's path grow with its square."""
+
+REST: Final = 0.5
+"""Of the rest before and after the motion, in s: that much stays of it where a stream is too long."""
+
+
+def thinned(recording: Recording, most: int = MOST_SAMPLES) -> Recording:
+    """The recording with at most ``most`` samples in each stream of a push; shorter pushes are left as they are.
+
+    Of a longer push the rests at its ends are cut to half a second, and then every k-th sample is kept.
+    """
+    return replace(recording, pushes=tuple(_thinned(push, most) for push in recording.pushes))
+
+
+def _thinned(push: Push, most: int) -> Push:
+    if max(len(stream) for stream in (push.object, push.hand, push.force) if stream is not None) <= most:
+        return push
+    span = _motion(push)
+    return replace(
+        push,
+        object=_poses(push.object, span, most),
+        hand=None if push.hand is None else _poses(push.hand, span, most),
+        force=None if push.force is None else _forces(push.force, span, most),
+    )
+
+
+def _motion(push: Push) -> tuple[float, float]:
+    """From half a second before the object first moves to half a second after it has come to rest [s]."""
+    times, rests = push.object.times, rest_segments(push)
+    begin, end = push.start_time, push.end_time
+    if not rests or rests[0].stop - rests[0].start == len(times):
+        return begin, end
+    if rests[0].start == 0:
+        begin = float(times[rests[0].stop - 1]) - REST
+    if rests[-1].stop == len(times):
+        end = float(times[rests[-1].start]) + REST
+    return begin, end
+
+
+def _poses(stream: PoseStream, span: tuple[float, float], most: int) -> PoseStream:
+    rows = _rows(stream.times, span, most)
+    return PoseStream(
+        times=stream.times[rows], positions=stream.positions[rows], quaternions=stream.quaternions[rows]
+    )
+
+
+def _forces(stream: ForceStream, span: tuple[float, float], most: int) -> ForceStream:
+    rows = _rows(stream.times, span, most)
+    return ForceStream(times=stream.times[rows], forces=stream.forces[rows])
+
+
+def _rows(times: Array, span: tuple[float, float], most: int) -> npt.NDArray[np.intp]:
+    """Indices of the samples to keep of a stream with times (n,) [s]."""
+    rows = np.flatnonzero((times >= span[0]) & (times <= span[1]))
+    if len(rows) < 2:  # a hand that was recorded at other times only
+        rows = np.arange(len(times))
+    return rows[:: -(-len(rows) // most)]
