@@ -53,6 +53,8 @@ CHANCE = 0.05  # of all looks: what explains no more is not worth a word
 FEWEST_PUSHES = 3
 GOOD_PART = 0.25  # of the squared error: less is not worth a word
 NO_WORSE = 1.1  # times the plain model's error of pushes left out: a model with more of it is none
+QUIET = 5e-5  # m: a tracker's noise that is no longer what hides the cell's own error
+OWN_POSITION, OWN_ROTATION = 2e-4, 2e-3  # m, rad: of left-out pushes, what the cell itself may be off by
 PART = "takes a part away, and leaves more than noise"
 VISIBLE = 10.0  # standard deviations of motion: pushes that would not show such an effect show nothing
 
@@ -60,9 +62,7 @@ VISIBLE = 10.0  # standard deviations of motion: pushes that would not show such
 def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
     """The verdict and all figures, from evidence; no rollouts."""
     case, plain, final = evidence.case, evidence.plain, evidence.final
-    p_value = evidence.detected
-    if p_value is None:
-        p_value = mismatch(plain, evidence.screening if evidence.steps else None)
+    p_value = _p_value(evidence)
     detectable = smallest(evidence, alpha)
     verdict = _verdict(evidence, p_value, alpha, detectable)
     findings = _findings(evidence) if verdict in ("explained", "ambiguous") else ()
@@ -96,6 +96,19 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
         warnings=case.noise.warnings,
         rollouts=case.pool.count,
     )
+
+
+def _p_value(evidence: Evidence) -> float:
+    """Of "the plain cell explains these pushes".
+
+    A simulation without noise shows how two honest simulators differ: all of that has structure, and is no physics.
+    """
+    before = _errors(evidence.case, evidence.errors_before)
+    if evidence.case.noise.position < QUIET and before.position < OWN_POSITION and before.rotation < OWN_ROTATION:
+        return 1.0
+    if evidence.detected is not None:
+        return evidence.detected
+    return mismatch(evidence.plain, evidence.screening if evidence.steps else None)
 
 
 def _verdict(evidence: Evidence, p_value: float, alpha: float, detectable: Sequence[Detectable]) -> str:

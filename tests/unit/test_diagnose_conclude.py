@@ -113,3 +113,16 @@ def test_what_the_model_has_beside_an_effect_is_no_rival_of_it(monkeypatch):
     monkeypatch.setattr(conclude, "out_of_question", lambda best, other: False)
     three, two = (conclude._probability(e.steps[0], conclude._others(e, 0)) for e in (alone, both))
     assert three < two < 1.0
+
+
+@pytest.mark.parametrize(
+    ("noise", "times", "want"),
+    [(1e-5, 0.05, 1.0), (1e-5, 0.3, 1e-9), (1e-4, 0.05, 1e-9)],
+    ids=["as near as simulators are", "further off", "noise that hides it"],
+)
+def test_what_a_simulation_without_noise_differs_by_is_no_physics(monkeypatch, noise, times, want):
+    monkeypatch.setattr(conclude, "mismatch", lambda plain, screening: 1e-9)
+    clean = evidence()
+    clean.case.noise = SimpleNamespace(position=noise)
+    clean.errors_before, clean.detected = errors(times), None  # times 1 mm and 10 mrad
+    assert conclude._p_value(clean) == want
