@@ -40,6 +40,10 @@ _SHAPES: dict[str, type[Box] | type[Cylinder] | type[Prism] | type[MeshShape]] =
 }  # fmt: skip
 
 
+Axes = tuple[tuple[float, float], tuple[float, float]]
+AS_W: Axes = ((1.0, 0.0), (0.0, 1.0))
+
+
 @dc.dataclass(frozen=True, kw_only=True)
 class Correlation:
     """How estimates vary together: that of their normal scores, the parameter of a Gaussian copula.
@@ -102,6 +106,7 @@ class Model:
         effects: physics beyond the plain cell.
         intervals: 90 % intervals as they were found, by ``theta.<name>`` and ``<effect>.<parameter>``.
         correlation: of what has an interval of two numbers; None where it is not known.
+        hand_axes: (2, 2) the axes of P, as columns, along x and y of W, if all pushes had about the same.
     """
 
     recording: str
@@ -113,6 +118,7 @@ class Model:
     effects: tuple[Effect, ...] = ()
     intervals: dict[str, Any] = dc.field(default_factory=dict)
     correlation: Correlation | None = None
+    hand_axes: Axes = AS_W
 
     def build(self) -> ModelCell:
         """The Drake cell with theta in its Context and the effects at their seams."""
@@ -139,6 +145,8 @@ class Model:
         }  # fmt: skip
         if self.correlation is not None:
             content["correlation"] = _plain(dc.asdict(self.correlation))
+        if self.hand_axes != AS_W:
+            content["hand_axes"] = _plain(self.hand_axes)
         return str(yaml.safe_dump(content, sort_keys=False))
 
 
@@ -190,6 +198,7 @@ class ModelCell:
         end: float,
         hand_height: float | None = None,
         order: int = 0,
+        hand_axes: Array | None = None,
     ) -> Motion:
         """Simulate a push with the model's theta and effects; arguments as in ``Cell.rollout``.
 
@@ -200,8 +209,12 @@ class ModelCell:
             end: end time [s].
             hand_height: of the tip's contact above the table [m].
             order: number of the push, for physics that changes from push to push.
+            hand_axes: (2, 2) the axes of P, as columns, along x and y of W; None takes the model's.
         """
-        push = Rollout(start=start, path=path, begin=begin, end=end, hand_height=hand_height, order=order)
+        axes = np.array(self.model.hand_axes) if hand_axes is None else hand_axes
+        push = Rollout(
+            start=start, path=path, begin=begin, end=end, hand_height=hand_height, order=order, hand_axes=axes
+        )
         return roll(lambda _: self.cell, Geometry(shape=self.model.shape), self.model.body, push, self.model.effects)
 
     def tracked(self, motion: Motion, times: Array) -> Array:
@@ -252,6 +265,7 @@ def _model(content: dict[str, Any], file: Path) -> Model:
         effects=tuple(_load_effect(e) for e in content["effects"]),
         intervals=content.get("intervals", {}),
         correlation=_load_correlation(content),
+        hand_axes=_tuples(content.get("hand_axes", _plain(AS_W))),
     )
 
 

@@ -104,8 +104,9 @@ def fresh_errors(diagnosis: Path, held: Path) -> np.ndarray:
 
 def _end_error(cell: ModelCell, problem: PushProblem) -> tuple[float, float]:
     motion = cell.rollout(
-        start=problem.start, path=problem.path, begin=problem.begin, end=problem.end, hand_height=problem.hand_height
-    )
+        start=problem.start, path=problem.path, begin=problem.begin, end=problem.end,
+        hand_height=problem.hand_height, hand_axes=problem.hand_axes,
+    )  # fmt: skip
     dx, dy, turn = (cell.tracked(motion, problem.times[-1:])[0] - problem.poses[-1]).tolist()
     return math.hypot(dx, dy), (turn + math.pi) % (2.0 * math.pi) - math.pi
 

@@ -103,12 +103,18 @@ def _p_value(evidence: Evidence) -> float:
 
     A simulation without noise shows how two honest simulators differ: all of that has structure, and is no physics.
     """
-    before = _errors(evidence.case, evidence.errors_before)
-    if evidence.case.noise.position < QUIET and before.position < OWN_POSITION and before.rotation < OWN_ROTATION:
+    if _is_own_error(evidence):
         return 1.0
     if evidence.detected is not None:
         return evidence.detected
     return mismatch(evidence.plain, evidence.screening if evidence.steps else None)
+
+
+def _is_own_error(evidence: Evidence) -> bool:
+    """Whether there is hardly any noise, and the plain cell predicts pushes to its own error."""
+    before = _errors(evidence.case, evidence.errors_before)
+    near = before.position < OWN_POSITION and before.rotation < OWN_ROTATION
+    return evidence.case.noise.position < QUIET and near
 
 
 def _verdict(evidence: Evidence, p_value: float, alpha: float, detectable: Sequence[Detectable]) -> str:
@@ -296,6 +302,8 @@ def _why_fitted_in_vain(candidate: Candidate, named: set[str], evidence: Evidenc
         return "its fit ran to nothing"
     if not candidate.accepted:
         return "pushes that were left out do not confirm it"
+    if _is_own_error(evidence):
+        return "smaller than the cell's own error"
     if named or not _predicts(evidence):
         return "predicts pushes that were left out worse"
     return "pushes that were left out confirm it, but it leaves more than noise"
@@ -310,6 +318,8 @@ def _why_not_fitted(name: str, evidence: Evidence) -> str:
 
 
 def _left(evidence: Evidence, verdict: str, after: Fitted, partly: Partly | None) -> str:
+    if _is_own_error(evidence):
+        return "no more than what two simulators differ by"
     named = verdict in ("explained", "ambiguous")
     hidden = verdict == "unexplained" or (named and scatter_p_value(after) < TOO_SCATTERED)
     if after.reduced_chi2 <= EXPLAINED and hidden:

@@ -9,9 +9,11 @@ from physid_drake.diagnose.estimates import correlation_of
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import Diagnosis
-from physid_drake.model import Correlation, Model
+from physid_drake.model import Axes, Correlation, Model
 
 Array = NDArray[np.float64]
+
+SAME = 0.9  # determinant of the mean of frames: they lie within about 25 degrees of each other
 
 
 def fit_that_leaves(diagnosis: Diagnosis, evidence: Evidence) -> Fitted:
@@ -46,4 +48,12 @@ def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
         effects=tuple(e.effect(case) for e in state.effects) if diagnosis.effects else (),
         intervals=intervals,
         correlation=Correlation.of([names[k] for k in kept], matrix[np.ix_(kept, kept)]),
+        hand_axes=_common_axes(np.array([p.hand_axes for p in case.problems])),
     )
+
+
+def _common_axes(axes: Array) -> Axes:
+    """The mean of pushes' axes (n, 2, 2) of P; those of W where they differ so much that it is no frame."""
+    mean = axes.mean(axis=0)
+    (a, b), (c, d) = (mean if abs(np.linalg.det(mean)) > SAME else np.eye(2)).tolist()
+    return (a, b), (c, d)

@@ -65,7 +65,7 @@ class _Seen:
 
 
 NOWHERE = Location(
-    statement="where the pushes end; of their way too little was recorded to say more", phase=(), dof=(),
+    statement="at the pushes' ends; of their way too little was recorded to say more", phase=(), dof=(),
     frame="none", windows=(),
 )  # fmt: skip
 

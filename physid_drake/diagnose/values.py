@@ -201,7 +201,8 @@ class Diagnosis:
         recording: its name.
         verdict: ``consistent``, ``explained``, ``ambiguous``, ``unexplained`` or ``underpowered``.
         sentence: the verdict for a person.
-        p_value: of the plain cell: that noise and scatter alone would leave as much.
+        p_value: of the plain cell: that noise and scatter alone would leave as much; 1 where there is hardly any
+            noise, and no more is left than the cell's own error.
         alpha: false-alarm rate that was asked for.
         effects: that were found, in the order in which they were; empty unless explained or ambiguous.
         location: of the mismatch; None where there is none.

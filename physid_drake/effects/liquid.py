@@ -106,7 +106,8 @@ class _SloshLaw:
             self._place, self._velocity = complex(*state.p_WBcm), complex(*state.v_WBcm)
         elif state.time > self._time:
             self._advance(state, state.time - self._time)
-        if (state.time, state.span) != (self._time, self._span):
+        moved = (complex(*state.v_WBcm), state.yaw_rate) != (self._anchor, self._spin)  # a strike in between
+        if moved or (state.time, state.span) != (self._time, self._span):
             self._time, self._span = state.time, state.span
             self._look_ahead(state)
         return self._wrench

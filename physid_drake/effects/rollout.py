@@ -101,9 +101,9 @@ def _true_start(effects: Sequence[Effect], start: Start) -> Start:
             pose = effect.true_pose(pose)
         return np.array(pose)
 
-    pose = true_pose(0.0)
-    if np.array_equal(pose, start.pose):
+    if all(type(effect).true_pose is Effect.true_pose for effect in effects):
         return start
+    pose = true_pose(0.0)
     velocity = (true_pose(SHORT) - true_pose(-SHORT)) / (2.0 * SHORT) if any(start.velocity) else np.zeros(3)
     (x, y, yaw), (vx, vy, spin) = pose.tolist(), velocity.tolist()
     return dc.replace(start, pose=(x, y, yaw), velocity=(vx, vy, spin))

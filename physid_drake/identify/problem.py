@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import CellConfig, HandPath, Start
 from physid_drake.cell.hand_fit import fit_hand_paths, stream_std
 from physid_drake.errors import RecordingError
+from physid_drake.recording import Box as BoxShape
 from physid_drake.recording import Cylinder as CylinderShape
 from physid_drake.recording import (
     Hand,
@@ -33,6 +34,10 @@ DEFAULT_ROTATION_STD = 5e-3  # rad
 DEFAULT_HAND_STD = 1e-4  # m
 DEFAULT_FORCE_STD = 0.05  # N
 LARGEST_CORRELATION = 0.98
+STANDING = 0.3  # area that the x and y axes of the tip span in the plane: less, and the tip lies
+MOVED = 5e-3  # m: more than a tracker's noise
+LONGEST_SLIDE = 1.5  # s: after it a released object rests
+BLINK = 0.1  # s: a hand that is away from the object for so long is not
 UPRIGHT = 0.87  # cosine of 30 degrees: an object that leans more does not stand on its face
 GRIP = 0.5  # of a round tip's radius: so far beyond the object's edge it still touches it nearly as wide as it is
 # A simulation without noise, or a tracker that is quiet at rest: below these the cell's own error is what differs.
@@ -216,12 +221,17 @@ def _problem(
 
 
 def _check_upright(recording: Recording, push: Push) -> None:
-    """Refuses an object that lies on another face than the recording says; a lying cylinder may be turned."""
+    """Refuses an object that lies on another face than the recording says.
+
+    A lying cylinder may be turned; a box or a cylinder upside down is the same object.
+    """
     shape = recording.object.shape
     if isinstance(shape, CylinderShape) and shape.axis == "y":
         return
     _, x, y, _ = push.object.quaternions[0]
-    cosine = abs(1.0 - 2.0 * float(x * x + y * y))
+    cosine = 1.0 - 2.0 * float(x * x + y * y)
+    if isinstance(shape, BoxShape | CylinderShape):
+        cosine = abs(cosine)
     if cosine < UPRIGHT:
         lean = np.degrees(np.arccos(cosine))
         raise RecordingError(
@@ -264,28 +274,51 @@ def _triple(values: Array) -> tuple[float, float, float]:
 
 
 def _beside(recording: Recording, push: Push, height: float) -> PoseStream | None:
-    """The hand's stream from where it has come down beside the object to where it lifts off: the longest run of it.
+    """The hand's stream from where it has come down beside the object to where it lifts off.
+
+    All of it where the object moves at other times, too: then heights tell nothing.
 
     Raises:
-        RecordingError: if it is never there.
+        RecordingError: if the hand passes above or below the object.
     """
     tip, hand = recording.hand, push.hand
     if tip is None or hand is None:
         return None
     z, reach = hand.positions[:, 2], _vertical_reach(tip)
     beside = (z - max(reach, GRIP * tip.radius) < height) & (z + reach > 0.0)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], beside, [False]])))
-    if not len(edges):
+    if beside.all():
+        return hand
+    kept = _longest_run(beside, hand.times)
+    if kept is not None and _rests_outside(push, hand.times[kept]):
+        return PoseStream(times=hand.times[kept], positions=hand.positions[kept], quaternions=hand.quaternions[kept])
+    if beside.mean() < 0.5:
         raise RecordingError(
             f"push '{push.name}': the hand at z = {np.median(z):.3f} m passes the object, which is {height:.3f} m"
             " high; correct hand_z_m or the object's size."
         )
-    longest = int(np.argmax(edges[1::2] - edges[::2]))
-    first, last = int(edges[2 * longest]), int(edges[2 * longest + 1])
-    if last - first < 2 or last - first == len(hand):
-        return hand
-    kept = slice(first, last)
-    return PoseStream(times=hand.times[kept], positions=hand.positions[kept], quaternions=hand.quaternions[kept])
+    return hand
+
+
+def _longest_run(flags: NDArray[np.bool_], times: Array) -> slice | None:
+    """The longest run of True, over gaps shorter than ``BLINK``; None if it is a single sample."""
+    where = np.flatnonzero(flags)
+    if not len(where):
+        return None
+    parted = (np.diff(where) > 1) & (np.diff(times[where]) > BLINK)
+    runs = np.split(where, np.flatnonzero(parted) + 1)
+    longest = max(runs, key=len)
+    return slice(int(longest[0]), int(longest[-1]) + 1) if len(longest) > 1 else None
+
+
+def _rests_outside(push: Push, times: Array) -> bool:
+    """Whether the object moves only while the hand is beside it at times (n,) [s], and slides to rest after that."""
+    places, seen = push.object.positions[:, :2], push.object.times
+
+    def moves(when: NDArray[np.bool_]) -> bool:
+        return bool(when.any()) and float(np.linalg.norm(np.ptp(places[when], axis=0))) > MOVED
+
+    pushed = moves(seen <= times[-1] + BLINK) or not moves(np.ones(len(seen), dtype=bool))
+    return pushed and not moves(seen <= times[0]) and not moves(seen >= times[-1] + LONGEST_SLIDE)
 
 
 def _contact_height(recording: Recording, hand: PoseStream | None, height: float) -> float:
@@ -300,12 +333,13 @@ def _contact_height(recording: Recording, hand: PoseStream | None, height: float
 
 
 def _plane_axes(quaternions: Array) -> Array:
-    """Mean (2, 2) of the upper left part of the rotation matrices of quaternions (n, 4)."""
+    """Axes of P (2, 2), as columns, along x and y of W: the mean over quaternions (n, 4)."""
     w, x, y, z = quaternions.T
     along_x = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z)]
     along_y = [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z)]
     axes: Array = np.array([along_x, along_y]).mean(axis=2)
-    return axes
+    # A tool that lies has an axis without a direction in the plane: its offset is said along W.
+    return axes if abs(np.linalg.det(axes)) > STANDING else np.eye(2)
 
 
 def _vertical_reach(hand: Hand) -> float:

@@ -150,7 +150,7 @@ def _roll(model: Model, push: PlannedPush, path: HandPath, situation: Situation)
     spec = CellSpec(shape=model.shape, hand_radius=model.hand_radius, config=config, table=model.table)
     rollout = Rollout(
         start=Start(pose=situation.start), path=path, begin=0.0, end=float(path.times[-1]) + HORIZON,
-        hand_height=situation.hand_height, order=situation.order,
+        hand_height=situation.hand_height, order=situation.order, hand_axes=np.array(model.hand_axes),
     )  # fmt: skip
     return roll(lambda g: cell_of(spec, g), Geometry(shape=model.shape), model.body, rollout, model.effects)
 

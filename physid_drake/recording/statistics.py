@@ -4,22 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 
+from physid_drake.recording.rests import SHORTEST_REST, TO_STD, rests_of
 from physid_drake.recording.screening import find_gaps
 from physid_drake.recording.values import Array, PoseStream, Push, Recording
-
-REST_SPEED: Final = 5e-4
-"""Below this speed in m/s, smoothed over a quarter of a second, a body is taken to be at rest."""
-
-REST_TURN_RATE: Final = 0.01
-"""The same for its yaw, in rad/s."""
-
-REST_WINDOW: Final = 0.25
-SHORTEST_REST: Final = 10
-_TO_STD: Final = 1.4826
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +88,7 @@ def summarise(push: Push) -> PushSummary:
 
 def rest_segments(push: Push) -> list[slice]:
     """Slices of the object's samples in which it does not move, each of at least ten samples."""
-    return _rests(push.object)
+    return rests_of(push.object)
 
 
 def estimate_noise(recording: Recording) -> NoiseEstimate:
@@ -114,7 +104,7 @@ def _noise_of(pushes: Sequence[Push]) -> NoiseEstimate:
     hand = [
         column - np.median(column)
         for stream in hands
-        for rest in _rests(stream)
+        for rest in rests_of(stream)
         for column in stream.positions[rest, :2].T
     ]
     return NoiseEstimate(
@@ -142,48 +132,6 @@ def _quiet_forces(push: Push) -> list[Array]:
     return [column - np.median(column) for column in forces.T]
 
 
-def _rests(stream: PoseStream) -> list[slice]:
-    if len(stream) < 2 * SHORTEST_REST:
-        return []
-    planar = stream.planar
-    interval = float(np.median(np.diff(stream.times)))
-    half = min(max(3, round(0.5 * REST_WINDOW / interval)), len(stream) // 3)
-    still = np.ones(len(stream) - 2 * half + 1, dtype=np.bool_)
-    averages = np.apply_along_axis(lambda c: np.convolve(c, np.full(half, 1.0 / half), "valid"), 0, planar)
-    centres = np.convolve(stream.times, np.full(half, 1.0 / half), "valid")
-    spans = centres[half:] - centres[:-half]
-    changes = np.abs(averages[half:] - averages[:-half])
-    for columns, limit in (([0, 1], REST_SPEED), ([2], REST_TURN_RATE)):
-        # Second differences see the noise and not the motion.
-        bends = np.abs(np.diff(planar[:, columns], n=2, axis=0))
-        noise = _TO_STD * float(np.median(bends)) / np.sqrt(6.0)
-        allowed = limit * spans + 4.0 * noise * np.sqrt(2.0 / half)
-        still &= (changes[:, columns] <= allowed[:, None]).all(axis=1)
-    return _runs(still, half, len(stream))
-
-
-def _runs(still: np.ndarray[tuple[int], np.dtype[np.bool_]], half: int, count: int) -> list[slice]:
-    """Slices whose windows are all still; a window that starts at k covers samples k to k + 2 half - 1."""
-    # Motion fills every window that touches it; an unrest that is over sooner is correlated noise.
-    for first, beyond in _edges(~still):
-        if beyond - first < half and first > 0 and beyond < len(still):
-            still[first:beyond] = True
-    found: list[slice] = []
-    for first, beyond in _edges(still):
-        # Only the middle of a still window is surely still, unless the stream begins or ends there.
-        start = 0 if first == 0 else first + half
-        stop = count if beyond == len(still) else beyond - 1 + half
-        if stop - start >= SHORTEST_REST:
-            found.append(slice(start, stop))
-    return found
-
-
-def _edges(flags: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[tuple[int, int]]:
-    """First and one past the last index of every run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8))).tolist()
-    return list(zip(edges[::2], edges[1::2], strict=True))
-
-
 def _largest_speed(stream: PoseStream) -> float | None:
     if len(stream) < 2:
         return None
@@ -198,7 +146,7 @@ def _largest_speed(stream: PoseStream) -> float | None:
 def _robust_std(residuals: Sequence[Array]) -> float | None:
     if not residuals:
         return None
-    return float(_TO_STD * np.median(np.abs(np.concatenate(residuals))))
+    return float(TO_STD * np.median(np.abs(np.concatenate(residuals))))
 
 
 def _autocorrelation(residuals: Sequence[Array]) -> float | None:

@@ -8,20 +8,20 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from physid_drake.recording.statistics import rest_segments
+from physid_drake.recording.rests import rests_of
 from physid_drake.recording.values import Array, ForceStream, PoseStream, Push, Recording
 
-MOST_SAMPLES: Final = 1500
+MOST_SAMPLES: Final = 2000
 """Of a stream in one push. Covariances and candidate knots of a hand's path grow with its square."""
 
-REST: Final = 0.5
+REST: Final = 1.0
 """Of the rest before and after the motion, in s: that much stays of it where a stream is too long."""
 
 
 def thinned(recording: Recording, most: int = MOST_SAMPLES) -> Recording:
     """The recording with at most ``most`` samples in each stream of a push; shorter pushes are left as they are.
 
-    Of a longer push the rests at its ends are cut to half a second, and then every k-th sample is kept.
+    Of a longer push the rests at its ends are cut to a second, and then every k-th sample is kept.
     """
     return replace(recording, pushes=tuple(_thinned(push, most) for push in recording.pushes))
 
@@ -32,15 +32,19 @@ def _thinned(push: Push, most: int) -> Push:
     span = _motion(push)
     return replace(
         push,
-        object=_poses(push.object, span, most),
+        object=push.object if push.endpoint_only else _poses(push.object, span, most),
         hand=None if push.hand is None else _poses(push.hand, span, most),
         force=None if push.force is None else _forces(push.force, span, most),
     )
 
 
 def _motion(push: Push) -> tuple[float, float]:
-    """From half a second before the object first moves to half a second after it has come to rest [s]."""
-    times, rests = push.object.times, rest_segments(push)
+    """From a second before the object first moves to a second after it has come to rest [s].
+
+    The hand's motion is what counts where only the object's ends are known.
+    """
+    stream = push.hand if push.endpoint_only and push.hand is not None else push.object
+    times, rests = stream.times, rests_of(stream)
     begin, end = push.start_time, push.end_time
     if not rests or rests[0].stop - rests[0].start == len(times):
         return begin, end
@@ -65,7 +69,9 @@ def _forces(stream: ForceStream, span: tuple[float, float], most: int) -> ForceS
 
 def _rows(times: Array, span: tuple[float, float], most: int) -> npt.NDArray[np.intp]:
     """Indices of the samples to keep of a stream with times (n,) [s]."""
-    rows = np.flatnonzero((times >= span[0]) & (times <= span[1]))
-    if len(rows) < 2:  # a hand that was recorded at other times only
-        rows = np.arange(len(times))
-    return rows[:: -(-len(rows) // most)]
+    # One sample on either side, where there is one: a stream of few samples moves between them.
+    first = max(0, int(np.searchsorted(times, span[0], side="right")) - 1)
+    last = min(len(times), int(np.searchsorted(times, span[1])) + 1)
+    if last - first < 2:  # a hand that was recorded at other times only
+        first, last = 0, len(times)
+    return np.arange(first, last, -(-(last - first) // most))

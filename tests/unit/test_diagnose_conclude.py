@@ -32,7 +32,8 @@ def evidence(*, steps=(), rejected=(), final=None, after=10.0):
     plain = model_that_leaves(100.0)
     screening = SimpleNamespace(scores=(SimpleNamespace(kind=SimpleNamespace(name="viscous_drag")),))
     return SimpleNamespace(
-        case=SimpleNamespace(features=[features()] * PUSHES), plain=plain, nearest=plain, screening=screening,
+        case=SimpleNamespace(features=[features()] * PUSHES, noise=SimpleNamespace(position=3e-4)),
+        plain=plain, nearest=plain, screening=screening,
         remaining=SimpleNamespace(scores=()), steps=steps, rejected=rejected, final=final or plain,
         errors_before=errors(10.0), errors_after=errors(after),
     )  # fmt: skip

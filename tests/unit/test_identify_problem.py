@@ -146,6 +146,38 @@ def test_a_hand_that_lifts_off_and_goes_back_above_the_object_pushes_as_if_it_ha
     assert np.array_equal(lifted.path.positions(times), plain.path.positions(times))
 
 
+def lifted(push, when):
+    """The push with its hand 0.2 m higher where ``when`` of its times (n,) [s] says."""
+    up = np.where(when(push.hand.times - push.hand.times[0]), 0.2, 0.0)
+    return replace(push, hand=replace(push.hand, positions=push.hand.positions + np.outer(up, [0, 0, 1])))
+
+
+def test_a_hand_whose_height_is_wrong_for_a_moment_is_where_it_is(recording):
+    blinking = with_pushes(recording, lambda p: lifted(p, lambda t: (t > 0.25) & (t < 0.28)))
+    plain, seen = first(recording), first(blinking)
+    assert np.array_equal(plain.path.positions(plain.times), seen.path.positions(plain.times))
+
+
+def test_a_hand_that_pushes_twice_is_taken_whole(recording):
+    twice = with_pushes(recording, lambda p: lifted(p, lambda t: (t > 0.35) & (t < 0.5)))
+    plain, seen = first(recording), first(twice)
+    assert np.array_equal(plain.path.positions(plain.times), seen.path.positions(plain.times))
+
+
+@pytest.mark.parametrize("low", [0.005, 0.04], ids=["one sample", "some samples"])
+def test_a_hand_that_is_beside_the_object_before_the_push_only_is_refused(recording, low):
+    with pytest.raises(RecordingError, match="passes the object"):
+        first(with_pushes(recording, lambda p: lifted(p, lambda t: t > low)))
+
+
+def test_a_tip_that_lies_has_the_axes_of_the_world(recording):
+    def lay(push):
+        q = np.tile([np.cos(np.pi / 4), 0.0, np.sin(np.pi / 4), 0.0], (len(push.hand), 1))
+        return replace(push, hand=replace(push.hand, quaternions=q))
+
+    assert np.array_equal(first(with_pushes(recording, lay)).hand_axes, np.eye(2))
+
+
 def test_the_axes_of_the_tip_are_those_of_its_quaternions(recording):
     assert np.array_equal(first(recording).hand_axes, np.eye(2))
 

@@ -79,6 +79,24 @@ def test_noise_at_rest_is_recovered(correlation):
     assert noise.force_std == pytest.approx(0.05, rel=0.1)
 
 
+@pytest.mark.parametrize(("std", "rate"), [(2e-4, 25), (2e-4, 100), (5e-4, 100), (5e-4, 500)])
+@pytest.mark.parametrize("speed", [1e-3, 4e-3])
+def test_a_slow_push_is_no_rest(speed, std, rate):
+    rng, still, way = np.random.default_rng(1), 1.0, 0.06
+    times = np.arange(0.0, 2 * still + way / speed, 1.0 / rate)
+    moved = speed * np.clip(times - still, 0.0, way / speed)
+    x, y, yaw = (share * moved + s * rng.standard_normal(len(times)) for share, s in
+                 ((1.0, std), (0.1, std), (0.5, 10 * std)))  # fmt: skip
+    hand = planar_stream(times, moved - 0.05, 0.0 * moved, 0.0 * moved)
+    push = Push(name="slow", object=planar_stream(times, x, y, yaw), hand=hand, force=None)
+    rests = rest_segments(push)
+    assert rests[0].start == 0 and rests[-1].stop == len(times)
+    for rest, begin, end in ((rests[0], 0.0, still), (rests[-1], still + way / speed, times[-1])):
+        assert times[rest.start] > begin - 0.4 and times[rest.stop - 1] < end + 0.4
+    # Measured: 0.86 to 1.18; 45 to 115 where such motion counts as rest.
+    assert estimate_noise(recording_of(push)).object_position_std == pytest.approx(std, rel=0.25)
+
+
 def test_a_push_without_rest_has_no_noise():
     times = np.arange(200) / RATE
     push = Push(name="a", object=planar_stream(times, 0.1 * times, 0 * times, 0 * times), hand=None, force=None)

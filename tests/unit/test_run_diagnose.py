@@ -7,13 +7,15 @@ import pytest
 import yaml
 
 from physid_drake import load_model
-from physid_drake.cell import Body, CellConfig
+from physid_drake.cell import Body, CellConfig, Start
+from physid_drake.cell.hand_path import straight_path
 from physid_drake.cli import main
 from physid_drake.diagnose.memory import Memory
 from physid_drake.effects.body import UnevenSupport
 from physid_drake.effects.drag import ViscousDrag
+from physid_drake.effects.hand import HandOffset
 from physid_drake.errors import ConfigError
-from physid_drake.model import Correlation, Model
+from physid_drake.model import AS_W, Correlation, Model
 from physid_drake.recording import Prism
 
 DRAG = "viscous_drag.coefficient"
@@ -68,6 +70,22 @@ def test_a_model_survives_its_file(model, tmp_path):
     assert loaded.intervals == model.intervals and loaded.body.support_friction[0] == 0.3
     assert loaded.build().diagram.HasSubsystemNamed("plant")
     assert loaded.plain().effects == ()
+
+
+def test_a_tip_that_was_turned_stays_turned(model, tmp_path):
+    assert "hand_axes" not in model.dump()
+    down = ((0.0, 1.0), (1.0, 0.0))  # pointing down: P's x along y of W
+    offset = replace(model, effects=(HandOffset(x=0.01),), hand_axes=down)
+    (tmp_path / "model.yaml").write_text(offset.dump(), encoding="utf-8")
+    loaded = load_model(tmp_path)
+    assert loaded.hand_axes == down
+    path = straight_path(np.array([-0.1, 0.0]), np.array([0.0, 0.0]), 0.0, 0.3)
+    push = {"start": Start(pose=(0.0, 0.0, 0.0)), "path": path, "begin": 0.0, "end": 0.5}
+    turned = loaded.build().rollout(**push).poses[-1]
+    aside = replace(offset, effects=(HandOffset(y=0.01),), hand_axes=AS_W).build().rollout(**push).poses[-1]
+    assert np.array_equal(turned, aside)
+    told = loaded.build().rollout(**push, hand_axes=np.eye(2)).poses[-1]
+    assert not np.allclose(told, turned, atol=1e-3)
 
 
 def test_how_estimates_vary_together_survives_the_file_and_may_be_absent(model, tmp_path):

@@ -1,0 +1,137 @@
+"""Where a tracked body does not move: what the noise and the start pose are read from."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from physid_drake.recording.values import Array, PoseStream
+
+Flags = npt.NDArray[np.bool_]
+
+REST_SPEED: Final = 5e-4
+"""Below this speed in m/s, smoothed over a quarter of a second, a body is taken to be at rest."""
+
+REST_TURN_RATE: Final = 0.01
+"""The same for its yaw, in rad/s."""
+
+REST_WINDOW: Final = 0.25
+SHORTEST_REST: Final = 10
+TO_STD: Final = 1.4826
+"""From the median of absolute deviations to the standard deviation of a normal distribution."""
+
+CREEP: Final = 6.0
+"""A line through a rest may rise by so many deviations of what scatters about it; slow noise does by three."""
+
+LONG: Final = 0.5
+"""In s: of a shorter rest, slow noise and creeping cannot be told apart."""
+
+GROWTH: Final = 1.3
+"""From one length to the next at which a rest is asked whether it still is one."""
+
+_LIMITS: Final = np.array([REST_SPEED, REST_SPEED, REST_TURN_RATE])
+
+
+def rests_of(stream: PoseStream) -> list[slice]:
+    """Slices of a stream in which the body does not move, each of at least ten samples.
+
+    Windows of a quarter of a second find motion that rises above the noise within them. What is slower than that, a
+    push at some millimetres per second, shows over a longer time: a rest that creeps is cut to the part before the
+    creeping begins, or after it has ended.
+    """
+    if len(stream) < 2 * SHORTEST_REST:
+        return []
+    planar = stream.planar
+    found: list[slice] = []
+    for rest in _still(stream.times, planar):
+        found += _without_creep(stream.times, planar, rest)
+    return found
+
+
+def _still(times: Array, planar: Array) -> list[slice]:
+    """Slices whose windows show no motion."""
+    interval = float(np.median(np.diff(times)))
+    half = min(max(3, round(0.5 * REST_WINDOW / interval)), len(times) // 3)
+    still = np.ones(len(times) - 2 * half + 1, dtype=np.bool_)
+    averages = np.apply_along_axis(lambda c: np.convolve(c, np.full(half, 1.0 / half), "valid"), 0, planar)
+    centres = np.convolve(times, np.full(half, 1.0 / half), "valid")
+    spans = centres[half:] - centres[:-half]
+    changes = np.abs(averages[half:] - averages[:-half])
+    for columns, limit in (([0, 1], REST_SPEED), ([2], REST_TURN_RATE)):
+        # Second differences see the noise and not the motion.
+        bends = np.abs(np.diff(planar[:, columns], n=2, axis=0))
+        noise = TO_STD * float(np.median(bends)) / np.sqrt(6.0)
+        allowed = limit * spans + 4.0 * noise * np.sqrt(2.0 / half)
+        still &= (changes[:, columns] <= allowed[:, None]).all(axis=1)
+    return _runs(still, half, len(times))
+
+
+def _runs(still: Flags, half: int, count: int) -> list[slice]:
+    """Slices whose windows are all still; a window that starts at k covers samples k to k + 2 half - 1."""
+    # Motion fills every window that touches it; an unrest that is over sooner is correlated noise.
+    for first, beyond in _edges(~still):
+        if beyond - first < half and first > 0 and beyond < len(still):
+            still[first:beyond] = True
+    found: list[slice] = []
+    for first, beyond in _edges(still):
+        # Only the middle of a still window is surely still, unless the stream begins or ends there.
+        start = 0 if first == 0 else first + half
+        stop = count if beyond == len(still) else beyond - 1 + half
+        if stop - start >= SHORTEST_REST:
+            found.append(slice(start, stop))
+    return found
+
+
+def _edges(flags: Flags) -> list[tuple[int, int]]:
+    """First and one past the last index of every run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def _without_creep(times: Array, planar: Array, rest: slice) -> list[slice]:
+    """A rest as it is; or what of it is one at the ends of the stream; nothing of one in between."""
+    t, p = times[rest], planar[rest]
+    if not _creeps(t, p):
+        return [rest]
+    found = []
+    if rest.start == 0 and (kept := _before_creep(t, p)) is not None:
+        found.append(slice(0, kept))
+    if rest.stop == len(times) and (kept := _before_creep(-t[::-1], p[::-1])) is not None:
+        found.append(slice(rest.stop - kept, rest.stop))
+    return found
+
+
+def _creeps(times: Array, planar: Array) -> bool:
+    """Whether a line through poses (n, 3) rises by more than rest and slow noise allow."""
+    span = float(times[-1] - times[0])
+    if span < LONG:
+        return False
+    design = np.column_stack([np.ones(len(times)), (times - times[0]) / span])
+    (_, rise), *_ = np.linalg.lstsq(design, planar, rcond=None)
+    scatter = (planar - design @ np.linalg.lstsq(design, planar, rcond=None)[0]).std(axis=0)
+    return bool((np.abs(rise) > CREEP * scatter + _LIMITS * span).any())
+
+
+def _before_creep(times: Array, planar: Array) -> int | None:
+    """How many samples of a rest that creeps at last are before that; None if too few."""
+    count = SHORTEST_REST
+    while count < len(times) and not _creeps(times[:count], planar[:count]):
+        count = min(len(times), max(count + 1, int(GROWTH * count)))
+    corner = _corner(times[:count], planar[:count])
+    return corner if corner >= SHORTEST_REST else None
+
+
+def _corner(times: Array, planar: Array) -> int:
+    """Index at which poses (n, 3) begin to move: of the constants that turn into lines, the one that fits best."""
+    noise = TO_STD * np.median(np.abs(np.diff(planar, n=2, axis=0)), axis=0) / np.sqrt(6.0)
+    scaled = planar / np.maximum(noise, 1e-3 * _LIMITS)
+    best, least = 0, np.inf
+    for k in range(0, len(times) - 2, max(1, len(times) // 60)):
+        design = np.column_stack([np.ones(len(times)), np.maximum(times - times[k], 0.0)])
+        solution, *_ = np.linalg.lstsq(design, scaled, rcond=None)
+        misfit = float(((scaled - design @ solution) ** 2).sum())
+        if misfit < least:
+            best, least = k, misfit
+    return best
