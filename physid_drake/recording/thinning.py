@@ -12,29 +12,29 @@ from physid_drake.recording.rests import rests_of
 from physid_drake.recording.values import Array, ForceStream, PoseStream, Push, Recording
 
 MOST_SAMPLES: Final = 2000
-"""Of a stream in one push. Covariances and candidate knots of a hand's path grow with its square."""
+"""Of poses in one push. Covariances and candidate knots of a hand's path grow with its square."""
 
 REST: Final = 1.0
 """Of the rest before and after the motion, in s: that much stays of it where a stream is too long."""
 
 
 def thinned(recording: Recording, most: int = MOST_SAMPLES) -> Recording:
-    """The recording with at most ``most`` samples in each stream of a push; shorter pushes are left as they are.
+    """The recording with at most ``most`` poses of object and hand in a push; shorter pushes are left as they are.
 
-    Of a longer push the rests at its ends are cut to a second, and then every k-th sample is kept.
+    Of a longer push the rests at its ends are cut to a second, and then every k-th pose is kept.
     """
     return replace(recording, pushes=tuple(_thinned(push, most) for push in recording.pushes))
 
 
 def _thinned(push: Push, most: int) -> Push:
-    if max(len(stream) for stream in (push.object, push.hand, push.force) if stream is not None) <= most:
+    if max(len(stream) for stream in (push.object, push.hand) if stream is not None) <= most:
         return push
     span = _motion(push)
     return replace(
         push,
         object=push.object if push.endpoint_only else _poses(push.object, span, most),
         hand=None if push.hand is None else _poses(push.hand, span, most),
-        force=None if push.force is None else _forces(push.force, span, most),
+        force=None if push.force is None else _forces(push.force, span),
     )
 
 
@@ -62,8 +62,9 @@ def _poses(stream: PoseStream, span: tuple[float, float], most: int) -> PoseStre
     )
 
 
-def _forces(stream: ForceStream, span: tuple[float, float], most: int) -> ForceStream:
-    rows = _rows(stream.times, span, most)
+def _forces(stream: ForceStream, span: tuple[float, float]) -> ForceStream:
+    """All samples of the span: they are compared as means, which more of them make surer."""
+    rows = _rows(stream.times, span, len(stream))
     return ForceStream(times=stream.times[rows], forces=stream.forces[rows])
 
 
