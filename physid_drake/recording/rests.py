@@ -109,9 +109,9 @@ def _creeps(times: Array, planar: Array) -> bool:
     if span < LONG:
         return False
     design = np.column_stack([np.ones(len(times)), (times - times[0]) / span])
-    (_, rise), *_ = np.linalg.lstsq(design, planar, rcond=None)
-    scatter = (planar - design @ np.linalg.lstsq(design, planar, rcond=None)[0]).std(axis=0)
-    return bool((np.abs(rise) > CREEP * scatter + _LIMITS * span).any())
+    line, *_ = np.linalg.lstsq(design, planar, rcond=None)
+    scatter = (planar - design @ line).std(axis=0)
+    return bool((np.abs(line[1]) > CREEP * scatter + _LIMITS * span).any())
 
 
 def _before_creep(times: Array, planar: Array) -> int | None:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from physid_drake.errors import RecordingError
+from physid_drake.recording.checks import check_choice, check_not_negative, check_positive, check_times, frozen
 from physid_drake.recording.outlines import check_polygon
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -32,62 +33,6 @@ DEFAULT_MASS_STD_SHARE: Final = 0.01
 """A mass given without a standard deviation is known to this share of itself."""
 
 
-def _frozen(value: npt.ArrayLike, name: str, columns: int | None) -> Array:
-    array = np.array(value, dtype=np.float64)
-    wanted = 1 if columns is None else 2
-    if array.ndim != wanted or (columns is not None and array.shape[1] != columns):
-        shape = "(n,)" if columns is None else f"(n, {columns})"
-        raise RecordingError(f"{name} must have shape {shape}, but got {array.shape}; reshape it.")
-    if not np.isfinite(array).all():
-        row = int(np.argwhere(~np.isfinite(array))[0][0])
-        raise RecordingError(f"{name} must be finite, but row {row} is {array[row]}; leave that row out.")
-    array.setflags(write=False)
-    return array
-
-
-def _check_times(times: Array) -> None:
-    if len(times) == 0:
-        raise RecordingError("a stream needs at least one sample, but got none; leave the stream out.")
-    late = np.flatnonzero(np.diff(times) <= 0.0)
-    if len(late):
-        k = int(late[0]) + 1
-        raise RecordingError(
-            f"times must increase, but times[{k}] = {float(times[k])!r} s follows {float(times[k - 1])!r} s; "
-            "sort the samples and drop repeated times."
-        )
-
-
-def check_positive(name: str, unit: str, *values: float | None) -> None:
-    """Refuses a length, mass or rate that is not a positive, finite number.
-
-    Args:
-        name: what the values are, for the message.
-        unit: their unit, for the message.
-        values: the numbers; None is passed over.
-
-    Raises:
-        RecordingError: if one of them is not positive and finite.
-    """
-    for value in values:
-        if value is not None and not (np.isfinite(value) and value > 0.0):
-            raise RecordingError(f"{name} must be positive, but got {value!r} {unit}; correct it.")
-
-
-def check_not_negative(name: str, unit: str, value: float | None) -> None:
-    """Refuses a standard deviation that is negative or not finite; 0 is an exact one.
-
-    Raises:
-        RecordingError: if it is.
-    """
-    if value is not None and not (np.isfinite(value) and value >= 0.0):
-        raise RecordingError(f"{name} must not be negative, but got {value!r} {unit}; correct it.")
-
-
-def _check_choice(name: str, got: str, choices: tuple[str, ...]) -> None:
-    if got not in choices:
-        raise RecordingError(f"{name} must be one of {', '.join(choices)}, but got {got!r}; choose one of them.")
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PoseStream:
     """Poses of one body in W against time.
@@ -103,10 +48,10 @@ class PoseStream:
     quaternions: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "times", _frozen(self.times, "times", None))
-        object.__setattr__(self, "positions", _frozen(self.positions, "positions", 3))
-        object.__setattr__(self, "quaternions", _frozen(self.quaternions, "quaternions", 4))
-        _check_times(self.times)
+        object.__setattr__(self, "times", frozen(self.times, "times", None))
+        object.__setattr__(self, "positions", frozen(self.positions, "positions", 3))
+        object.__setattr__(self, "quaternions", frozen(self.quaternions, "quaternions", 4))
+        check_times(self.times)
         if not len(self.times) == len(self.positions) == len(self.quaternions):
             lengths = f"{len(self.times)}, {len(self.positions)} and {len(self.quaternions)}"
             raise RecordingError(f"times, positions and quaternions must be equally long, but got {lengths} rows.")
@@ -156,9 +101,9 @@ class ForceStream:
     forces: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "times", _frozen(self.times, "times", None))
-        object.__setattr__(self, "forces", _frozen(self.forces, "forces", 3))
-        _check_times(self.times)
+        object.__setattr__(self, "times", frozen(self.times, "times", None))
+        object.__setattr__(self, "forces", frozen(self.forces, "forces", 3))
+        check_times(self.times)
         if len(self.times) != len(self.forces):
             raise RecordingError(
                 f"times and forces must be equally long, but got {len(self.times)} and {len(self.forces)} rows."
@@ -254,7 +199,7 @@ class Cylinder:
     def __post_init__(self) -> None:
         check_positive("radius_m", "m", self.radius)
         check_positive("length_m", "m", self.length)
-        _check_choice("axis", self.axis, get_args(CylinderAxis))
+        check_choice("axis", self.axis, get_args(CylinderAxis))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -326,8 +271,8 @@ class Hand:
     stream: HandStream = "measured"
 
     def __post_init__(self) -> None:
-        _check_choice("tip", self.tip, get_args(TipShape))
-        _check_choice("stream", self.stream, get_args(HandStream))
+        check_choice("tip", self.tip, get_args(TipShape))
+        check_choice("stream", self.stream, get_args(HandStream))
         check_positive("radius_m", "m", self.radius)
         check_positive("length_m", "m", self.length)
         long = self.tip in ("cylinder", "capsule")

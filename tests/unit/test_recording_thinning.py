@@ -78,9 +78,10 @@ def test_a_slow_push_keeps_its_motion_its_noise_and_its_start(recording, speed, 
     short = thinned(long)
     (kept,) = short.pushes
     assert len(kept.object) <= 2000 < len(push.object)
-    assert kept.start_time == pytest.approx(still - 1.0, abs=0.3)
-    assert kept.end_time == pytest.approx(times[-1] - still + 1.0, abs=0.3)
-    assert estimate_noise(short).object_position_std == pytest.approx(2e-4, rel=0.3)
+    assert kept.start_time == pytest.approx(still - 1.0, abs=0.15)
+    assert kept.end_time == pytest.approx(times[-1] - still + 1.0, abs=0.15)
+    # Measured: 0.84 (of 68 samples) to 1.09 times it, and ends 0.06 s off.
+    assert estimate_noise(short).object_position_std == pytest.approx(2e-4, rel=0.2)
     assert kept.object.planar[rest_segments(kept)[0]].mean(axis=0)[0] == pytest.approx(0.0, abs=1e-4)
 
 
