@@ -1,0 +1,72 @@
+"""How often a diagnosis is right, in one proof or several together: diagnose.py [PROOF ...] [--worlds 20] [--seed 1].
+
+PROOF is a folder of ``prove`` in which worlds have been diagnosed. Without one, ``prove`` makes and diagnoses as many
+worlds as are asked for (``pip install '.[proof]'``; minutes for each), and goes on where it stopped.
+"""
+
+import argparse
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from physid_drake.errors import PhysidError
+from physid_drake.prove.figures import figures_of, power_table, table
+from physid_drake.prove.score import read_outcomes
+from physid_drake.prove.seal import SEALED, check_seal, read_seal
+from physid_drake.report.proof import MAIN, POWER, said_of, truth_of
+
+FAULTS = ("world", "truth", "sigma", "said")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("proofs", type=Path, nargs="*", metavar="PROOF")
+    parser.add_argument("--worlds", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    try:
+        folders = given.proofs or [made(given.worlds, given.seed)]
+        outcomes = [outcome for folder in folders for outcome in opened(folder)]
+    except PhysidError as error:
+        parser.error(str(error))
+    twice = [name for name, times in Counter(o.id for o in outcomes).items() if times > 1]
+    if twice:
+        parser.error(f"world {twice[0]} is in two of the folders: it would count twice.")
+    if not outcomes:
+        parser.error("none of the worlds has been diagnosed yet.")
+    figures = figures_of(outcomes)
+    faults = sorted((o for o in outcomes if o.fault is not None), key=lambda o: -o.size)
+    rows = [(o.id, truth_of(o), f"{o.size:.1f}", said_of(o)) for o in faults]
+    console = Console(width=140)
+    console.print(shown(f"{len(outcomes)} worlds of {len(folders)} proofs", MAIN, table(figures)))
+    console.print(shown("single effects by size", POWER, power_table(figures)))
+    console.print(shown("answers that are not right", FAULTS, rows))
+
+
+def made(worlds, seed):
+    """The folder of a proof that has been made and diagnosed."""
+    folder = Path("proofs") / f"seed_{seed}"
+    words = ["prove", "--worlds", str(worlds), "--seed", str(seed), "--out", str(folder)]
+    subprocess.run([sys.executable, "-m", "physid_drake", *words], check=True)
+    return folder
+
+
+def opened(folder):
+    """The outcomes of the worlds that have been diagnosed, if the seal holds."""
+    check_seal(folder, [file.stem for file in (folder / SEALED).glob("*.json")], read_seal(folder))
+    return read_outcomes(folder / SEALED, folder / "diagnoses")
+
+
+def shown(title, headings, rows):
+    made = Table(*headings, title=title, title_justify="left")
+    for row in rows:
+        made.add_row(*row)
+    return made
+
+
+if __name__ == "__main__":
+    main()
