@@ -6,6 +6,8 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from scipy import stats
+from scipy.linalg import toeplitz
 
 from physid_drake.recording.values import Array, PoseStream
 
@@ -28,6 +30,12 @@ CREEP: Final = 6.0
 LONG: Final = 0.5
 """In s: of a shorter rest, slow noise and creeping cannot be told apart."""
 
+BEND: Final = 0.02
+"""In s: the noise's memory is read from second differences over so long. Motion bends little within it."""
+
+QUIET_SHARE: Final = 0.35
+"""Of the second differences are surely without motion. As much of normal noise is within 0.454 deviations."""
+
 GROWTH: Final = 1.3
 """From one length to the next at which a rest is asked whether it still is one."""
 
@@ -39,18 +47,28 @@ def rests_of(stream: PoseStream) -> list[slice]:
 
     Windows of a quarter of a second find motion that rises above the noise within them. What is slower than that, a
     push at some millimetres per second, shows over a longer time: a rest that creeps is cut to the part before the
-    creeping begins, or after it has ended.
+    creeping begins, or after it has ended. Noise that is slow itself looks like motion within a window: a stream that
+    does not seem to rest at both of its ends is looked at again, with as much of it as its bends show.
     """
-    if len(stream) < 2 * SHORTEST_REST:
+    count = len(stream)
+    if count < 2 * SHORTEST_REST:
         return []
-    planar = stream.planar
+    found = _rests(stream.times, stream.planar, slow=False)
+    if found and found[0].start == 0 and found[-1].stop == count:
+        return found
+    again = _rests(stream.times, stream.planar, slow=True)
+    return max((found, again), key=lambda rests: sum(rest.stop - rest.start for rest in rests))
+
+
+def _rests(times: Array, planar: Array, *, slow: bool) -> list[slice]:
+    """Slices in which nothing moves or creeps, the noise taken as white, or as slow as it seems."""
     found: list[slice] = []
-    for rest in _still(stream.times, planar):
-        found += _without_creep(stream.times, planar, rest)
+    for rest in _still(times, planar, slow=slow):
+        found += _without_creep(times, planar, rest)
     return found
 
 
-def _still(times: Array, planar: Array) -> list[slice]:
+def _still(times: Array, planar: Array, *, slow: bool) -> list[slice]:
     """Slices whose windows show no motion."""
     interval = float(np.median(np.diff(times)))
     half = min(max(3, round(0.5 * REST_WINDOW / interval)), len(times) // 3)
@@ -60,12 +78,41 @@ def _still(times: Array, planar: Array) -> list[slice]:
     spans = centres[half:] - centres[:-half]
     changes = np.abs(averages[half:] - averages[:-half])
     for columns, limit in (([0, 1], REST_SPEED), ([2], REST_TURN_RATE)):
-        # Second differences see the noise and not the motion.
-        bends = np.abs(np.diff(planar[:, columns], n=2, axis=0))
-        noise = TO_STD * float(np.median(bends)) / np.sqrt(6.0)
-        allowed = limit * spans + 4.0 * noise * np.sqrt(2.0 / half)
+        noise = _slow_noise if slow else _white_noise
+        allowed = limit * spans + 4.0 * noise(planar[:, columns], half, interval)
         still &= (changes[:, columns] <= allowed[:, None]).all(axis=1)
     return _runs(still, half, len(times))
+
+
+def _white_noise(values: Array, half: int, interval: float) -> float:
+    """Standard deviation of a change between the means of two windows, if the noise of values (n, k) is white."""
+    # Second differences see the noise and not the motion.
+    bends = np.abs(np.diff(values, n=2, axis=0))
+    return float(TO_STD * np.median(bends) / np.sqrt(6.0) * np.sqrt(2.0 / half))
+
+
+def _slow_noise(values: Array, half: int, interval: float) -> float:
+    """The same if it is an autoregressive process of first order, whose memory second differences at two lags tell.
+
+    At lag L they have the variance 2 (1 - r) (3 - r), with r the correlation over L samples, times that of the noise.
+    """
+    lag = min(max(2, round(BEND / interval)), (len(values) - 1) // 4)
+    near, far = (
+        np.quantile(np.abs(values[2 * k :] - 2.0 * values[k:-k] + values[: -2 * k]), QUIET_SHARE) for k in (1, lag)
+    )
+    if near == 0.0:
+        return _white_noise(values, half, interval)
+    correlations = np.linspace(0.0, 0.98, 99)
+
+    def variance(r: Array) -> Array:
+        return 2.0 * (1.0 - r) * (3.0 - r)
+
+    ratios = variance(correlations**lag) / variance(correlations)
+    best = int(np.argmin(np.abs(ratios - (far / near) ** 2)))
+    sigma = near / stats.norm.ppf(0.5 + 0.5 * QUIET_SHARE) / np.sqrt(variance(correlations[best]))
+    weights = np.repeat([-1.0, 1.0], half) / half
+    spread = weights @ toeplitz(correlations[best] ** np.arange(2 * half)) @ weights
+    return float(sigma * np.sqrt(spread))
 
 
 def _runs(still: Flags, half: int, count: int) -> list[slice]:

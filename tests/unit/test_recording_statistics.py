@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from physid_drake.recording import (
     Box,
@@ -28,17 +29,20 @@ def planar_stream(times, x, y, yaw):
     )
 
 
+def autoregressive(rng, count, correlation):
+    """Noise (count,) of unit variance and first order."""
+    white = rng.standard_normal(count) * np.sqrt(1.0 - correlation**2)
+    white[0] = rng.standard_normal()
+    return lfilter([1.0], [1.0, -correlation], white)
+
+
 def rest_move_rest(rng, position_std, rotation_std, correlation=0.0):
     """2 s at rest, 1 s at 0.1 m/s, 2 s at rest."""
     times = np.arange(500) / RATE
     x = 0.1 * np.clip(times - 2.0, 0.0, 1.0)
 
     def noise(std):
-        white = rng.standard_normal(500) * std * np.sqrt(1 - correlation**2)
-        out = np.zeros(500)
-        for k in range(500):
-            out[k] = correlation * out[k - 1] + white[k]
-        return out
+        return std * autoregressive(rng, 500, correlation)
 
     motion = planar_stream(times, x + noise(position_std), noise(position_std), 0.5 * x / 0.1 + noise(rotation_std))
     hand = planar_stream(times, x - 0.05, 0 * x, 0 * x)
@@ -96,6 +100,27 @@ def test_a_slow_push_is_no_rest(speed, std, rate):
         assert times[rest.start] > begin - 0.4 and times[rest.stop - 1] < end + 0.4
     # Measured: 0.91 to 1.05 times it; 45 to 115 where such motion counts as rest.
     assert estimate_noise(recording_of(push)).object_position_std == pytest.approx(std, rel=0.15)
+
+
+@pytest.mark.parametrize(("rate", "memory"), [(100, 0.03), (200, 0.02), (200, 0.044), (500, 0.03)])
+def test_short_rests_are_seen_under_slow_noise(rate, memory):
+    """0.35 s at rest, struck to 0.4 m/s, at rest again for as long: noise that wanders in a window is no motion."""
+    rng, std, still, deceleration = np.random.default_rng(4), 3e-4, 0.35, 3.0
+    slid = 0.4 / deceleration
+    times = np.arange(0.0, 2 * still + slid, 1.0 / rate)
+    since = np.clip(times - still, 0.0, slid)
+    moved = 0.4 * since - 0.5 * deceleration * since**2
+    correlation, found, starts, ends = np.exp(-1.0 / (rate * memory)), [], 0, 0
+    for _ in range(40):
+        x, y, yaw = (share * moved + s * autoregressive(rng, len(times), correlation) for share, s in
+                     ((1.0, std), (0.1, std), (0.5, 10 * std)))  # fmt: skip
+        rests = rest_segments(Push(name="a", object=planar_stream(times, x, y, yaw), hand=None, force=None))
+        found += [float(np.ptp(moved[rest])) for rest in rests]
+        starts += bool(rests) and rests[0].start == 0
+        ends += bool(rests) and rests[-1].stop == len(times)
+    # Measured: 35 to 40, and no motion in them; 1 to 21 where noise is taken for white.
+    assert min(starts, ends) >= 33
+    assert max(found) < 0.1 * std
 
 
 def test_a_push_without_rest_has_no_noise():
