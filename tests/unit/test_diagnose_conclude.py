@@ -103,6 +103,13 @@ def test_a_model_that_predicts_left_out_pushes_worse_explains_nothing(monkeypatc
         assert conclude._left(worse, "explained", hidden, None).startswith(said)
 
 
+@pytest.mark.parametrize(("odd", "predicts"), [(1, True), (2, False)])
+def test_one_push_that_goes_another_way_does_not_speak_against_a_model(odd, predicts):
+    told = evidence(steps=((tried("magnet", 50.0, model_that_leaves(1.0)),),), after=1.0)
+    told.errors_after = errors(100.0)[:odd] + told.errors_after[odd:]
+    assert conclude._predicts(told) is predicts
+
+
 def test_what_the_model_has_beside_an_effect_is_no_rival_of_it(monkeypatch):
     gains = {"size_error": 50.0, "stribeck_friction": 49.0, "viscous_drag": 49.0}
     size, stribeck, drag = (tried(name, gain, model_that_leaves(1.0)) for name, gain in gains.items())
