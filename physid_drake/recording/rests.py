@@ -78,13 +78,14 @@ def _still(times: Array, planar: Array, *, slow: bool) -> list[slice]:
     spans = centres[half:] - centres[:-half]
     changes = np.abs(averages[half:] - averages[:-half])
     for columns, limit in (([0, 1], REST_SPEED), ([2], REST_TURN_RATE)):
-        noise = _slow_noise if slow else _white_noise
-        allowed = limit * spans + 4.0 * noise(planar[:, columns], half, interval)
+        values = planar[:, columns]
+        noise = _slow_noise(values, half, interval) if slow else _white_noise(values, half)
+        allowed = limit * spans + 4.0 * noise
         still &= (changes[:, columns] <= allowed[:, None]).all(axis=1)
     return _runs(still, half, len(times))
 
 
-def _white_noise(values: Array, half: int, interval: float) -> float:
+def _white_noise(values: Array, half: int) -> float:
     """Standard deviation of a change between the means of two windows, if the noise of values (n, k) is white."""
     # Second differences see the noise and not the motion.
     bends = np.abs(np.diff(values, n=2, axis=0))
@@ -101,7 +102,7 @@ def _slow_noise(values: Array, half: int, interval: float) -> float:
         np.quantile(np.abs(values[2 * k :] - 2.0 * values[k:-k] + values[: -2 * k]), QUIET_SHARE) for k in (1, lag)
     )
     if near == 0.0:
-        return _white_noise(values, half, interval)
+        return _white_noise(values, half)
     correlations = np.linspace(0.0, 0.98, 99)
 
     def variance(r: Array) -> Array:
