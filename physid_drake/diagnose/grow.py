@@ -18,7 +18,7 @@ from physid_drake.diagnose.confirm import (
     rejudged,
     worthwhile,
 )
-from physid_drake.diagnose.evidence import mismatch
+from physid_drake.diagnose.evidence import mismatch, unexplained
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.pairs import confirmed_pairs, steps_of
@@ -250,11 +250,12 @@ class Growth:
 def worth_adding(base: Fitted, last: Fitted, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     """The candidates, the one to add first: the simplest of the best, or the best; none where neither will do.
 
-    What is a hundredth of what the effects before it explain may be no more than the error of their laws.
+    What is a hundredth of what the effects before it explain may be no more than the error of their laws, unless they
+    leave more than such an error.
     """
     if not candidates:
         return ()
-    least = A_LAW * float((push_scores(last) - push_scores(base)).sum())
+    least = 0.0 if unexplained(base, last) else A_LAW * float((push_scores(last) - push_scores(base)).sum())
     best = max((c for c in candidates if not c.degenerate), key=lambda c: c.gain, default=candidates[0])
     for one in (candidates[0], best):
         if worthwhile(last, one) and one.gain > least:

@@ -60,6 +60,7 @@ def tried(name, gains, *, coordinates=1, chi2=1.0, degenerate=False):
 @pytest.fixture
 def before(monkeypatch):
     monkeypatch.setattr(grow, "push_scores", lambda one: one.scores)
+    monkeypatch.setattr(grow, "unexplained", lambda base, last: last.reduced_chi2 > 2.0)
     return SimpleNamespace(reduced_chi2=6.0, scores=np.zeros(8))
 
 
@@ -76,9 +77,12 @@ def test_nothing_is_added_that_pushes_do_not_confirm(before):
     assert grow.worth_adding(before, before, ()) == ()
 
 
-@pytest.mark.parametrize(("explained", "added"), [(7000.0, True), (9000.0, False)])
-def test_what_the_law_of_a_large_effect_may_be_wrong_by_is_no_second_one(before, explained, added):
+@pytest.mark.parametrize(
+    ("explained", "left", "added"), [(7000.0, 1.6, True), (9000.0, 1.6, False), (9000.0, 6.0, True)]
+)
+def test_what_the_law_of_a_large_effect_may_be_wrong_by_is_no_second_one(before, explained, left, added):
     base = SimpleNamespace(reduced_chi2=60.0, scores=np.full(8, -explained / 8.0))
+    before.reduced_chi2 = left
     small = tried("magnet", [10.0] * 8)
     assert bool(grow.worth_adding(base, before, (small,))) == added
 
