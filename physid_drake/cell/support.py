@@ -107,7 +107,7 @@ def support_of(
             places, weights = _cell_points(outline, cut, math.ceil(math.sqrt(points) / 2))
         case Disc(radius=radius):
             rings = max(3 if height > SLENDER * radius else 2, math.ceil(math.sqrt(points) / 3))
-            places, weights = _star_points(lambda _: radius, rings, 8 if points <= 64 else 16)
+            places, weights = _disc_points(radius, rings, points)
         case Polygon(vertices=vertices) if len(vertices) <= FEW_CORNERS:
             places, weights = _fan_points(outline, points)
         case Polygon():
@@ -174,23 +174,37 @@ def _star_points(reach: Callable[[float], float], radii: int, angles: int) -> tu
     return (r[:, None, None] * ring).reshape(-1, 2), np.outer(wr, area / area.sum()).ravel()
 
 
-def _fan_points(polygon: Polygon, points: int) -> tuple[Array, Array]:
-    """A Gauss rule on each triangle of the fan about the centroid, by collapsing the square (Duffy).
+def _disc_points(radius: float, rings: int, points: int) -> tuple[Array, Array]:
+    """Gauss in r with weight r, times equal angles: points about as dense everywhere, and the same mirrored.
 
-    Source: M. G. Duffy, Quadrature over a pyramid or cube of integrands with a singularity at a vertex, 1982.
+    Where slip turns about a point under the disc, that does better than as many points on each ring.
+    """
+    r, wr = _radial_gauss(rings)
+    counts = [2 * max(2, round(0.5 * points * share)) for share in (r / r.sum()).tolist()]
+    places, weights = [], []
+    for k, count in enumerate(counts):
+        phi = 2.0 * math.pi * (np.arange(count) + 0.5 * (k % 2)) / count
+        places.append(radius * r[k] * np.column_stack([np.cos(phi), np.sin(phi)]))
+        weights.append(np.full(count, wr[k] / count))
+    return np.concatenate(places), np.concatenate(weights)
+
+
+def _fan_points(polygon: Polygon, points: int) -> tuple[Array, Array]:
+    """A Gauss rule on each triangle of the fan about the centroid, with more points along the edge the further out.
+
+    As Duffy's, which collapses a square (Quadrature over a pyramid or cube of integrands with a singularity at a
+    vertex, 1982), without as many points about the centroid.
     """
     vertices = np.array(polygon.vertices)
-    order = max(4 if len(vertices) == 3 else 3, round(math.sqrt(points / len(vertices))))
-    u, wu = _radial_gauss(order)
-    v, wv = _composite_gauss(0.0, 1.0, 1, order)
+    u, wu = _radial_gauss(max(4, round(math.sqrt(2.0 * points / len(vertices)))))
+    along = [_composite_gauss(0.0, 1.0, 1, max(2, k + 1)) for k in range(len(u))]
     centre = polygon_centroid(vertices)
     places, weights = [], []
     for a, b in zip(vertices, np.roll(vertices, -1, axis=0), strict=True):
         area = 0.5 * abs((a - centre)[0] * (b - centre)[1] - (a - centre)[1] * (b - centre)[0])
-        edge = a + v[:, None] * (b - a)
-        grid_points = centre + u[:, None, None] * (edge - centre)[None]
-        places.append(grid_points.reshape(-1, 2))
-        weights.append(area * np.outer(wu, wv).ravel())
+        for reach, share, (v, wv) in zip(u.tolist(), wu.tolist(), along, strict=True):
+            places.append(centre + reach * (a + v[:, None] * (b - a) - centre))
+            weights.append(area * share * wv)
     return np.concatenate(places), np.concatenate(weights)
 
 

@@ -89,7 +89,7 @@ def test_mass_cancels_in_a_free_slide(model, name):
     # The stiffness follows the weight, so even the resting depth is the same.
     cell, mass = cell_of(name, model), OBJECTS[name].mass
     ends = [final(slide(cell, body_of(share * mass), (0.5, 0.1, 4.0))) for share in (0.1, 1.0, 10.0)]
-    np.testing.assert_allclose(ends[0], ends[1], atol=1e-6)  # measured 4e-7 m and rad
+    np.testing.assert_allclose(ends[0], ends[1], atol=2e-6)  # measured 1.1e-6 m and rad (the can)
     np.testing.assert_allclose(ends[2], ends[1], atol=1e-6)  # measured 1e-8
 
 
@@ -108,8 +108,8 @@ def test_a_spinning_object_turns_as_far_as_torsional_friction_lets_it(model, nam
     body, spin, mu = OBJECTS[name], 10.0, 0.3
     motion = slide(cell_of(name, model), body_of(body.mass, mu), (0.0, 0.0, spin))
     expected = body.inertia / body.mass * spin**2 / (2 * mu * GRAVITY * mean_radius(name))
-    # Measured: box -0.18 %, can -1.06 %, eraser +0.87 %, book +0.03 %; both models alike (the quadrature's error).
-    assert final(motion)[2] == pytest.approx(expected, rel=0.02)
+    # Measured: box -0.17 %, can 0.00 %, eraser -0.07 %, book -0.18 %; both models alike (the quadrature's error).
+    assert final(motion)[2] == pytest.approx(expected, rel=0.004)
     assert np.abs(final(motion)[:2]).max() < 1e-9
 
 

@@ -131,7 +131,7 @@ def test_a_noise_that_nothing_tells_is_what_the_plain_cell_leaves():
 
 
 def test_where_no_noise_is_known_an_effect_is_found_by_the_quiet_that_it_leaves():
-    recording = endpoints(world(count=8, pull=(ERASER.mass * 9.81 * 0.03, 0.0)))
+    recording = endpoints(world(count=10, pull=(ERASER.mass * 9.81 * 0.03, 0.0)))  # eight are too few
     made = case(replace(recording, sensors=Sensors()))
     diagnosis, evidence = diagnose(made, effects=("table_tilt", "com_offset"))
     assert not made.noise.known
