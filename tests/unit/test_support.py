@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from physid_drake.cell import CellConfig
 from physid_drake.cell.outline import Disc, Polygon, rectangle
 from physid_drake.cell.support import FrictionGrid, Support, rest_depths, support_of
 
@@ -121,6 +122,28 @@ def test_no_point_lies_on_the_border_of_two_cells(name, grid, request):
         borders = np.linspace(low, high, count + 1)[1:-1]
         if len(borders):
             assert np.abs(values[:, None] - borders).min() > 1e-6
+
+
+# --------------------------------------------------------------------------------------------------- friction
+
+
+def friction(points, weights, centre):
+    """Force and torque (3,) [N, N m] about the origin on points that turn about a centre, friction and weight 1."""
+    slip = (points - centre) @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    fx, fy = (weights[:, None] * slip / np.maximum(np.linalg.norm(slip, axis=1), 1e-9)[:, None]).T
+    return np.array([fx.sum(), fy.sum(), points[:, 0] @ fy - points[:, 1] @ fx])
+
+
+@every_outline
+def test_friction_of_a_base_that_turns_about_a_point_in_it_or_near_it(name):
+    """Where few points get it wrong by 1 %, a quiet tracker sees it, and a diagnosis calls it a patch."""
+    points, support = fine_points(OUTLINES[name], 300), quadrature(name, points=CellConfig().contact.support_points)
+    even, arm = np.full(len(points), 1.0 / len(points)), np.sqrt((points**2).sum(axis=1).mean())
+    low, high = points.min(axis=0), points.max(axis=0)
+    centres = np.random.default_rng(0).uniform(1.5 * low, 1.5 * high, (200, 2))
+    errors = [friction(support.points, support.weights, c) - friction(points, even, c) for c in centres]
+    # Measured: 0.40 to 0.56 %; 0.48 to 1.2 % with the about thirty points of before.
+    assert np.sqrt(np.mean(np.square(errors / np.array([1.0, 1.0, arm])))) < 0.006
 
 
 # ------------------------------------------------------------------------------------------------------- rest
