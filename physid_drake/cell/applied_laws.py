@@ -19,8 +19,8 @@ class AppliedLaws:
         self._laws, self._frictions = laws, frictions
 
     def act(self, state: PlantState, time: float, span: float) -> None:
-        """Add the laws' impulses over a tick [s] to the object's velocities."""
-        if not self._laws and not self._frictions:
+        """Add the laws' impulses over a tick [s] to the object's velocities, and what turning slip has too much."""
+        if not self._laws and not self._frictions and not state.turns():
             return
         seen = state.object_state(time, span)
         for wrench in total_wrenches(seen, self._laws, self._frictions):

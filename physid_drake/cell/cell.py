@@ -27,11 +27,12 @@ from physid_drake.cell.setters import (
 from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.cell.stepper import Stepper
-from physid_drake.cell.support import SLENDER, PressureGrid, rest_depths
+from physid_drake.cell.support import PressureGrid, rest_depths
 from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]
 
+SLENDER = 2.5  # height over radius above which an object leans notably under load transfer
 EDGE_POINTS = 200  # under an object where the table's edge cuts the underside
 
 

@@ -135,7 +135,7 @@ def add_scene(
     plant.set_name("plant")
     plant.mutable_gravity_field().set_gravity_vector(np.array([0.0, 0.0, -gravity]))
     grid = FrictionGrid(nx=config.friction_cells[0], ny=config.friction_cells[1])
-    support = support_of(solid.underside, grid, config.contact.support_points, height=solid.height, pressure=pressure)
+    support = support_of(solid.underside, grid, config.contact.support_points, pressure=pressure)
     if solid.rolling_radius is not None:
         support = _axis_support(support)
 
@@ -162,7 +162,8 @@ def _axis_support(support: Support) -> Support:
     ys = np.unique(np.round(support.points[:, 1], 12))
     shares = np.array([support.weights[np.isclose(support.points[:, 1], y)].sum() for y in ys])
     cells = np.array([support.cells[np.isclose(support.points[:, 1], y)][0] for y in ys])
-    return Support(points=np.column_stack([np.zeros_like(ys), ys]), weights=shares, cells=cells)
+    points = np.column_stack([np.zeros_like(ys), ys])
+    return Support(points=points, weights=shares, cells=cells, radii=np.zeros_like(ys))
 
 
 def _add_table(plant: MultibodyPlant, edge: Array | None, hydroelastic: bool) -> GeometryId:

@@ -118,6 +118,11 @@ class PlantState:
         q, v = self._q, self._v
         return self._reader.at(time, span, self._x[q : q + 7].tolist(), self._x[v : v + 6].tolist())
 
+    def turns(self) -> bool:
+        """Whether the object turns about a place under it or close by."""
+        vx, vy, wz = self.twist()
+        return math.hypot(vx, vy) < abs(wz) * self._reader.underside.reach
+
     def lean(self) -> tuple[float, float, float]:
         """Depth of Bo's foot in the table [m], and how it grows along x and y of B [-]."""
         return self._reader.lean(self._x[self._q : self._q + 7].tolist())

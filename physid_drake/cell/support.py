@@ -20,8 +20,9 @@ from physid_drake.recording import polygon_centroid
 
 Array = NDArray[np.float64]
 
+SECTORS = 720  # of a smooth outline, to part equal areas
+ABOUT = 0.95  # of the points that are asked for
 FEW_CORNERS = 6  # a polygon with more is treated as a round outline
-SLENDER = 2.5  # height over radius above which load transfer may lift a part of the underside
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,13 +73,15 @@ class Support:
 
     Attributes:
         points: (n, 2) in B [m].
-        weights: (n,) shares of the area, summing to 1.
+        weights: (n,) shares of the load, summing to 1.
         cells: (n,) index of the friction cell of each point.
+        radii: (n,) of a disc as large as the part of the underside that each point stands for [m].
     """
 
     points: Array
     weights: Array
     cells: NDArray[np.intp]
+    radii: Array
 
 
 def support_of(
@@ -86,7 +89,6 @@ def support_of(
     grid: FrictionGrid,
     points: int,
     *,
-    height: float = 0.0,
     pressure: PressureGrid | None = None,
 ) -> Support:
     """Quadrature points over an outline, fine enough that every friction cell holds some.
@@ -95,29 +97,28 @@ def support_of(
         outline: the underside, convex, in B.
         grid: the friction cells.
         points: about how many; Gauss points as dense along x as along y.
-        height: of the object [m]: a slender disc stands on part of its underside while it is pushed, and
-            needs a third ring of points.
         pressure: where it is not even; the quadrature is then as fine as its cells need too.
     """
     cut = grid if pressure is None else _common(grid, pressure.grid)
+    rings = max(3, math.ceil(math.sqrt(points) / 3))
     match outline:
         case Polygon() if _is_rectangle(outline):
             places, weights = _rectangle_points(outline, cut, points)
         case _ if cut.size > 1:
             places, weights = _cell_points(outline, cut, math.ceil(math.sqrt(points) / 2))
         case Disc(radius=radius):
-            rings = max(3 if height > SLENDER * radius else 2, math.ceil(math.sqrt(points) / 3))
-            places, weights = _disc_points(radius, rings, points)
+            places, weights = _ring_points(lambda _: radius, rings, points)
         case Polygon(vertices=vertices) if len(vertices) <= FEW_CORNERS:
             places, weights = _fan_points(outline, points)
         case Polygon():
-            places, weights = _star_points(outline.reach, max(2, math.ceil(math.sqrt(points) / 3)), 16)
+            places, weights = _ring_points(outline.reach, rings, points)
         case _:
             raise TypeError(f"no quadrature for an outline of type {type(outline).__name__}")
     cells = grid.cell_of(places, outline)
+    radii = np.sqrt(weights / weights.sum() * _area(_as_polygon(outline)) / math.pi)
     if pressure is not None:
         weights = weights * pressure.factors(places, outline)
-    return Support(points=places, weights=weights / weights.sum(), cells=cells)
+    return Support(points=places, weights=weights / weights.sum(), cells=cells, radii=radii)
 
 
 def _common(first: FrictionGrid, second: FrictionGrid) -> FrictionGrid:
@@ -159,32 +160,28 @@ def _radial_gauss(order: int) -> tuple[Array, Array]:
     return np.asarray(0.5 * (x + 1.0)), np.asarray(w / w.sum())
 
 
-def _star_points(reach: Callable[[float], float], radii: int, angles: int) -> tuple[Array, Array]:
-    """Gauss in r with weight r, times equal angles, which converge fast on a smooth outline.
+def _ring_points(reach: Callable[[float], float], rings: int, points: int) -> tuple[Array, Array]:
+    """Gauss in r with weight r, times angles that part equal areas: points about as dense everywhere.
+
+    Where slip turns about a place in the base, that does better than as many points on each ring. Equal areas make
+    the rule of an ellipse that of a disc, stretched, and converge as fast. Even numbers make a disc's rule the same
+    mirrored.
 
     Args:
-        reach: distance [m] from Bo to the outline in a direction [rad].
-        radii: number of rings.
-        angles: points per ring.
-    """
-    r, wr = _radial_gauss(radii)
-    phi = 2.0 * math.pi * (np.arange(angles) + 0.5) / angles
-    ring = np.array([reach(float(angle)) for angle in phi])[:, None] * np.column_stack([np.cos(phi), np.sin(phi)])
-    area = (ring**2).sum(axis=1)
-    return (r[:, None, None] * ring).reshape(-1, 2), np.outer(wr, area / area.sum()).ravel()
-
-
-def _disc_points(radius: float, rings: int, points: int) -> tuple[Array, Array]:
-    """Gauss in r with weight r, times equal angles: points about as dense everywhere, and the same mirrored.
-
-    Where slip turns about a point under the disc, that does better than as many points on each ring.
+        reach: distance [m] from Bo to the smooth outline in a direction [rad].
+        rings: their number.
+        points: about how many on all of them.
     """
     r, wr = _radial_gauss(rings)
     counts = [2 * max(2, round(0.5 * points * share)) for share in (r / r.sum()).tolist()]
+    angles = np.linspace(0.0, 2.0 * math.pi, SECTORS + 1)
+    squares = np.array([reach(float(angle)) for angle in angles]) ** 2
+    swept = np.concatenate([[0.0], np.cumsum(squares[1:] + squares[:-1])])
     places, weights = [], []
     for k, count in enumerate(counts):
-        phi = 2.0 * math.pi * (np.arange(count) + 0.5 * (k % 2)) / count
-        places.append(radius * r[k] * np.column_stack([np.cos(phi), np.sin(phi)]))
+        phi = np.interp((np.arange(count) + 0.5 * (k % 2)) / count * swept[-1], swept, angles)
+        far = r[k] * np.array([reach(float(angle)) for angle in phi])
+        places.append(far[:, None] * np.column_stack([np.cos(phi), np.sin(phi)]))
         weights.append(np.full(count, wr[k] / count))
     return np.concatenate(places), np.concatenate(weights)
 
@@ -196,8 +193,11 @@ def _fan_points(polygon: Polygon, points: int) -> tuple[Array, Array]:
     vertex, 1982), without as many points about the centroid.
     """
     vertices = np.array(polygon.vertices)
-    u, wu = _radial_gauss(max(4, round(math.sqrt(2.0 * points / len(vertices)))))
-    along = [_composite_gauss(0.0, 1.0, 1, max(2, k + 1)) for k in range(len(u))]
+    rows = [2, 2, 3]
+    while len(vertices) * sum(rows) < ABOUT * points:
+        rows.append(rows[-1] + 1)
+    u, wu = _radial_gauss(len(rows))
+    along = [_composite_gauss(0.0, 1.0, 1, row) for row in rows]
     centre = polygon_centroid(vertices)
     places, weights = [], []
     for a, b in zip(vertices, np.roll(vertices, -1, axis=0), strict=True):
