@@ -7,6 +7,7 @@ of a smooth ramp are off by some percent of the speed at which the object is let
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -29,6 +30,11 @@ WIDER = 0.2  # at either end: where the fit of a smooth ramp starts
 SURE = 10.0  # of the criterion, in all streams: smooth ramps must be that much better
 MOST = 20.0  # what one stream may say for or against them; one of a smooth robot that says more keeps straight ones
 VOTERS = 12  # about so many streams of a robot are asked
+FAST = 0.3  # of the largest speed: samples that show whether time stamps are late or early
+FEWEST_FAST = 40  # of them
+NOTABLE = 1.3  # times as far off along the way as across it
+MEDIAN_OF_NORMAL = 0.6745  # of the absolute value, over the standard deviation
+HAIR = 1e-4  # s: for differences
 
 STRAIGHT: Final = Polynomial([0, 1])
 # Speeds s(x) from 0 to 1 over a ramp, x from 0 to 1: limited jerk, and least jerk (Flash and Hogan 1985).
@@ -39,14 +45,18 @@ def fit_hand_paths(streams: Sequence[tuple[Array, Array]], std: float | None) ->
     """The paths with the fewest knots that explain the streams of one robot.
 
     Knots are added where they explain most (orthogonal matching pursuit over all sample times), moved to
-    where they fit best, and taken away again while the Bayesian information criterion falls. The same criterion,
-    summed over all streams, tells whether the robot's ramps of speed are straight or smooth.
+    where they fit best, and taken away again while the Bayesian information criterion falls. Where time stamps are
+    late or early, fast samples count for less. The same criterion, summed over all streams, tells whether the robot's
+    ramps of speed are straight or smooth.
 
     Args:
         streams: per push times (n,) [s], n >= 2, and positions (n, 2) [m].
         std: standard deviation of one position [m]; None estimates it from third differences.
     """
     best = {k: _fit_of(*stream, std) for k, stream in enumerate(streams) if len(stream[0]) >= 6}
+    jitter = _jitter_of(list(best.values()))
+    if jitter > 0.0:
+        best = {k: fit.with_jitter(jitter) for k, fit in best.items()}
     asked = list(best.values())[:: max(1, len(best) // VOTERS)]
     votes = [sum(_vote(fit, _SmoothFit(fit, ramp)) for fit in asked) for ramp in SMOOTH_RAMPS]
     if max(votes) > SURE:
@@ -56,6 +66,25 @@ def fit_hand_paths(streams: Sequence[tuple[Array, Array]], std: float | None) ->
         best[k].path(float(times[0])) if k in best else _polygon_path(times, positions)
         for k, (times, positions) in enumerate(streams)
     )
+
+
+def _jitter_of(fits: Sequence[_Fit]) -> float:
+    """Standard deviation of the time stamps [s]: what fast samples are off by along their way more than across it."""
+    if not fits:
+        return 0.0
+    fastest = max(float(np.abs(fit.velocities()).max()) for fit in fits)
+    along, across = [], []
+    for fit in fits:
+        velocities = fit.velocities()
+        fast = np.abs(velocities) > FAST * fastest
+        turned = fit.residuals()[fast] * np.conj(velocities[fast])  # a velocity as x + iy: parts along it and across
+        along.append(turned.real / np.abs(velocities[fast]) ** 2)
+        across.append(turned.imag / np.abs(velocities[fast]) ** 2)
+    late, beside = np.concatenate(along), np.concatenate(across)
+    if len(late) < FEWEST_FAST:
+        return 0.0
+    own, other = (float(np.median(np.abs(values))) / MEDIAN_OF_NORMAL for values in (late, beside))
+    return math.sqrt(own**2 - other**2) if own > NOTABLE * other else 0.0
 
 
 def _vote(straight: _Fit, smooth: _Fit) -> float:
@@ -76,13 +105,13 @@ def fit_hand_path(times: Array, positions: Array, std: float | None) -> HandPath
 
 def _fit_of(times: Array, positions: Array, std: float | None) -> _Fit:
     sigma = max(std if std is not None else stream_std(positions), SMALLEST_STD)
-    return _Fit(times - times[0], positions, sigma)
+    return _Fit(times - times[0], positions, np.full(len(times), sigma))
 
 
 def stream_std(positions: Array) -> float:
     """Noise of a stream (n, 2) [m] from its third differences, which a path hardly has: variance 20 sigma^2."""
     third = np.diff(positions, 3, axis=0)
-    return float(1.4826 * np.median(np.abs(third)) / np.sqrt(20.0))
+    return float(np.median(np.abs(third)) / MEDIAN_OF_NORMAL / np.sqrt(20.0))
 
 
 def _polygon_path(times: Array, positions: Array) -> HandPath:
@@ -98,13 +127,15 @@ def _polygon_path(times: Array, positions: Array) -> HandPath:
 class _Fit:
     """Least squares of truncated parabolas: position = p0 + v0 t + sum c_j (t - k_j)_+^2."""
 
-    def __init__(self, times: Array, positions: Array, sigma: float) -> None:
-        self._take(times, positions, sigma)
+    def __init__(self, times: Array, positions: Array, sigmas: Array) -> None:
+        self._take(times, positions, sigmas)
         self._moving = self._starts_moving()
         self.knots = self._prune(self._place(self._grow()))
 
-    def _take(self, times: Array, positions: Array, sigma: float) -> None:
-        self._t, self._p, self._sigma = times, positions, sigma
+    def _take(self, times: Array, positions: Array, sigmas: Array) -> None:
+        """Times (n,) from 0, positions (n, 2) and the standard deviations (n,) in units of which all is fitted."""
+        self._t, self._p, self._sigmas = times, positions, sigmas
+        self._scaled = positions / sigmas[:, None]
         self._span = float(times[-1])
         # One knot costs its place and two coefficients.
         self._price = 3.0 * np.log(len(times)) + 4.0
@@ -119,19 +150,35 @@ class _Fit:
         coefficients, _ = self._solve(self.knots, ended=True)
         return self._as_path(self.knots, coefficients, origin)
 
+    def residuals(self) -> NDArray[np.complex128]:
+        """Recorded less fitted (n,), x + iy [m]."""
+        coefficients, _ = self._solve(self.knots, ended=True)
+        left = (self._scaled - self._design(self.knots) @ coefficients) * self._sigmas[:, None]
+        return np.asarray(left[:, 0] + 1j * left[:, 1])
+
+    def velocities(self) -> NDArray[np.complex128]:
+        """Of the fit at the samples (n,), x + iy [m/s]."""
+        path = self.path(0.0)
+        moved = path.positions(self._t + HAIR) - path.positions(self._t - HAIR)
+        return np.asarray((moved[:, 0] + 1j * moved[:, 1]) / (2.0 * HAIR))
+
+    def with_jitter(self, jitter: float) -> _Fit:
+        """The stream fitted again, its time stamps being late or early by a standard deviation [s]."""
+        return _Fit(self._t, self._p, np.hypot(self._sigmas, jitter * np.abs(self.velocities())))
+
     def _starts_moving(self) -> bool:
         """Whether the stream begins in motion: a line through its first samples rises above the noise."""
         n = min(len(self._t), 12)
         t = self._t[:n] - self._t[:n].mean()
         slope = t @ (self._p[:n] - self._p[:n].mean(axis=0)) / (t @ t)
-        return bool(np.linalg.norm(slope) > 5.0 * self._sigma / np.sqrt(t @ t))
+        return bool(np.linalg.norm(slope) > 5.0 * self._sigmas[:n].max() / np.sqrt(t @ t))
 
     def _design(self, knots: Array) -> Array:
         columns = [np.ones_like(self._t)]
         if self._moving:
             columns += [self._t / self._span]
         columns += [np.maximum(self._t - k, 0.0) ** 2 / self._span**2 for k in knots]
-        return np.column_stack(columns)
+        return np.column_stack(columns) / self._sigmas[:, None]
 
     def _ending(self, knots: Array) -> Array:
         """Rows that make velocity and acceleration vanish after the last knot (in the design's scaling)."""
@@ -146,29 +193,29 @@ class _Fit:
     def _solve(self, knots: Array, *, ended: bool) -> tuple[Array, float]:
         """Coefficients (m, 2) and chi-square; with rest after the last knot if the stream allows it."""
         design = self._design(knots)
-        free, *_ = np.linalg.lstsq(design, self._p, rcond=1e-13)
-        chi2 = float(((self._p - design @ free) ** 2).sum()) / self._sigma**2
+        free, *_ = np.linalg.lstsq(design, self._scaled, rcond=1e-13)
+        chi2 = float(((self._scaled - design @ free) ** 2).sum())
         if not ended or len(knots) < 3:
             return np.asarray(free, dtype=np.float64), chi2
         rows = self._ending(knots)
         _, _, vt = np.linalg.svd(rows)
         null = vt[2:].T
-        inner, *_ = np.linalg.lstsq(design @ null, self._p, rcond=1e-13)
+        inner, *_ = np.linalg.lstsq(design @ null, self._scaled, rcond=1e-13)
         held: Array = np.asarray(null @ inner, dtype=np.float64)
-        held_chi2 = float(((self._p - design @ held) ** 2).sum()) / self._sigma**2
+        held_chi2 = float(((self._scaled - design @ held) ** 2).sum())
         if held_chi2 - chi2 < 4.0 + 3.0 * self._price:
             return held, held_chi2
         return np.asarray(free, dtype=np.float64), chi2
 
     def _grow(self) -> Array:
         candidates = self._t[1:-1]
-        columns = np.maximum(self._t[:, None] - candidates, 0.0) ** 2 / self._span**2
+        columns = np.maximum(self._t[:, None] - candidates, 0.0) ** 2 / self._span**2 / self._sigmas[:, None]
         knots = np.array([], dtype=np.float64)
         while len(knots) < MOST_KNOTS:
             design = self._design(knots)
             q, _ = np.linalg.qr(design)
-            residual = self._p - q @ (q.T @ self._p)
-            if float((residual**2).sum()) / self._sigma**2 < 2.0 * len(self._t):
+            residual = self._scaled - q @ (q.T @ self._scaled)
+            if float((residual**2).sum()) < 2.0 * len(self._t):
                 break
             free = columns - q @ (q.T @ columns)
             norms = np.einsum("ij,ij->j", free, free)
@@ -176,7 +223,7 @@ class _Fit:
             if len(knots):
                 gains[np.abs(candidates[:, None] - knots).min(axis=1) < SHORTEST_PIECE] = 0.0
             best = int(np.argmax(gains))
-            if gains[best] / self._sigma**2 < self._price:
+            if gains[best] < self._price:
                 break
             knots = np.sort(np.append(knots, candidates[best]))
             if len(knots) % 2 == 0:
@@ -192,8 +239,8 @@ class _Fit:
 
         def residual(places: Array) -> Array:
             design = self._design(np.sort(places))
-            coefficients, *_ = np.linalg.lstsq(design, self._p, rcond=1e-13)
-            return ((self._p - design @ coefficients) / self._sigma).ravel()
+            coefficients, *_ = np.linalg.lstsq(design, self._scaled, rcond=1e-13)
+            return (self._scaled - design @ coefficients).ravel()
 
         found = least_squares(
             residual, knots, bounds=(-0.5 * SHORTEST_PIECE, self._span), x_scale=0.01, max_nfev=evaluations
@@ -244,7 +291,7 @@ class _SmoothFit(_Fit):
     """The same where the hand starts and brakes along smooth ramps of speed: position = p0 + sum v_k Phi_k(t)."""
 
     def __init__(self, straight: _Fit, ramp: Polynomial) -> None:
-        self._take(straight._t, straight._p, straight._sigma)
+        self._take(straight._t, straight._p, straight._sigmas)
         self._moving = straight._moving
         self._ramp = ramp
         self.knots = self._prune(self._place(np.clip(_widened(straight.knots), 0.0, self._span)))
@@ -261,7 +308,8 @@ class _SmoothFit(_Fit):
         ups, downs = [self._t, *rises], [*rises, np.zeros_like(self._t)]
         columns = [up - down for up, down in zip(ups, downs, strict=True)] if len(knots) else []
         # A hand that rests before the first knot has no speed there.
-        return np.column_stack([np.ones_like(self._t), *(columns if self._moving else columns[1:])])
+        columns = [np.ones_like(self._t), *(columns if self._moving else columns[1:])]
+        return np.column_stack(columns) / self._sigmas[:, None]
 
     def _rise(self, begin: float, end: float, ramp: Polynomial) -> Array:
         """Way (n,) of a hand that is at rest before ``begin`` and has the speed 1 after ``end``."""
@@ -273,8 +321,8 @@ class _SmoothFit(_Fit):
         design = self._design(knots)
         found = []
         for columns in (design, design[:, :-1]) if ended and len(knots) >= 3 else (design,):
-            coefficients, *_ = np.linalg.lstsq(columns, self._p, rcond=1e-13)
-            found.append((coefficients, float(((self._p - columns @ coefficients) ** 2).sum()) / self._sigma**2))
+            coefficients, *_ = np.linalg.lstsq(columns, self._scaled, rcond=1e-13)
+            found.append((coefficients, float(((self._scaled - columns @ coefficients) ** 2).sum())))
         (free, chi2), (held, held_chi2) = found[0], found[-1]
         if held_chi2 - chi2 < 4.0 + self._price:
             return np.pad(held, ((0, len(free) - len(held)), (0, 0))), held_chi2

@@ -216,3 +216,37 @@ def test_every_noisy_path_is_fitted_with_few_knots():
         assert len(fit.times[:: fit.pieces]) <= MOST_KNOTS + 3
         assert (np.diff(fit.times) > 0.0).all()
         assert np.isfinite(fit.velocities).all()
+
+
+def late_or_early(jitter):
+    """Twelve streams of one robot whose stamps are off by up to ``jitter`` [s], and their paths."""
+    paths, streams = [], []
+    for seed in range(12):
+        rng = np.random.default_rng([3, seed])
+        path = trapezoid(speed=rng.uniform(0.2, 0.5), cruise=rng.uniform(0.15, 0.5))
+        times, stream = sampled(path, 0.9, seed=seed)
+        paths.append(path)
+        streams.append((times + jitter * rng.uniform(-1.0, 1.0, len(times)), stream))
+    return paths, streams
+
+
+def test_stamps_that_are_late_or_early_are_no_change_of_speed(monkeypatch):
+    paths, streams = late_or_early(1e-3)
+    fits = fit_hand_paths(streams, STD)
+    monkeypatch.setattr(hand_fit, "_jitter_of", lambda fits: 0.0)
+    blind = fit_hand_paths(streams, STD)
+    dense = np.arange(0.0, 0.88, 1e-3)
+
+    def off(found):
+        errors = [f.positions(dense) - p.positions(dense) for f, p in zip(found, paths, strict=True)]
+        return np.sqrt(np.mean(np.square(errors)))
+
+    assert off(fits) < 0.9 * off(blind)  # 0.034 of 0.041 mm
+    assert max(len(f.times) for f in fits) < 10  # 6; blind takes them for smooth ramps in 121 to 193 pieces
+
+
+@pytest.mark.parametrize("jitter", [0.0, 3e-4, 1e-3])
+def test_the_jitter_of_stamps_is_seen(jitter):
+    _, streams = late_or_early(jitter)
+    seen = hand_fit._jitter_of([hand_fit._fit_of(*stream, STD) for stream in streams])
+    assert seen == pytest.approx(jitter / np.sqrt(3.0), rel=0.3, abs=2e-5)
