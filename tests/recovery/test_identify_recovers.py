@@ -159,10 +159,10 @@ def test_scatter_of_friction_is_found_push_by_push():
     changes = np.array([-0.12, 0.08, 0.12, -0.08])
     recording = recorded(BOX, TRUTH, pushes_of(BOX, 4, seed=9), seed=2, friction_changes=changes)
     result = identified(recording, *FRICTIONS)
-    assert_recovered(result, "support_friction", 0.27, 0.12)  # -10.3 %; four such pushes tell it to 5 %
-    assert 0.03 < result.polished.friction_scatter < 0.15  # 0.076; 0.102 is true
+    assert_recovered(result, "support_friction", 0.27, 0.1, widest=0.12)  # -8.0 %; half an interval is 10.2 %
+    assert 0.03 < result.polished.friction_scatter < 0.15  # 0.044; 0.102 is true
     found = [unknowns["friction"] for unknowns in result.polished.unknowns]
-    assert np.corrcoef(found, changes)[0, 1] > 0.9  # 0.97
+    assert np.corrcoef(found, changes)[0, 1] > 0.9  # 0.91
 
 
 def test_the_same_seed_gives_the_same_result_to_the_bit_on_one_process_and_on_two():
