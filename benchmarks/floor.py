@@ -105,27 +105,20 @@ def cells_error(recording, truth):
         Task(problem=problem, theta=theta, nuisance=own, values=np.zeros(len(own.names)), effects=effects)
         for problem, own in zip(case.problems, case.nuisances, strict=True)
     ]
+    predictions = case.pool.run(tasks)
+    if any(prediction is None for prediction in predictions):
+        return math.nan
     errors = [
         features.poses(features.recorded - features.of(prediction))[:, :2]
-        for features, prediction in zip(case.features, case.pool.run(tasks), strict=True)
-        if prediction is not None
+        for features, prediction in zip(case.features, predictions, strict=True)
     ]
     return 1e3 * math.sqrt(2.0 * np.mean(np.square(np.concatenate(errors))))
 
 
 def table(rows):
     made = Table(title="error of left-out pushes [mm], and over that of the true world")
-    for column in (
-        "world",
-        "truth",
-        "true world",
-        "as tracked",
-        "cell",
-        "diagnosis",
-        "tracked",
-        "cell ",
-        "diagnosis ",
-    ):
+    errors = ("true world", "as tracked", "cell", "diagnosis")
+    for column in ("world", "truth", *errors, *(f"{name} / true" for name in errors[1:])):
         made.add_column(column, justify="left" if column in ("world", "truth") else "right")
     for name, truth, *errors in rows:
         made.add_row(name, truth, *(shown(value) for value in (*errors, *(e / errors[0] for e in errors[1:]))))

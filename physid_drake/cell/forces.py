@@ -20,18 +20,13 @@ from numpy.typing import NDArray
 from physid_drake.cell.diagram import Scene
 from physid_drake.cell.motion import planar_pose
 from physid_drake.cell.setters import Body
+from physid_drake.cell.turning import CANCELS, Turning
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+TINY = 1e-12  # of a direction
 SLOWEST = 5e-4  # m/s: below this slip a point feels the contact's full friction, which holds it at rest
-# Over the disc that a support point stands for, where slip turns about a place, in radii of the disc:
-CANCELS = 2.0  # a place further off from which slip turns leaves all of its friction
-LEAVES_ALL = 1.1  # about where friction begins to cancel
-OWN_ARM = (
-    0.35  # of the disc's own torque where it turns about its centre; two thirds if no other point made up for it
-)
-OWN_TORQUE = 1.2  # a place further off leaves the disc no torque of its own
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,33 +54,6 @@ class Underside:
     def reach(self) -> float:
         """From Bo, how far away a place may be about which slip turns within what a point stands for [m]."""
         return float((np.abs(self.points) + CANCELS * self.radii).max())
-
-
-@dataclass(frozen=True, kw_only=True)
-class Turning:
-    """A support point that slip nearly turns about.
-
-    Attributes:
-        point: its index.
-        cancelled: share of its friction that cancels over what the point stands for.
-        arm: of the torque that is left there, about the point, times its friction [m].
-    """
-
-    point: int
-    cancelled: float
-    arm: float
-
-    @classmethod
-    def of(cls, point: int, distance: float, radius: float) -> Turning:
-        """Where slip turns about a place at a distance, in radii [m] of what the point stands for.
-
-        A smooth min(distance, 1), so sharp because the points' weights are right for slip that changes little from
-        one to the next. The constants make the error of forces and torques least over six bases and 30 to 45 points.
-        """
-        near = distance / LEAVES_ALL
-        left = near / math.pow(1.0 + near**8, 0.125)
-        arm = OWN_ARM * radius * max(0.0, 1.0 - (distance / OWN_TORQUE) ** 2)
-        return cls(point=point, cancelled=1.0 - left, arm=arm)
 
 
 @dataclass(kw_only=True)
@@ -207,13 +175,13 @@ class ObjectState:
 
         A point has friction of full size and of one direction. Over the part of the underside that it stands for,
         slip points all ways where it turns about a place within: most of the friction cancels, and leaves a torque.
-        Without this, three to four times as many points are needed (``benchmarks/turning.py``).
+        Without this, three times as many points or more are needed (``benchmarks/turning.py``).
         """
         base, spin = self.underside, self.yaw_rate
         if not abs(self.v_WBo) < abs(spin) * base.reach:
             return []
-        distances = np.abs(base.points - self._centre) / base.radii
-        near = np.flatnonzero(distances < CANCELS).tolist()
+        distances = np.abs(base.points - self._centre)
+        near = np.flatnonzero(distances < CANCELS * base.radii).tolist()
         return [Turning.of(i, float(distances[i]), float(base.radii[i])) for i in near]
 
     @property
@@ -313,16 +281,17 @@ def total_wrenches(state: ObjectState, laws: Sequence[ForceLaw], frictions: Sequ
 
 
 def _turning_wrench(state: ObjectState, largest: float, refunds: Sequence[Array]) -> Wrench:
-    """The friction that cancels where slip turns, given back: of the contact's, less what laws gave back before."""
+    """The friction that cancels where slip turns, given back, less the torque that is left: of what laws leave."""
     force, moment, turn, spin = 0j, 0.0, cmath.exp(1j * state.yaw), state.yaw_rate
     for one in state.turning:
-        direction = state.slip_direction_at(one.point)
-        held = largest * state.holding_at(one.point)
-        held -= sum((complex(*forces[one.point]) * direction.conjugate()).real for forces in refunds)
-        push = one.cancelled * held * direction
+        direction, held = state.slip_direction_at(one.point), largest * state.holding_at(one.point)
+        given = sum((complex(*forces[one.point]) for forces in refunds), 0j)
+        push = one.cancelled * (held * direction - given)
         force += push
         moment += ((turn * complex(state.underside.points[one.point])).conjugate() * push).imag
-        moment -= one.arm * held * spin / math.hypot(spin, state.slow_spin)
+        # The direction fades where the point hardly slips, and so does what laws gave; the rest of its disc slips on.
+        along = (given * direction.conjugate()).real / max(abs(direction), TINY)
+        moment -= one.arm * (held - along) * spin / math.hypot(spin, state.slow_spin)
     return _wrench_at_table(state, force, moment)
 
 

@@ -188,6 +188,42 @@ def test_a_few_points_friction_is_that_of_all(lean):
     np.testing.assert_allclose(ways, state.slip_directions, rtol=1e-12)
 
 
+@every_outline
+def test_an_object_that_does_not_turn_or_move_is_left_alone_to_the_bit(name):
+    sliding = dataclasses.replace(spinning(name, (0.0, 0.0)), v_WBo=0.3 + 0.1j, yaw_rate=0.0)
+    resting = dataclasses.replace(sliding, v_WBo=0j)
+    assert total_wrenches(sliding, (), ()) == total_wrenches(resting, (), ()) == []
+
+
+@every_outline
+def test_turning_slip_is_braked_less_but_never_driven_and_alike_both_ways(name):
+    low, high = np.array(OUTLINES[name].extent()).reshape(2, 2)
+    for place in np.random.default_rng(1).uniform(low, high, (50, 2)):
+        state = spinning(name, place)
+        back = dataclasses.replace(state, v_WBo=-state.v_WBo, yaw_rate=-state.yaw_rate)
+        motion = np.array([state.v_WBo.real, state.v_WBo.imag, state.yaw_rate])
+        contact = refund_wrench(state, as_plane(state.holding * state.slip_directions))
+        most = motion @ np.array([contact.fx, contact.fy, contact.torque])
+        # Some torque is left where the points alone have none, so that a little more than theirs may be lost.
+        assert 0.0 < motion @ felt(state) < 1.02 * most
+        np.testing.assert_allclose(felt(back), -felt(state), rtol=1e-9, atol=1e-12)
+
+
+class Half:
+    """A friction law that leaves half of Coulomb's."""
+
+    largest = 1.0
+
+    def refund(self, state):
+        return as_plane(0.5 * state.holding * state.slip_directions)
+
+
+def test_half_the_friction_cancels_half_as_much():
+    state = spinning("rectangle", (0.01, 0.005))
+    (whole,), half = total_wrenches(state, (), ()), total_wrenches(state, (), (Half(),))[-1]
+    np.testing.assert_allclose(dataclasses.astuple(half), 0.5 * np.array(dataclasses.astuple(whole)), rtol=1e-6)
+
+
 # ------------------------------------------------------------------------------------------------------- rest
 
 
