@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,6 +30,9 @@ FORCE_BIN = 0.1  # s: forces are compared as means over such windows; single sam
 FORCE_SHARE = 0.05  # of the force: how well a rigid-body contact force is expected to be predicted
 LOADED = 0.3  # of the largest force: a window with more has contact
 TOUCH_SIGMAS = 3.0  # of the start pose
+STRIKE = 5e-3  # s: longer than two hard bodies touch
+STRIKE_SIGMAS = 3.0  # of a window's mean
+STRIKE_SHARE = 0.1  # of the largest force: ten samples, of which one has all of it, saw no strike but the touch
 DEFAULT_POSITION_STD = 5e-4  # m, where neither stated nor seen
 DEFAULT_ROTATION_STD = 5e-3  # rad
 DEFAULT_HAND_STD = 1e-4  # m
@@ -197,10 +201,11 @@ def _problem(
     start, start_std = _start_of(push, planar, noise, free=path is None)
     compared = np.ones(len(planar), dtype=bool)
     compared[0] = not (push.endpoint_only or path is None)
-    force_times, forces, white = _force_windows(push, noise)
+    force_times, forces, white, struck = _force_windows(push, noise)
+    told = ~(struck | _resting(push, force_times))
     if path is not None:
-        told = ~_touching(path, force_times, forces, white, float(start_std[0]))
-        force_times, forces, white = force_times[told], forces[told], white[told]
+        told &= ~_touching(path, force_times, forces, white, float(start_std[0]))
+    force_times, forces, white = force_times[told], forces[told], white[told]
     largest = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
     return PushProblem(
         name=push.name,
@@ -347,17 +352,52 @@ def _vertical_reach(hand: Hand) -> float:
     return 0.5 * hand.length if hand.length is not None else 0.0
 
 
-def _force_windows(push: Push, noise: Noise) -> tuple[Array, Array, Array]:
-    """Middles (k,) [s], means (k, 2) and deviations (k,) by the sensor's noise [N]."""
+def _force_windows(push: Push, noise: Noise) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Middles (k,) [s], means (k, 2) and deviations (k,) by the sensor's noise [N]; which windows saw a strike."""
     if push.force is None:
-        return np.zeros(0), np.zeros((0, 2)), np.zeros(0)
+        return np.zeros(0), np.zeros((0, 2)), np.zeros(0), np.zeros(0, dtype=bool)
     times, forces = push.force.times, push.force.forces[:, :2]
     index = np.floor((times - times[0]) / FORCE_BIN).astype(np.intp)
-    kept = [k for k in np.unique(index) if np.count_nonzero(index == k) >= 2]
-    middle = np.array([times[index == k].mean() for k in kept])
-    mean = np.array([forces[index == k].mean(axis=0) for k in kept]).reshape(-1, 2)
-    count = np.array([np.count_nonzero(index == k) for k in kept])
-    return middle, mean, noise.force / np.sqrt(count)
+    windows = [np.flatnonzero(index == k) for k in np.unique(index) if np.count_nonzero(index == k) >= 2]
+    middle = np.array([times[window].mean() for window in windows])
+    mean = np.array([forces[window].mean(axis=0) for window in windows]).reshape(-1, 2)
+    white = noise.force / np.sqrt([len(window) for window in windows])
+    return middle, mean, white, _struck([forces[window] for window in windows], mean, white)
+
+
+def _struck(samples: Sequence[Array], means: Array, white: Array) -> NDArray[np.bool_]:
+    """Windows (k,) whose mean a few samples make: a strike is over in so few, and what a sensor sees of it is chance.
+
+    Args:
+        samples: of each window, (n, 2) [N].
+        means: (k, 2) of the windows [N].
+        white: (k,) deviations of the means by the sensor's noise [N].
+    """
+    rest = np.array([_without_its_peak(window) for window in samples]).reshape(-1, 2)
+    usual = float(np.linalg.norm(rest, axis=1).max(initial=0.0))
+    struck: NDArray[np.bool_] = np.linalg.norm(means - rest, axis=1) > np.hypot(
+        STRIKE_SIGMAS * white, STRIKE_SHARE * usual
+    )
+    return struck
+
+
+def _without_its_peak(window: Array) -> Array:
+    """Mean (2,) of the samples (n, 2) of a window but the largest, as many as a strike lasts."""
+    peak = max(1, round(STRIKE / FORCE_BIN * len(window)))
+    mean: Array = window[np.argsort(np.linalg.norm(window, axis=1))[:-peak]].mean(axis=0)
+    return mean
+
+
+def _resting(push: Push, middles: Array) -> NDArray[np.bool_]:
+    """Windows (k,) that reach into the object's last rest, whose force tells nothing of the object.
+
+    A hand that stops against it may hold any force between none and what starts it again: friction holds as much.
+    """
+    rests = rest_segments(push)
+    if not rests or rests[-1].start == 0 or rests[-1].stop < len(push.object.times):
+        return np.zeros(len(middles), dtype=bool)
+    resting: NDArray[np.bool_] = middles + 0.5 * FORCE_BIN > push.object.times[rests[-1].start]
+    return resting
 
 
 def _touching(path: HandPath, middles: Array, forces: Array, stds: Array, start_std: float) -> NDArray[np.bool_]:

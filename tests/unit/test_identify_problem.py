@@ -355,3 +355,41 @@ def test_without_forces_there_are_no_windows(recording):
 def test_the_table_of_the_cell_is_the_recorded_one(recording):
     moved = replace(recording, table=Table(size=(1.0, 0.4), centre=(0.2, -0.1)))
     np.testing.assert_allclose(spec_of(moved, None).table, [[-0.3, -0.3], [0.7, 0.1]])
+
+
+def of_a_stop(recording, *, last_rests):
+    """The first push, its force 2 N throughout, the object standing still in the last half second or not."""
+    push = recording.pushes[0]
+    times = push.object.times
+    moving = np.minimum(times, times[-1] - 0.5) if last_rests else times
+    positions = np.column_stack([0.1 * (moving - times[0]), 0 * times, 0 * times + 0.03])
+    positions[:, :2] += 3e-4 * np.random.default_rng(0).standard_normal((len(times), 2))
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1))
+    stopped = replace(push, object=PoseStream(times=times, positions=positions, quaternions=upright))
+    force = ForceStream(times=times, forces=np.tile([2.0, 0.0, 0.0], (len(times), 1)))
+    return first(replace(recording, pushes=(replace(stopped, force=force), *recording.pushes[1:])))
+
+
+def test_the_force_on_an_object_at_rest_is_left_out(recording):
+    """A hand that leans against it may hold any force that friction bears."""
+    stopped, moving = (of_a_stop(recording, last_rests=rests) for rests in (True, False))
+    assert len(moving.force_times) - len(stopped.force_times) in (5, 6)
+    assert stopped.force_times.max() < stopped.end - 0.5
+
+
+@pytest.mark.parametrize("rate", [100.0, 1000.0])
+def test_windows_with_a_strike_are_left_out(recording, rate):
+    """Of a strike of five milliseconds a sensor sees one sample or none, or its own filter."""
+
+    def struck(seconds, size=30.0):
+        def force(t):
+            strike = size * (np.abs(t - t[0] - 0.55) < 0.5 * seconds)
+            return np.column_stack([2.0 + strike, 0 * t, 0 * t])
+
+        return first(with_forces(recording, force, rate=rate))
+
+    plain, once, long = struck(0.0), struck(0.004), struck(0.08, 4.0)
+    lost = set(np.round(plain.force_times, 3)) - set(np.round(once.force_times, 3))
+    assert len(lost) == 1
+    np.testing.assert_allclose(once.forces, 2.0 * np.eye(2)[[0] * len(once.forces)])
+    assert len(long.force_times) == len(plain.force_times)  # a hard push that lasts is a force
