@@ -139,6 +139,8 @@ class PushWorld:
         log, forces, last = self._steps(actual, begin, stop, every, moment, stops=duration is None)
         rested = last < len(log) - 1
         log[last + 1 :] = log[last]
+        seen = (last - 1) // every  # the last sample of force
+        forces[seen + 1 :] = forces[seen]  # friction holds what a tip leans with
         log[:begin] = log[begin]
         kept = min(samples, math.ceil(last / every) + round(rest / sample_time)) if duration is None else samples
         grid_poses = self._poses(log, pose)

@@ -158,6 +158,15 @@ def test_hand_carries_what_friction_takes():
     assert abs(motion.forces[motion.times < 0.1]).max() == 0
 
 
+def test_a_hand_that_stops_slowly_leans_on_at_rest():
+    lag = fx.ActuatorLag(time_constant=0.03)
+    motion = push(lag, path=central_push(speed=0.03, seconds=0.8), sample_time=0.005, rest=0.1)
+    still = motion.forces[-10:, 0]  # of the time that is no longer simulated
+    assert motion.rested
+    assert still[0] == still[-1]
+    assert 0.1 * MU * MASS * GRAVITY < still[0] < 1.001 * MU * MASS * GRAVITY
+
+
 # ------------------------------------------------------------------------------------------------------------ effects
 
 
