@@ -250,6 +250,9 @@ class Growth:
 def worth_adding(base: Fitted, last: Fitted, candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
     """The candidates, the one to add first: the simplest of the best, or the best; none where neither will do.
 
+    Where left-out pushes are unsure of both, one that they confirm and that explains all is the answer, even if it
+    gains less: one push may make the most of an effect that the others deny.
+
     What is a hundredth of what the effects before it explain may be no more than the error of their laws, unless they
     leave more than such an error.
     """
@@ -257,7 +260,9 @@ def worth_adding(base: Fitted, last: Fitted, candidates: Sequence[Candidate]) ->
         return ()
     least = 0.0 if unexplained(base, last) else A_LAW * float((push_scores(last) - push_scores(base)).sum())
     best = max((c for c in candidates if not c.degenerate), key=lambda c: c.gain, default=candidates[0])
-    for one in (candidates[0], best):
+    answers = [c for c in candidates if c.accepted and not unexplained(base, c.fitted)]
+    surest = max(answers, key=lambda c: c.gain, default=best)
+    for one in (candidates[0], best, *(() if best.accepted else (surest,))):
         if worthwhile(last, one) and one.gain > least:
             return (one, *(c for c in candidates if c is not one))
     return ()

@@ -15,6 +15,8 @@ from physid_drake.effects.places import grid_of_places
 
 Array = NDArray[np.float64]
 WEAKEST = 1e-9  # N/m: a spring weaker than this has no anchor
+SHORT = 0.1  # m: of a cable beside a table, at least as likely
+PULL = 20.0  # times what friction holds: a stiff cable that is slack nearly everywhere
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -68,15 +70,23 @@ class Tether(Effect):
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
-        """Stiffness, the force at the region's middle, and the rest length: linear where the rest length is 0."""
+        """Stiffness, its pull at the region's middle if there were no rest length, and the rest length.
+
+        The wrench is linear in the first three where the rest length is 0, and a fit that begins there finds a cable
+        that is slack over a part of the table, or at its middle.
+        """
         reach = float(np.max(around.region[1] - around.region[0]))
-        force, most = around.slight, 2.0 * around.friction * around.weight
+        force, most = around.slight, PULL * around.friction * around.weight
         return (
             Coordinate(name="stiffness", step=2.0 * force / reach, lower=0.0),
             Coordinate(name="force_x", step=force, lower=-most, upper=most),
             Coordinate(name="force_y", step=force, lower=-most, upper=most),
             Coordinate(
-                name="rest_length", step=0.02 * reach, lower=0.0, upper=max(2.0 * reach, 1.0), std=0.3 * reach
+                name="rest_length",
+                step=0.02 * reach,
+                lower=0.0,
+                upper=max(2.0 * reach, 1.0),
+                std=max(0.3 * reach, SHORT),
             ),
         )
 
@@ -87,16 +97,13 @@ class Tether(Effect):
 
     @classmethod
     def at(cls, point: Array, around: Surroundings) -> Tether:
-        """The spring whose pull at the region's middle is the chart's force."""
+        """The spring whose pull at the region's middle would be the chart's force if it had no rest length."""
         stiffness, fx, fy, rest = point.tolist()
         if stiffness == fx == fy == 0.0:
             return cls(rest_length=rest)
         middle = 0.5 * (around.region[0] + around.region[1])
         k = max(stiffness, WEAKEST)
-        pull = math.hypot(fx, fy)
-        # Taut at the middle: pull = k (d - rest), towards the anchor.
-        stretch = 1.0 + (k * rest / pull if pull > 0.0 else 0.0)
-        x, y = middle + stretch * np.array([fx, fy]) / k
+        x, y = middle + np.array([fx, fy]) / k
         return cls(stiffness=k, x=float(x), y=float(y), rest_length=rest)
 
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:

@@ -77,6 +77,16 @@ def test_nothing_is_added_that_pushes_do_not_confirm(before):
     assert grow.worth_adding(before, before, ()) == ()
 
 
+ONE_PUSH = [300.0, -9.0, -9.0, -9.0, -9.0, -9.0, -9.0, -9.0]
+
+
+@pytest.mark.parametrize(("left", "added"), [(1.6, ["uneven_support", "magnet"]), (2.4, [])])
+def test_what_pushes_confirm_and_explains_them_goes_before_what_one_push_makes_the_most_of(before, left, added):
+    odd, sure = tried("magnet", ONE_PUSH), tried("uneven_support", [6.0] * 8, chi2=left)
+    assert odd.gain > sure.gain
+    assert [c.name for c in grow.worth_adding(before, before, (odd, sure))] == added
+
+
 @pytest.mark.parametrize(
     ("explained", "left", "added"), [(7000.0, 1.6, True), (9000.0, 1.6, False), (9000.0, 6.0, True)]
 )
