@@ -140,8 +140,15 @@ def _slosh(rng: Rng, scene: Scene) -> Knob:
 
 
 def _tether(rng: Rng, scene: Scene) -> Knob:
-    (x, y), rest = _place(rng, 0.3), float(rng.choice([0.0, rng.uniform(0.0, 0.1)]))
-    limit = 0.6 * _hold(scene) / 0.4
+    """A spring, a cable that is taut nearly everywhere, or one that is slack up to about the middle of the table."""
+    x, y = _place(rng, 0.3)
+    far = math.hypot(x, y)
+    rest, stretch = (
+        (0.0, 0.4),
+        (float(rng.uniform(0.0, 0.1)), 0.4),
+        (max(0.02, far + float(rng.uniform(-0.06, 0.03))), 0.1),
+    )[int(rng.integers(3))]
+    limit = 0.6 * _hold(scene) / stretch
     return Knob(at=lambda a: world.Tether(stiffness=a, x=x, y=y, rest_length=rest), limit=limit)
 
 

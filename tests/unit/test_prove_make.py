@@ -14,6 +14,7 @@ from physid_drake.errors import ProofError
 from physid_drake.prove import make, mujoco_world
 from physid_drake.prove.effects import catalogue as fx
 from physid_drake.prove.effects.effect import parameters_of
+from physid_drake.prove.knobs import draw_knob
 from physid_drake.prove.mujoco_world import PushWorld
 from physid_drake.prove.scene import draw_scene
 from physid_drake.prove.world_plan import Plan
@@ -90,6 +91,15 @@ def test_a_world_is_made_again_bit_for_bit_and_tells_nothing(tmp_path, short_sce
             error = push_.object.planar - exact
             assert np.abs(error[:, :2]).max() < 6 * truth["noise"]["position"]
             assert len(exact) == len(push_.object)
+
+
+def test_tethers_are_springs_and_cables_and_some_cables_are_slack_in_the_middle():
+    scene = draw_scene(np.random.default_rng(0))
+    knobs = [draw_knob("tether", np.random.default_rng([1, k]), scene) for k in range(60)]
+    drawn = [knob.at(knob.limit) for knob in knobs]
+    slack = [np.hypot(one.x, one.y) < one.rest_length for one in drawn]
+    assert 10 <= sum(one.rest_length == 0.0 for one in drawn) <= 30
+    assert 5 <= sum(slack) <= 20
 
 
 def test_parameters_are_plain_numbers():
