@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import CellConfig, HandPath, Start
 from physid_drake.cell.hand_fit import fit_hand_paths, stream_std
 from physid_drake.errors import RecordingError
+from physid_drake.identify.force_windows import force_windows
 from physid_drake.recording import Box as BoxShape
 from physid_drake.recording import Cylinder as CylinderShape
 from physid_drake.recording import (
@@ -26,13 +26,6 @@ from physid_drake.recording import (
 
 Array = NDArray[np.float64]
 
-FORCE_BIN = 0.1  # s: forces are compared as means over such windows; single samples of a stiff contact chatter
-FORCE_SHARE = 0.05  # of the force: how well a rigid-body contact force is expected to be predicted
-LOADED = 0.3  # of the largest force: a window with more has contact
-TOUCH_SIGMAS = 3.0  # of the start pose
-STRIKE = 5e-3  # s: longer than two hard bodies touch
-STRIKE_SIGMAS = 3.0  # of a window's mean
-STRIKE_SHARE = 0.1  # of the largest force: ten samples, of which one has all of it, saw no strike but the touch
 DEFAULT_POSITION_STD = 5e-4  # m, where neither stated nor seen
 DEFAULT_ROTATION_STD = 5e-3  # rad
 DEFAULT_HAND_STD = 1e-4  # m
@@ -201,12 +194,7 @@ def _problem(
     start, start_std = _start_of(push, planar, noise, free=path is None)
     compared = np.ones(len(planar), dtype=bool)
     compared[0] = not (push.endpoint_only or path is None)
-    force_times, forces, white, struck = _force_windows(push, noise)
-    told = ~(struck | _resting(push, force_times))
-    if path is not None:
-        told &= ~_touching(path, force_times, forces, white, float(start_std[0]))
-    force_times, forces, white = force_times[told], forces[told], white[told]
-    largest = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
+    forces = force_windows(push, path, noise.force, float(start_std[0]))
     return PushProblem(
         name=push.name,
         order=order,
@@ -219,9 +207,9 @@ def _problem(
         hand_axes=np.eye(2) if hand is None else _plane_axes(hand.quaternions),
         times=push.object.times[compared].copy(),
         poses=planar[compared].copy(),
-        force_times=force_times,
-        forces=forces,
-        force_std=np.hypot(white, FORCE_SHARE * largest),
+        force_times=forces.middles,
+        forces=forces.means,
+        force_std=forces.stds,
     )
 
 
@@ -350,70 +338,3 @@ def _plane_axes(quaternions: Array) -> Array:
 def _vertical_reach(hand: Hand) -> float:
     """Half the height over which the tip is as wide as its radius [m]."""
     return 0.5 * hand.length if hand.length is not None else 0.0
-
-
-def _force_windows(push: Push, noise: Noise) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
-    """Middles (k,) [s], means (k, 2) and deviations (k,) by the sensor's noise [N]; which windows saw a strike."""
-    if push.force is None:
-        return np.zeros(0), np.zeros((0, 2)), np.zeros(0), np.zeros(0, dtype=bool)
-    times, forces = push.force.times, push.force.forces[:, :2]
-    index = np.floor((times - times[0]) / FORCE_BIN).astype(np.intp)
-    windows = [np.flatnonzero(index == k) for k in np.unique(index) if np.count_nonzero(index == k) >= 2]
-    middle = np.array([times[window].mean() for window in windows])
-    mean = np.array([forces[window].mean(axis=0) for window in windows]).reshape(-1, 2)
-    white = noise.force / np.sqrt([len(window) for window in windows])
-    return middle, mean, white, _struck([forces[window] for window in windows], mean, white)
-
-
-def _struck(samples: Sequence[Array], means: Array, white: Array) -> NDArray[np.bool_]:
-    """Windows (k,) whose mean a few samples make: a strike is over in so few, and what a sensor sees of it is chance.
-
-    Args:
-        samples: of each window, (n, 2) [N].
-        means: (k, 2) of the windows [N].
-        white: (k,) deviations of the means by the sensor's noise [N].
-    """
-    rest = np.array([_without_its_peak(window) for window in samples]).reshape(-1, 2)
-    usual = float(np.linalg.norm(rest, axis=1).max(initial=0.0))
-    struck: NDArray[np.bool_] = np.linalg.norm(means - rest, axis=1) > np.hypot(
-        STRIKE_SIGMAS * white, STRIKE_SHARE * usual
-    )
-    return struck
-
-
-def _without_its_peak(window: Array) -> Array:
-    """Mean (2,) of the samples (n, 2) of a window but the largest, as many as a strike lasts."""
-    peak = max(1, round(STRIKE / FORCE_BIN * len(window)))
-    mean: Array = window[np.argsort(np.linalg.norm(window, axis=1))[:-peak]].mean(axis=0)
-    return mean
-
-
-def _resting(push: Push, middles: Array) -> NDArray[np.bool_]:
-    """Windows (k,) that reach into the object's last rest, whose force tells nothing of the object.
-
-    A hand that stops against it may hold any force between none and what starts it again: friction holds as much.
-    """
-    rests = rest_segments(push)
-    if not rests or rests[-1].start == 0 or rests[-1].stop < len(push.object.times):
-        return np.zeros(len(middles), dtype=bool)
-    resting: NDArray[np.bool_] = middles + 0.5 * FORCE_BIN > push.object.times[rests[-1].start]
-    return resting
-
-
-def _touching(path: HandPath, middles: Array, forces: Array, stds: Array, start_std: float) -> NDArray[np.bool_]:
-    """Windows (k,) about the first touch, whose force tells nothing of the object.
-
-    A slow hand meets an object whose place the tracker knows to ``start_std`` [m] that much earlier or later: there
-    the force jumps between nothing and all, and tells nothing but the gap. A fast one strikes it for a few
-    milliseconds, and how much of that peak a sensor's samples catch is chance.
-    """
-    sizes = np.linalg.norm(forces, axis=1)
-    loaded: NDArray[np.bool_] = sizes > np.maximum(LOADED * sizes.max(initial=0.0), stds)
-    if not loaded.any() or loaded[0]:
-        return np.zeros(len(middles), dtype=bool)
-    touch = float(middles[np.argmax(loaded)])
-    way = path.positions(np.array([touch, touch + 2.0 * FORCE_BIN]))
-    speed = float(np.linalg.norm(way[1] - way[0])) / (2.0 * FORCE_BIN)
-    unsure = TOUCH_SIGMAS * start_std / max(speed, 1e-6)
-    near: NDArray[np.bool_] = np.abs(middles - touch) < unsure + 0.5 * FORCE_BIN
-    return near

@@ -16,6 +16,7 @@ from physid_drake.cell import Cell, Motion, Outcome
 from physid_drake.effects import Effect
 from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
 from physid_drake.errors import TippedError
+from physid_drake.identify.force_windows import WINDOW
 from physid_drake.identify.nuisance import Nuisance, apply_nuisance
 from physid_drake.identify.problem import CellSpec, PushProblem
 from physid_drake.identify.theta import ThetaMap
@@ -112,10 +113,10 @@ def predict(spec: CellSpec, thetas: ThetaMap, task: Task) -> Prediction | None:
 
 
 def _window_forces(motion: Motion, middles: Array) -> Array:
-    """Mean forces (k, 2) over windows of 0.1 s about the middles."""
+    """Mean forces (k, 2) over the windows about the middles."""
     if not len(middles):
         return np.zeros((0, 2))
-    offsets = np.linspace(-0.045, 0.045, 10)
+    offsets = WINDOW * np.linspace(-0.45, 0.45, 10)
     samples = motion.forces_at((middles[:, None] + offsets).ravel())
     means: Array = samples[:, :2].reshape(len(middles), len(offsets), 2).mean(axis=1)
     return means

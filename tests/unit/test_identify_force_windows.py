@@ -1,0 +1,127 @@
+"""Which means of recorded forces are compared: not those of touches, strikes and rests."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from runs import shipped_pushes
+
+from physid_drake.cell.hand_path import straight_path
+from physid_drake.identify.force_windows import SHARE, _touching
+from physid_drake.identify.problem import Noise, problems_of
+from physid_drake.recording import ForceStream, PoseStream
+
+QUIET = Noise(position=3e-4, rotation=3e-3, hand=5e-5, force=0.02, correlation=0.0, source={})
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return shipped_pushes(3)
+
+
+def first(recording):
+    return problems_of(recording, QUIET, 0.03)[0]
+
+
+def with_forces(recording, force_of, rate=100.0):
+    def add(push):
+        times = np.arange(push.hand.times[0], push.hand.times[-1], 1.0 / rate)
+        return replace(push, force=ForceStream(times=times, forces=force_of(times - times[0])))
+
+    return replace(recording, pushes=tuple(add(push) for push in recording.pushes))
+
+
+def test_forces_are_means_over_windows(recording):
+    # Loaded from the start, so that no window is that of a touch.
+    problem = first(with_forces(recording, lambda t: np.column_stack([10.0 * t, 0.0 * t + 20.0, 0.0 * t + 9.0])))
+    middles = problem.force_times
+    np.testing.assert_allclose(middles - middles[0], 0.1 * np.arange(len(middles)), atol=0.006)
+    start = with_forces(recording, lambda t: np.zeros((len(t), 3))).pushes[0].force.times[0]
+    np.testing.assert_allclose(problem.forces[:, 0], 10.0 * (problem.force_times - start), atol=1e-9)
+    np.testing.assert_allclose(problem.forces[:, 1], 20.0)
+    largest = np.linalg.norm(problem.forces, axis=1).max()
+    np.testing.assert_allclose(problem.force_std[0], np.hypot(0.02 / np.sqrt(10), SHARE * largest), rtol=0.01)
+
+
+def test_a_window_of_one_sample_is_left_out(recording):
+    assert first(with_forces(recording, lambda t: np.zeros((len(t), 3)), rate=9.0)).force_times.size == 0
+
+
+MIDDLES = 0.05 + 0.1 * np.arange(90)
+SLOW = straight_path(np.zeros(2), np.array([0.02, 0.0]), 0.0, 10.0)  # 2 mm/s: half a millimetre in 0.25 s
+
+
+def touched_after(time):
+    return np.column_stack([np.where(time < MIDDLES, 4.0, 0.0), np.zeros(90)])
+
+
+def test_a_slow_touch_whose_time_the_tracker_does_not_tell_is_left_out():
+    unsure = _touching(SLOW, MIDDLES, touched_after(3.0), np.full(90, 0.2), 5e-4)
+    # Three standard deviations are 0.75 s, and half a window, on both sides of the touch at 3.05 s.
+    np.testing.assert_array_equal(unsure, np.abs(MIDDLES - 3.05) < 0.79)
+
+
+def test_of_a_touch_that_the_tracker_tells_only_its_own_window_is_left_out():
+    struck = _touching(SLOW, MIDDLES, touched_after(3.0), np.full(90, 0.2), 1e-5)
+    np.testing.assert_array_equal(np.flatnonzero(struck), [30])  # of the touch at 3.05 s
+    assert not _touching(SLOW, MIDDLES, touched_after(0.0), np.full(90, 0.2), 5e-4).any()  # from the start
+
+
+def test_the_peak_of_a_strike_is_no_measure_of_the_force_that_follows(recording):
+    def struck(peak):
+        return first(
+            with_forces(
+                recording,
+                lambda t: np.column_stack(
+                    [2.0 * (t > t[0] + 0.2) + peak * (abs(t - t[0] - 0.25) < 0.03), 0 * t, 0 * t]
+                ),
+            )
+        )
+
+    plain, hard = struck(0.0), struck(50.0)
+    np.testing.assert_allclose(hard.force_std, plain.force_std)
+    np.testing.assert_allclose(hard.forces, plain.forces)
+
+
+def test_without_forces_there_are_no_windows(recording):
+    problem = first(recording)
+    assert problem.forces.shape == (0, 2)
+    assert problem.force_std.shape == problem.force_times.shape == (0,)
+
+
+def of_a_stop(recording, *, last_rests):
+    """The first push, its force 2 N throughout, the object standing still in the last half second or not."""
+    push = recording.pushes[0]
+    times = push.object.times
+    moving = np.minimum(times, times[-1] - 0.5) if last_rests else times
+    positions = np.column_stack([0.1 * (moving - times[0]), 0 * times, 0 * times + 0.03])
+    positions[:, :2] += 3e-4 * np.random.default_rng(0).standard_normal((len(times), 2))
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1))
+    stopped = replace(push, object=PoseStream(times=times, positions=positions, quaternions=upright))
+    force = ForceStream(times=times, forces=np.tile([2.0, 0.0, 0.0], (len(times), 1)))
+    return first(replace(recording, pushes=(replace(stopped, force=force), *recording.pushes[1:])))
+
+
+def test_the_force_on_an_object_at_rest_is_left_out(recording):
+    """A hand that leans against it may hold any force that friction bears."""
+    stopped, moving = (of_a_stop(recording, last_rests=rests) for rests in (True, False))
+    assert len(moving.force_times) - len(stopped.force_times) in (5, 6)
+    assert stopped.force_times.max() < stopped.end - 0.5
+
+
+@pytest.mark.parametrize("rate", [100.0, 1000.0])
+def test_windows_with_a_strike_are_left_out(recording, rate):
+    """Of a strike of five milliseconds a sensor sees one sample or none, or its own filter."""
+
+    def struck(seconds, size=30.0):
+        def force(t):
+            strike = size * (np.abs(t - t[0] - 0.55) < 0.5 * seconds)
+            return np.column_stack([2.0 + strike, 0 * t, 0 * t])
+
+        return first(with_forces(recording, force, rate=rate))
+
+    plain, once, long = struck(0.0), struck(0.004), struck(0.08, 4.0)
+    lost = set(np.round(plain.force_times, 3)) - set(np.round(once.force_times, 3))
+    assert len(lost) == 1
+    np.testing.assert_allclose(once.forces, 2.0 * np.eye(2)[[0] * len(once.forces)])
+    assert len(long.force_times) == len(plain.force_times)  # a hard push that lasts is a force
