@@ -170,6 +170,11 @@ def test_a_hand_that_stops_slowly_leans_on_at_rest():
 # ------------------------------------------------------------------------------------------------------------ effects
 
 
+def moves(plain, poses):
+    length = min(len(plain), len(poses))
+    return np.abs(poses[:length] - plain[:length]).max() > 1e-5
+
+
 @pytest.mark.parametrize("name", [*fx.CATALOGUED, *fx.OTHERS])
 def test_null_values_change_no_bit_and_strength_does(name):
     effect = (fx.CATALOGUED | fx.OTHERS)[name]
@@ -178,10 +183,9 @@ def test_null_values_change_no_bit_and_strength_does(name):
     plain = push(**run).poses
     assert np.array_equal(push(effect(), **run).poses, plain)
     scene = replace(draw_scene(np.random.default_rng(0)), plan=PLAN)
-    knob = draw_knob(name, np.random.default_rng(5), scene)
-    moved = push(knob.at(0.8 * knob.limit), **run).poses
-    length = min(len(plain), len(moved))
-    assert np.abs(moved[:length] - plain[:length]).max() > 1e-5
+    # A patch, a seam or a cable may lie where this push does not feel it.
+    drawn = (draw_knob(name, np.random.default_rng(seed), scene) for seed in (5, 6, 7))
+    assert any(moves(plain, push(knob.at(0.8 * knob.limit), **run).poses) for knob in drawn)
 
 
 def test_tilt_lengthens_the_way_down():
