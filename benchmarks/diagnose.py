@@ -41,7 +41,7 @@ def main():
     figures = figures_of(outcomes)
     faults = sorted((o for o in outcomes if o.fault is not None), key=lambda o: -o.size)
     rows = [(o.id, truth_of(o), f"{o.size:.1f}", said_of(o)) for o in faults]
-    console = Console(width=140)
+    console = Console(width=140, markup=False)
     console.print(shown(f"{len(outcomes)} worlds of {len(folders)} proofs", MAIN, table(figures)))
     console.print(shown("single effects by size", POWER, power_table(figures)))
     console.print(shown("answers that are not right", FAULTS, rows))

@@ -11,16 +11,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from rich.console import Console
-
 from physid_drake.errors import ConfigError, OutputError, PhysidError
 from physid_drake.recording import read_recording
 
 if TYPE_CHECKING:
     Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
-
-NARROWEST_TABLE = 100
-"""Columns that a table is given where the output is no terminal."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -73,12 +68,10 @@ def _register_inspect(subparsers: Subparsers) -> None:
 def _run_inspect(arguments: argparse.Namespace) -> int:
     # Matplotlib takes half a second to import, which the other commands need not wait for.
     from physid_drake.report.inspection import draw_pushes, inspection_table, warning_lines  # noqa: PLC0415
+    from physid_drake.report.terminal import terminal  # noqa: PLC0415
 
     recording = read_recording(arguments.folder)
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=max(NARROWEST_TABLE, console.width))
-    console.print(inspection_table(recording))
+    terminal().print(inspection_table(recording))
     for line in warning_lines(recording):
         warnings.warn(line, UserWarning, stacklevel=1)
     if arguments.out is not None:

@@ -32,6 +32,7 @@ from physid_drake.report.progress import progress_bar
 from physid_drake.report.result import result_json
 from physid_drake.report.stage import ShownMotion, Stage
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
+from physid_drake.report.terminal import terminal
 from physid_drake.run_diagnose import ALPHA, STATE, recording_folder, run_case, show, write
 from physid_drake.run_folder import RunFolder
 from physid_drake.run_plan import forget as forget_plan
@@ -46,7 +47,7 @@ PACKAGES = ("physid_drake", "drake", "numpy", "scipy", "scikit-learn")
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the main job; returns the exit status: 0 done, 1 an error of the input or output, 130 interrupted."""
     arguments = _parser().parse_args(argv)
-    console = Console()
+    console = terminal()
     try:
         run(arguments, console)
     except PhysidError as error:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from pydrake.geometry import Meshcat
 from rich.console import Console
+from rich.text import Text
 
 from physid_drake.diagnose import Case, Diagnosis, Evidence, case_of, cell_config, diagnose, model_of
 from physid_drake.diagnose.leaving import fit_that_leaves
@@ -23,6 +24,7 @@ from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_ta
 from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.stage import ShownMotion, Stage
+from physid_drake.report.terminal import terminal
 from physid_drake.resources import shipped
 from physid_drake.run_folder import RunFolder
 
@@ -49,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"--pushes must be at least 1, but is {arguments.pushes}.")
     for name in arguments.effects or ():
         effect_named(name)
-    console = Console()
+    console = terminal()
     recording = read_recording(recording_folder(arguments.recording))
     config = cell_config(recording, contact=arguments.contact, time_step=arguments.time_step)
     case = case_of(recording, config, ThetaConfig(), jobs=arguments.jobs, most=arguments.pushes)
@@ -99,7 +101,7 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
     """Print the diagnosis."""
     console.print()
     p_value = f"p = {diagnosis.p_value:.2g}" if diagnosis.p_value > 0.0 else "p < 1e-300"
-    console.print(f"[bold]{diagnosis.verdict}[/bold] ({p_value}). {diagnosis.sentence}")
+    console.print(Text.assemble((diagnosis.verdict, "bold"), f" ({p_value}). {diagnosis.sentence}"))
     if diagnosis.location is not None:
         console.print(f"Where: {diagnosis.location.statement}.")
     console.print(f"Left over: {diagnosis.left}.")

@@ -16,8 +16,9 @@ from physid_drake.experiments.values import Result
 from physid_drake.report.experiment import result_figure, result_json, result_markdown, rich_table, table_csv
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.svg import drawn
+from physid_drake.report.terminal import terminal
 from physid_drake.run_folder import RunFolder
-from physid_drake.run_prove import ended_softly, versions, wide_console
+from physid_drake.run_prove import ended_softly, versions
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -35,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     out: Path = arguments.out or Path("experiments") / (arguments.name + ("_quick" if arguments.quick else ""))
     folder = claim(arguments.name, experiment, out)
-    console = wide_console()
+    console = terminal()
     with ended_softly(), progress_bar(console) as tick:
         records = run_all(experiment, folder, jobs=arguments.jobs, tick=tick)
     result = experiment.result(records)

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 from physid_drake.errors import ConfigError
 from physid_drake.identify.polish import scatter_freedom
@@ -24,6 +23,7 @@ from physid_drake.policies import push_csv
 from physid_drake.report.plan import plan_json, plan_table, push_files
 from physid_drake.report.plan_page import plan_page, plan_png
 from physid_drake.report.progress import progress_bar
+from physid_drake.report.terminal import terminal
 from physid_drake.run_folder import RunFolder
 
 FEWEST_TRIALS, TRIALS_PER_SETTING = 24, 16  # of a search
@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         direction=None if arguments.direction is None else _radians("--direction", arguments.direction),
     )  # fmt: skip
     policy = policy_for(arguments.policy, model, start, goal, choices)
-    console = Console()
+    console = terminal()
     with progress_bar(console) as tick:
         made = plan(
             model, policy, DistanceToGoal(goal=goal), situation=Situation(start=start, order=learnt.pushes),

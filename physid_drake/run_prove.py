@@ -29,10 +29,10 @@ from physid_drake.report.proof import Proof, proof_json, proof_markdown, proof_t
 from physid_drake.report.proof_page import proof_page
 from physid_drake.report.proof_pictures import confusion_picture
 from physid_drake.report.svg import drawn
+from physid_drake.report.terminal import terminal
 from physid_drake.run_folder import RunFolder
 
 WORLDS, QUICK = 200, 10
-NARROWEST_TABLE = 120  # columns
 SETTINGS = "settings.json"
 Commander = Callable[..., tuple[str, ...]]
 """Recording, folder of the results, what must not be seen (one or more): the words of the command that diagnoses."""
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace, command: Commander = diagnose_command) ->
     worlds = _checked(arguments)
     out: Path = arguments.out or Path("proofs") / "_".join(filter(None, (f"seed_{arguments.seed}", arguments.kind)))
     folder = claim(out, {"seed": arguments.seed, "kind": arguments.kind})
-    console = wide_console()
+    console = terminal()
     names = [world_id(index, arguments.seed) for index in range(worlds)]
     if arguments.open:
         seal = read_seal(out)
@@ -72,12 +72,6 @@ def run(arguments: argparse.Namespace, command: Commander = diagnose_command) ->
         soft_wrap=True,
     )
     return 0
-
-
-def wide_console() -> Console:
-    """A console whose tables are legible where the output is no terminal."""
-    console = Console()
-    return console if console.is_terminal else Console(width=max(NARROWEST_TABLE, console.width))
 
 
 def _checked(arguments: argparse.Namespace) -> int:

@@ -20,8 +20,9 @@ from physid_drake.prove.shapes import height_of
 from physid_drake.recording import MeshShape, read_recording
 from physid_drake.report.real import pressure_picture, real_json, real_markdown, real_table
 from physid_drake.report.svg import drawn
+from physid_drake.report.terminal import terminal
 from physid_drake.run_folder import RunFolder
-from physid_drake.run_prove import Commander, check_running, claim, ended_softly, run_tasks, wide_console
+from physid_drake.run_prove import Commander, check_running, claim, ended_softly, run_tasks
 
 
 def run_real(arguments: argparse.Namespace, command: Commander = diagnose_command) -> int:
@@ -40,7 +41,7 @@ def run_real(arguments: argparse.Namespace, command: Commander = diagnose_comman
     cases = chosen_cases(arguments.only)
     out: Path = arguments.out or Path("proofs") / "real"
     folder = claim(out, {"real": True, "seed": arguments.seed, "pushes": arguments.pushes})
-    console = wide_console()
+    console = terminal()
     with ended_softly():
         reasons = {c.name: prepare(c, published, out, pushes=arguments.pushes, seed=arguments.seed) for c in cases}
         there = [case for case in cases if reasons[case.name] is None]

@@ -8,7 +8,6 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from rich.table import Table
-from rich.text import Text
 
 from physid_drake.recording.statistics import NoiseEstimate, PushSummary, estimate_noise, summarise
 from physid_drake.recording.values import Array, Box, Cylinder, Prism, Recording, Shape
@@ -19,8 +18,8 @@ _MANY_PUSHES = 12
 def inspection_table(recording: Recording) -> Table:
     """One row for each push, speeds at their largest, and the noise of all in the caption."""
     table = Table(
-        title=Text(recording.name),
-        caption=Text(_noise_line(estimate_noise(recording))),
+        title=recording.name,
+        caption=_noise_line(estimate_noise(recording)),
         caption_justify="left",
     )
     table.add_column("push", no_wrap=True)
@@ -36,10 +35,9 @@ def inspection_table(recording: Recording) -> Table:
         "noise\n[deg]",
         "warn",
     ):
-        # As Text, since [s] would be read as a style.
-        table.add_column(Text(heading), justify="right")
+        table.add_column(heading, justify="right")
     for push in recording.pushes:
-        table.add_row(Text(push.name), *_cells(summarise(push)))
+        table.add_row(push.name, *_cells(summarise(push)))
     return table
 
 

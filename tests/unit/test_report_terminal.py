@@ -1,0 +1,29 @@
+"""What is printed is printed as it is: neither units nor names of pushes are markup."""
+
+from rich.table import Table
+
+from physid_drake.report.progress import progress_bar
+from physid_drake.report.terminal import NARROWEST, terminal
+
+WORDS = ("path [mm]", "wild[/b].csv", "[red]")
+
+
+def test_brackets_are_printed(capsys):
+    table = Table(title=WORDS[1], caption=WORDS[2])
+    table.add_column(WORDS[0])
+    table.add_row(WORDS[1])
+    console = terminal()
+    console.print(table)
+    console.print(*WORDS)
+    printed = capsys.readouterr().out
+    assert [printed.count(word) for word in WORDS] == [2, 3, 2]
+
+
+def test_a_bar_takes_any_name_for_its_stage():
+    with progress_bar(terminal()) as tick:
+        tick(WORDS[1], 1, 2)
+
+
+def test_a_file_has_room_for_a_table(capsys):
+    terminal().print("x" * NARROWEST)
+    assert capsys.readouterr().out == "x" * NARROWEST + "\n"
