@@ -52,7 +52,7 @@ SCORE_ERROR = 2.0  # nats: of a difference of gains, beside its standard error
 CHANCE = 0.05  # of all looks: what explains no more is not worth a word
 FEWEST_PUSHES = 3
 GOOD_PART = 0.25  # of the squared error: less is not worth a word
-NO_WORSE = 1.1  # times the plain model's error of pushes left out: a model with more of it is none
+BETTER = 1.2  # times: as much nearer has a model to simulate pushes that were left out than the plain one
 QUIET = 5e-5  # m: a tracker's noise that is no longer what hides the cell's own error
 OWN_POSITION, OWN_ROTATION = 2e-4, 2e-3  # m, rad: of left-out pushes, what the cell itself may be off by
 PART = "takes a part away, and leaves more than noise"
@@ -107,7 +107,8 @@ def _p_value(evidence: Evidence) -> float:
         return 1.0
     if evidence.detected is not None:
         return evidence.detected
-    return mismatch(evidence.plain, evidence.screening if evidence.steps else None)
+    confirmed_by_pushes = bool(evidence.steps) and _predicts(evidence)
+    return mismatch(evidence.plain, evidence.screening if confirmed_by_pushes else None)
 
 
 def _is_own_error(evidence: Evidence) -> bool:
@@ -129,17 +130,18 @@ def _verdict(evidence: Evidence, p_value: float, alpha: float, detectable: Seque
 
 
 def _predicts(evidence: Evidence) -> bool:
-    """Whether the last model, simulated, is no worse on pushes that were left out.
+    """Whether the last model, simulated, is visibly nearer to pushes that were left out than the plain one.
 
-    Effects and a friction that scatters may share what is missing, so that each push is likelier than before, and yet
-    comes out of the simulation further from where it was. The push that speaks most against the model is left out: an
-    object that is about to slip off the hand goes one way or the other for next to nothing.
+    Each push may be likelier than before and yet come out of the simulation no nearer to where it was: effects and a
+    friction that scatters share what is missing, or an effect took up the cell's own error. The push that speaks most
+    against the model is left out: an object that is about to slip off the hand goes one way or the other for next to
+    nothing.
     """
     before, after = (
         np.square(_errors(evidence.case, e).per_push) for e in (evidence.errors_before, evidence.errors_after)
     )
     others = np.arange(len(before)) != np.argmax(after - before)
-    return float(after[others].sum()) <= NO_WORSE**2 * float(before[others].sum())
+    return BETTER**2 * float(after[others].sum()) <= float(before[others].sum())
 
 
 def _explained(evidence: Evidence) -> bool:
@@ -308,8 +310,10 @@ def _why_fitted_in_vain(candidate: Candidate, named: set[str], evidence: Evidenc
         return "pushes that were left out do not confirm it"
     if _is_own_error(evidence):
         return "smaller than the cell's own error"
-    if named or not _predicts(evidence):
+    if named:
         return "predicts pushes that were left out worse"
+    if not _predicts(evidence):
+        return "pushes that were left out are simulated hardly better with it"
     return "pushes that were left out confirm it, but it leaves more than noise"
 
 
