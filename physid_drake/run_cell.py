@@ -40,6 +40,7 @@ from physid_drake.run_plan import write as write_plan
 from physid_drake.scenario import dump_scenario, load_scenario
 from physid_drake.scenario_schema import Scenario
 
+BELIEF = "belief.npz"  # of an interrupted identification
 SHOWN = 12  # pushes in the animation, held-out ones first
 PACKAGES = ("physid_drake", "drake", "numpy", "scipy", "scikit-learn")
 
@@ -88,7 +89,7 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     # Everything that can be refused is refused before anything is written.
     identifier = _identifier(scenario, recording, out)
     planner = None if arguments.no_plan else _planner(scenario, recording, identifier, console)
-    folder = RunFolder.open(out, dump_scenario(name, scenario))
+    folder = RunFolder.open(out, dump_scenario(name, scenario), states=(BELIEF, STATE))
     stage = None if arguments.no_view else _live(recording, console)
     result, plan = _identify(identifier, planner, scenario, recording, console)
     console.print()
@@ -106,11 +107,11 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     folder.write("page.html", page)
     folder.write("result.json", result_json(result, recording, scenario.seed, versions()))
     folder.write("model.yaml", identified_model(result, identifier.pool.spec, recording.name).dump())
-    folder.forget("belief.npz")
     console.print(f"written: result.json, page.html and model.yaml in {folder.path}")
     _keep_plan(plan, scenario, folder, console)
     if not arguments.no_diagnosis:
         _diagnose(scenario, recording, folder, console)
+    folder.forget(BELIEF)
     _keep_serving(arguments.no_view, stage, console)
 
 
@@ -132,7 +133,7 @@ def _diagnose(scenario: Scenario, recording: Recording, folder: RunFolder, conso
     write(folder, diagnosis, evidence, page="diagnosis.html")
     folder.forget(STATE)
     show(console, diagnosis)
-    console.print(f"written: diagnosis.json, diagnosis.html and model.yaml in {folder.path}")
+    console.print(f"written: diagnosis.json, diagnosis.html, scene.html and model.yaml in {folder.path}")
 
 
 def versions() -> dict[str, str]:
@@ -155,7 +156,7 @@ def _identifier(scenario: Scenario, recording: Recording, out: Path) -> Identifi
         search=scenario.search,
         held_out_share=scenario.held_out_share,
         seed=scenario.seed,
-        state=out / "belief.npz",
+        state=out / BELIEF,
     )
 
 

@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     settings = {"seed": arguments.seed, "alpha": arguments.alpha, "effects": arguments.effects,
                 "cell": dc.asdict(config), "recording": recording.name, "pushes": _fingerprint(case)}  # fmt: skip
     out = arguments.out or Path("diagnoses") / recording.name
-    folder = RunFolder.open(out, json.dumps(settings, indent=2) + "\n", name="settings.json", state=STATE)
+    folder = RunFolder.open(out, json.dumps(settings, indent=2) + "\n", name="settings.json", states=(STATE,))
     diagnosis, evidence = run_case(
         case, console, seed=arguments.seed, alpha=arguments.alpha, effects=arguments.effects,
         memory=Memory(folder.path / STATE),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,15 +19,15 @@ class RunFolder:
 
     @classmethod
     def open(
-        cls, path: Path, configuration: str, *, name: str = "config.yaml", state: str | None = "belief.npz"
+        cls, path: Path, configuration: str, *, name: str = "config.yaml", states: Sequence[str] = ()
     ) -> RunFolder:
-        """Make the folder, or go on in one; the state of a run with another configuration is dropped.
+        """Make the folder, or go on in one; the states of a run with another configuration are dropped.
 
         Args:
             path: of the folder.
             configuration: text that says what the run is; kept in the folder.
             name: of the file that keeps it.
-            state: of the file that an interrupted run goes on from; None if it cannot.
+            states: names of the files that an interrupted run goes on from.
 
         Raises:
             OutputError: if it cannot be written.
@@ -35,8 +36,9 @@ class RunFolder:
         try:
             path.mkdir(parents=True, exist_ok=True)
             config = path / name
-            if state is not None and config.exists() and config.read_text(encoding="utf-8") != configuration:
-                folder.forget(state)
+            if config.exists() and config.read_text(encoding="utf-8") != configuration:
+                for state in states:
+                    folder.forget(state)
         except (OSError, UnicodeDecodeError) as error:
             raise OutputError(f"output folder '{path}': cannot be written: {error}.") from error
         folder.write(name, configuration)

@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
     with_effects = outcome_under(made, full) if arguments.plain and full.effects else None
     folder = RunFolder.open(
         arguments.out or Path("plans") / model.recording, json.dumps(_settings(arguments), indent=2) + "\n",
-        name="settings.json", state=None,
+        name="settings.json",
     )  # fmt: skip
     write(folder, made, seed=arguments.seed, with_effects=with_effects)
     console.print(plan_table(made, with_effects=with_effects))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,10 +23,10 @@ def fit_that_leaves(diagnosis: Diagnosis, evidence: Evidence) -> Fitted:
     return evidence.final if diagnosis.effects else evidence.nearest
 
 
-def predicted(evidence: Evidence, fitted: Fitted, i: int) -> Array:
-    """Window means (w, 3) [m, m, rad] of push i, its own unknowns at zero and without the diagnosis' tolerances."""
-    features, push, own = evidence.case.features[i], fitted.pushes[i], fitted.own_dimension
-    return features.poses(features.recorded - push.residual + push.shared[:, :own] @ fitted.solution.beta[:own])
+def predicted(evidence: Evidence, errors: Sequence[Array], i: int) -> Array:
+    """Window means (w, 3) [m, m, rad] of push i, left out, of ``errors_before`` or ``errors_after``."""
+    features = evidence.case.features[i]
+    return features.poses(features.recorded - errors[i])
 
 
 def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:

@@ -52,7 +52,9 @@ def search_theta(case: Case, rng: np.random.Generator, tick: Tick) -> Array:
 
 
 def numerics(case: Case, state: State) -> tuple[Array, ...]:
-    """Per push (m, 2): how the rollout changes with half the time step and with the other contact model.
+    """Per push (m, 2): how the case's rollout changes with half its own ticks and with the other contact model.
+
+    The case is on ticks twice as long (``coarse``), so that ticks differ by a factor of four.
 
     The cell's own error has about the shape and the size of these; each push has an unknown multiple of them.
     """

@@ -53,7 +53,7 @@ MOST_ERRORS, MOST_STRIPS, MOST_RANKED = 4, 8, 8  # shown before the reader asks 
 
 
 def shown_pushes(diagnosis: Diagnosis, evidence: Evidence) -> list[ShownPush]:
-    """All pushes, recorded and as the models before and after have them."""
+    """All pushes, recorded and as the models before and after predict them, fitted to the others."""
     case, pushes = evidence.case, []
     for i, problem in enumerate(case.problems):
         free = (w.start for w in evidence.wrenches if w.push == i and w.phase == "free_slide")
@@ -62,8 +62,8 @@ def shown_pushes(diagnosis: Diagnosis, evidence: Evidence) -> list[ShownPush]:
                 name=problem.name,
                 times=case.features[i].middles,
                 recorded=case.features[i].poses(case.features[i].recorded),
-                before=predicted(evidence, evidence.nearest, i),
-                after=predicted(evidence, evidence.final, i) if diagnosis.effects else None,
+                before=predicted(evidence, evidence.errors_before, i),
+                after=predicted(evidence, evidence.errors_after, i) if diagnosis.effects else None,
                 released=next(free, None),
             )
         )
