@@ -130,18 +130,21 @@ def _verdict(evidence: Evidence, p_value: float, alpha: float, detectable: Seque
 
 
 def _predicts(evidence: Evidence) -> bool:
-    """Whether the last model, simulated, is visibly nearer to pushes that were left out than the plain one.
+    """Whether the last model comes visibly nearer to pushes that were left out than the plain one."""
+    return comes_nearer(evidence.case, evidence.errors_before, evidence.errors_after)
+
+
+def comes_nearer(case: Case, before: Sequence[Array], after: Sequence[Array]) -> bool:
+    """Whether errors (m_i,) of pushes that were left out, simulated, are visibly smaller than before.
 
     Each push may be likelier than before and yet come out of the simulation no nearer to where it was: effects and a
     friction that scatters share what is missing, or an effect took up the cell's own error. The push that speaks most
     against the model is left out: an object that is about to slip off the hand goes one way or the other for next to
     nothing.
     """
-    before, after = (
-        np.square(_errors(evidence.case, e).per_push) for e in (evidence.errors_before, evidence.errors_after)
-    )
-    others = np.arange(len(before)) != np.argmax(after - before)
-    return BETTER**2 * float(after[others].sum()) <= float(before[others].sum())
+    old, new = (np.square(_errors(case, errors).per_push) for errors in (before, after))
+    others = np.arange(len(old)) != np.argmax(new - old)
+    return BETTER**2 * float(new[others].sum()) <= float(old[others].sum())
 
 
 def _explained(evidence: Evidence) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from physid_drake.diagnose.conclude import class_of
+from physid_drake.diagnose.conclude import class_of, comes_nearer
 from physid_drake.diagnose.confirm import (
     A_LAW,
     EXPLAINED,
@@ -138,18 +138,30 @@ class Growth:
         return Grown(base=base, last=last, steps=tuple(steps), rejected=rejected)
 
     def pruned(self, grown: Grown) -> Grown:
-        """Without the effects that a later one made superfluous: they had stood in for what was still missing."""
+        """Without effects that are superfluous beside the others.
+
+        One that a later effect made so had stood in for what was still missing. One with which left-out pushes are
+        simulated no better took up what noise and the cell's own error leave.
+        """
         last, steps, made = grown.last, list(grown.steps), dict[str, Fitted]()
-        for k in reversed(range(len(steps) - 1)):
+        for k in reversed(range(len(steps))):
+            if len(steps) == 1:
+                break
             name = steps[k][0].name
             made[name] = without = self._without(name, last.fitted)
             gains = push_scores(last.fitted) - push_scores(without)
-            if not dc.replace(steps[k][0], fitted=last.fitted, gains=gains).accepted:
+            confirmed = dc.replace(steps[k][0], fitted=last.fitted, gains=gains).accepted
+            if not confirmed or not self._shows(without, last.fitted):
                 missed = [s for s in grown.base.signatures if s.kind.name == name]
                 last = Looked.at(without, (*last.signatures, *missed), self.rng)
                 made.clear()
                 del steps[k]
         return dc.replace(grown, last=last, steps=tuple(steps), without=made)
+
+    def _shows(self, without: Fitted, model: Fitted) -> bool:
+        """Whether a model simulates left-out pushes visibly better than one without an effect of it."""
+        before, after = (self.fitter.left_out(m) for m in (without, model))
+        return comes_nearer(self.fitter.case, before, after)
 
     def _without(self, name: str, model: Fitted) -> Fitted:
         """A model fitted again without one of its effects."""

@@ -26,10 +26,15 @@ def step(name):
 
 
 class Refits:
-    """Fits whose score depends on which effects are left."""
+    """Fits whose score, and the error of simulated left-out pushes, depend on which effects are left."""
 
-    def __init__(self, scores):
-        self.scores = scores
+    case = None
+
+    def __init__(self, scores, errors=()):
+        self.scores, self.errors = scores, dict(errors)
+
+    def left_out(self, model):
+        return self.errors.get(tuple(e.kind.name for e in model.state.effects), -model.scores[0])
 
     def fit(self, state, **how):
         names = tuple(e.kind.name for e in state.effects)
@@ -39,6 +44,7 @@ class Refits:
 @pytest.fixture
 def grown(monkeypatch):
     monkeypatch.setattr(grow, "push_scores", lambda one: one.scores)
+    monkeypatch.setattr(grow, "comes_nearer", lambda case, before, after: 1.2 * after <= before)
     monkeypatch.setattr(
         grow.Looked,
         "at",
@@ -106,15 +112,21 @@ def growth(fitter):
 
 
 def test_an_effect_that_a_later_one_makes_superfluous_is_taken_out(grown):
-    pruned = growth(Refits({("table_tilt",): -1.2})).pruned(grown)
+    pruned = growth(Refits({("magnet",): -9.0, ("table_tilt",): -1.2})).pruned(grown)
     assert names_of(pruned) == ["table_tilt"]
     assert [e.kind.name for e in pruned.last.fitted.state.effects] == ["table_tilt"]
 
 
 def test_two_effects_that_both_matter_stay(grown):
-    pruned = growth(Refits({("table_tilt",): -9.0})).pruned(grown)
+    pruned = growth(Refits({("magnet",): -9.0, ("table_tilt",): -9.0})).pruned(grown)
     assert names_of(pruned) == ["magnet", "table_tilt"]
     assert pruned.last is grown.last
+
+
+def test_an_effect_that_makes_no_simulated_push_better_is_taken_out(grown):
+    errors = {("magnet", "table_tilt"): 1.0, ("magnet",): 1.1}
+    pruned = growth(Refits({("magnet",): -9.0}, errors)).pruned(grown)
+    assert names_of(pruned) == ["magnet"]
 
 
 @pytest.fixture
