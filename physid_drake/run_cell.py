@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import platform
 import sys
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +32,7 @@ from physid_drake.report.stage import ShownMotion, Stage
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
 from physid_drake.report.terminal import terminal
 from physid_drake.run_diagnose import ALPHA, STATE, recording_folder, run_case, show, write
-from physid_drake.run_folder import RunFolder
+from physid_drake.run_folder import RunFolder, versions
 from physid_drake.run_plan import forget as forget_plan
 from physid_drake.run_plan import write as write_plan
 from physid_drake.scenario import dump_scenario, load_scenario
@@ -42,7 +40,6 @@ from physid_drake.scenario_schema import Scenario
 
 BELIEF = "belief.npz"  # of an interrupted identification
 SHOWN = 12  # pushes in the animation, held-out ones first
-PACKAGES = ("physid_drake", "drake", "numpy", "scipy", "scikit-learn")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -134,11 +131,6 @@ def _diagnose(scenario: Scenario, recording: Recording, folder: RunFolder, conso
     folder.forget(STATE)
     show(console, diagnosis)
     console.print(f"written: diagnosis.json, diagnosis.html, scene.html and model.yaml in {folder.path}")
-
-
-def versions() -> dict[str, str]:
-    """Versions of everything that the numbers depend on."""
-    return {"python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
 
 
 def _live(recording: Recording, console: Console) -> Stage:

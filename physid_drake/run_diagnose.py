@@ -105,6 +105,8 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
     if diagnosis.location is not None:
         console.print(f"Where: {diagnosis.location.statement}.")
     console.print(f"Left over: {diagnosis.left}.")
+    for warning in diagnosis.warnings:
+        console.print(f"Note: {warning}.")
     if diagnosis.effects:
         console.print(findings_table(diagnosis))
     console.print(fit_table(diagnosis))

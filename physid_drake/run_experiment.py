@@ -17,8 +17,8 @@ from physid_drake.report.experiment import result_figure, result_json, result_ma
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.svg import drawn
 from physid_drake.report.terminal import terminal
-from physid_drake.run_folder import RunFolder
-from physid_drake.run_prove import ended_softly, versions
+from physid_drake.run_folder import RunFolder, versions
+from physid_drake.run_prove import ended_softly
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -1,14 +1,29 @@
-"""A run's folder: files that are written whole or not at all, and the state to go on from."""
+"""A run's folder: files that are written whole or not at all, the state to go on from, and what made them."""
 
 from __future__ import annotations
 
 import os
+import platform
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 
 from physid_drake.errors import OutputError
+
+PACKAGES = ("physid_drake", "drake", "mujoco", "numpy", "scipy", "scikit-learn")
+
+
+def versions() -> dict[str, str]:
+    """Of Python and of what the numbers of a run depend on, as far as it is installed."""
+    found = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,14 +5,12 @@ from __future__ import annotations
 import argparse
 import functools
 import json
-import platform
 import re
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from importlib import metadata
 from pathlib import Path
 from types import FrameType
 
@@ -30,7 +28,7 @@ from physid_drake.report.proof_page import proof_page
 from physid_drake.report.proof_pictures import confusion_picture
 from physid_drake.report.svg import drawn
 from physid_drake.report.terminal import terminal
-from physid_drake.run_folder import RunFolder
+from physid_drake.run_folder import RunFolder, versions
 
 WORLDS, QUICK = 200, 10
 SETTINGS = "settings.json"
@@ -223,17 +221,6 @@ def opened(out: Path, names: Sequence[str], seal: str, *, seed: int, kind: str |
         seed=seed, kind=kind, seal=seal, sealed=len(names), outcomes=outcomes, figures=figures_of(outcomes),
         versions=versions(),
     )  # fmt: skip
-
-
-def versions() -> dict[str, str]:
-    """Of Python and of what the numbers depend on."""
-    found = {"python": platform.python_version()}
-    for name in ("physid_drake", "drake", "mujoco", "numpy", "scipy"):
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return found
 
 
 def write(folder: RunFolder, proof: Proof) -> None:

@@ -52,6 +52,7 @@ class Case:
         around: the effects' scales.
         config: of the cell.
         odd: (n,) how many times as loud as the others a push is; empty where none is.
+        pushes: of the whole recording.
     """
 
     recording: Recording
@@ -64,6 +65,16 @@ class Case:
     around: Surroundings
     config: CellConfig
     odd: tuple[float, ...] = ()
+    pushes: int = 0
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader must know of how the recording was taken."""
+        some = len(self.problems)
+        thinned = (
+            f"{some} of the {self.pushes} pushes were looked at, at equal distances (diagnose --pushes N for more)"
+        )
+        return (*((thinned,) if some < self.pushes else ()), *self.noise.warnings)
 
     def louder(self, factor: float, forces: ForceNoise, odd: Sequence[float] = ()) -> Case:
         """The case with more noise.
@@ -111,6 +122,7 @@ def case_of(
     orders = np.unique(
         np.linspace(0, len(recording.pushes) - 1, min(most, len(recording.pushes))).round().astype(int)
     )
+    count = len(recording.pushes)
     recording = recording.subset(orders.tolist())
     solid = solid_of(recording.object.shape)
     problems = tuple(
@@ -133,6 +145,7 @@ def case_of(
         pool=RolloutPool(spec_of(recording, config), thetas, jobs=jobs),
         around=_surroundings(recording, problems, thetas),
         config=config,
+        pushes=count,
     )
 
 

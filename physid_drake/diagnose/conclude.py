@@ -93,7 +93,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
             "correlation_time_s": list(case.noise.correlation_time),
             "jitter_s": case.noise.jitter,
         },
-        warnings=case.noise.warnings,
+        warnings=case.warnings,
         rollouts=case.pool.count,
     )
 

@@ -91,7 +91,7 @@ class HiddenRobot:
 
     def see(self) -> Pose:
         """Where the tracker says that the object is."""
-        x, y, yaw = (np.array(self._pose) + self._rng.standard_normal(3) * self._object_std()).tolist()
+        x, y, yaw = (np.array(self._pose) + self._rng.standard_normal(3) * self._sensors.object_std).tolist()
         return x, y, yaw
 
     def execute(self, push: PlannedPush) -> Push:
@@ -133,12 +133,8 @@ class HiddenRobot:
             config=config, body=body,
         )  # fmt: skip
 
-    def _object_std(self) -> Array:
-        place, turn = self._sensors.object_position_std or 0.0, self._sensors.object_rotation_std or 0.0
-        return np.array([place, place, turn])
-
     def _recorded(self, times: Array, poses: Array, tips: Array) -> Push:
-        seen = poses + self._rng.standard_normal(poses.shape) * self._object_std()
+        seen = poses + self._rng.standard_normal(poses.shape) * self._sensors.object_std
         hand = tips + (self._sensors.hand_position_std or 0.0) * self._rng.standard_normal(tips.shape)
         flat = np.column_stack([hand, np.zeros(len(hand))])
         return Push(

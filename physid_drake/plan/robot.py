@@ -55,7 +55,7 @@ class SimulatedRobot:
 
     def see(self) -> Pose:
         """The object's pose with the tracker's noise."""
-        x, y, yaw = np.array(self._pose) + self._rng.standard_normal(3) * self._object_std()
+        x, y, yaw = np.array(self._pose) + self._rng.standard_normal(3) * self._sensors.object_std
         return float(x), float(y), float(yaw)
 
     def execute(self, push: PlannedPush) -> Push:
@@ -88,10 +88,6 @@ class SimulatedRobot:
             hand=PoseStream(times=times, positions=hand, quaternions=np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1))),
         )  # fmt: skip
 
-    def _object_std(self) -> Array:
-        place, turn = self._sensors.object_position_std or 0.0, self._sensors.object_rotation_std or 0.0
-        return np.array([place, place, turn])
-
     def _object(self, times: Array, poses: Array) -> PoseStream:
-        seen = poses + self._rng.standard_normal(poses.shape) * self._object_std()
+        seen = poses + self._rng.standard_normal(poses.shape) * self._sensors.object_std
         return planar_poses(times, seen, hand_height_of(self._hidden, Situation(start=self._pose)))

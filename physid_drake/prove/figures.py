@@ -237,7 +237,7 @@ def table(figures: Figures) -> list[tuple[str, str, str, str]]:
         _row("two effects: both named", figures.pairs["both"], "70 %"),
         _row("  one named", figures.pairs["one"], ""),
         _row("  a wrong name", figures.pairs["wrong"], ""),
-        ("Brier score of the stated probabilities", _fixed(figures.brier), "", ""),
+        ("Brier score of the stated probabilities", decimals(figures.brier), "", ""),
         _row("no diagnosis", figures.failed, ""),
     ]
 
@@ -267,8 +267,8 @@ def held_out_table(figures: Figures) -> list[tuple[str, ...]]:
     words = {"none": "no effect", "effect": "one effect, clear and named rightly", "other": NOT_CATALOGUED,
              "pair": "two effects"}  # fmt: skip
     return [
-        (words[kind], str(e.worlds), *(_fixed(1e3 * v) for v in e.position),
-         *(_fixed(math.degrees(v)) for v in e.rotation), *(_fixed(v) for v in e.rms))
+        (words[kind], str(e.worlds), *(decimals(1e3 * v) for v in e.position),
+         *(decimals(math.degrees(v)) for v in e.rotation), *(decimals(v) for v in e.rms))
         for kind, e in figures.held_out.items()
     ]  # fmt: skip
 
@@ -367,5 +367,6 @@ def _percent(error: Quantiles, *, tail: bool = False) -> str:
     return f"{100 * (error.p90 if tail else error.median):.1f} % (of {error.count})" if error.count else "-"
 
 
-def _fixed(value: float) -> str:
+def decimals(value: float) -> str:
+    """A number with two decimals, or a dash where there is none."""
     return f"{value:.2f}" if math.isfinite(value) else "-"

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from physid_drake.prove.diagnosing import RESULT, attempt_of
 from physid_drake.prove.real import RealCase
+from physid_drake.prove.score import number
 from physid_drake.prove.shapes import Array
 from physid_drake.recording import read_recording
 
@@ -104,9 +105,9 @@ def real_outcome(case: RealCase, published: Path, out: Path) -> RealOutcome:
         pushes=len(pushes),
         verdict=said["verdict"],
         classes=tuple((e["name"], *e["indistinguishable_from"]) for e in said["effects"]),
-        chi2=(_number(said["reduced_chi2_before"]), _number(said["reduced_chi2_after"])),
-        position=(_number(fit["held_out_rms_before_m"]), _number(fit["held_out_rms_after_m"])),
-        rotation=(_number(fit["held_out_rms_before_rad"]), _number(fit["held_out_rms_after_rad"])),
+        chi2=(number(said["reduced_chi2_before"]), number(said["reduced_chi2_after"])),
+        position=(number(fit["held_out_rms_before_m"]), number(fit["held_out_rms_after_m"])),
+        rotation=(number(fit["held_out_rms_before_rad"]), number(fit["held_out_rms_after_rad"])),
         fresh=_fresh(folder / FRESH_ERRORS),
         published=published_errors(published / case.source, [p.note for p in pushes])
         if case.group == "mit"
@@ -230,8 +231,4 @@ def _fresh(file: Path) -> tuple[float, float]:
     if not file.is_file():
         return math.nan, math.nan
     errors = json.loads(file.read_text(encoding="utf-8"))
-    return _number(errors["position_m"]), _number(errors["rotation_rad"])
-
-
-def _number(value: float | None) -> float:
-    return math.nan if value is None else float(value)
+    return number(errors["position_m"]), number(errors["rotation_rad"])

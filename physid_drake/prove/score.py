@@ -156,7 +156,7 @@ def outcome(truth: dict[str, Any], diagnosis: dict[str, Any], seconds: float = m
         covered=tuple(covered for _, covered in compared),
         theta_errors=tuple(error for error, _ in theta),
         theta_covered=tuple(covered for _, covered in theta),
-        chi2=_number(diagnosis["reduced_chi2_after"]),
+        chi2=number(diagnosis["reduced_chi2_after"]),
         held_out=_held_out(diagnosis["fit"], truth.get("held_out_floor", {})),
         seconds=seconds,
     )
@@ -233,11 +233,12 @@ def _leaves(true: dict[str, Any] | None, effect: dict[str, Any], name: str) -> f
 
 def _held_out(fit: dict[str, Any], floor: dict[str, float]) -> HeldOut:
     def three(what: str, unit: str) -> tuple[float, float, float]:
-        before, after = (_number(fit.get(f"held_out_rms_{when}{unit}")) for when in ("before", "after"))
-        return before, after, _number(floor.get(what))
+        before, after = (number(fit.get(f"held_out_rms_{when}{unit}")) for when in ("before", "after"))
+        return before, after, number(floor.get(what))
 
     return HeldOut(rms=three("rms", ""), position=three("position_m", "_m"), rotation=three("rotation_rad", "_rad"))
 
 
-def _number(value: float | None) -> float:
+def number(value: float | None) -> float:
+    """A number of a JSON file; null is NaN."""
     return math.nan if value is None else float(value)

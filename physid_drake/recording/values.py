@@ -297,6 +297,12 @@ class Sensors:
         check_not_negative("hand_position_std_m", "m", self.hand_position_std)
         check_not_negative("force_std_n", "N", self.force_std)
 
+    @property
+    def object_std(self) -> Array:
+        """Of x, y, yaw (3,) of the object [m, m, rad]; what is unknown counts as none."""
+        place, turn = self.object_position_std or 0.0, self.object_rotation_std or 0.0
+        return np.array([place, place, turn])
+
 
 @dataclass(frozen=True, kw_only=True)
 class Recording:

@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.table import Table
 
-from physid_drake.prove.figures import Figures, held_out_table, json_of, power_table, table
+from physid_drake.prove.figures import Figures, decimals, held_out_table, json_of, power_table, table
 from physid_drake.prove.score import Outcome
 
 FORMAT = "physid-proof/1"
@@ -123,7 +123,7 @@ def proof_markdown(proof: Proof) -> str:
         _markdown(
             ("stated", "mean", "came true"),
             [
-                (f"{b.low:g} to {b.high:g}", _fixed(b.stated), f"{b.right.count} of {b.right.of}")
+                (f"{b.low:g} to {b.high:g}", decimals(b.stated), f"{b.right.count} of {b.right.of}")
                 for b in figures.reliability
             ],
         ),
@@ -148,10 +148,6 @@ def _worlds(proof: Proof) -> str:
 def _markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [headings, ["---"] * len(headings), *rows]
     return "\n".join("| " + " | ".join(cell.strip().replace("|", "\\|") for cell in line) + " |" for line in lines)
-
-
-def _fixed(value: float) -> str:
-    return f"{value:.2f}" if math.isfinite(value) else "-"
 
 
 def proof_tables(proof: Proof) -> tuple[Table, Table]:

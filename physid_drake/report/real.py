@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
+from physid_drake.prove.figures import decimals
 from physid_drake.prove.real_score import NEAR, Pressure, RealOutcome
 
 FORMAT = "physid-proof-real/1"
@@ -32,7 +33,7 @@ def _row(outcome: RealOutcome) -> tuple[str, ...]:
     published = o.published or {}
     models = [_errors(published.get(name, (math.nan, math.nan))) for name in ("quadratic", "poly4")]
     return (
-        o.case.name, str(o.pushes), _fixed(o.chi2[0]), _fixed(o.chi2[1]), o.verdict,
+        o.case.name, str(o.pushes), decimals(o.chi2[0]), decimals(o.chi2[1]), o.verdict,
         " + ".join(" or ".join(names) for names in o.classes) or "-",
         _change([1e3 * v for v in o.position]), _change([math.degrees(v) for v in o.rotation]),
         *_errors(o.fresh), *models[0], *models[1], _near(o), _arm(o),
@@ -40,15 +41,11 @@ def _row(outcome: RealOutcome) -> tuple[str, ...]:
 
 
 def _errors(errors: tuple[float, float]) -> tuple[str, str]:
-    return _fixed(1e3 * errors[0]), _fixed(math.degrees(errors[1]))
+    return decimals(1e3 * errors[0]), decimals(math.degrees(errors[1]))
 
 
 def _change(values: Sequence[float]) -> str:
-    return " to ".join(_fixed(v) for v in values)
-
-
-def _fixed(value: float) -> str:
-    return f"{value:.2f}" if math.isfinite(value) else "-"
+    return " to ".join(decimals(v) for v in values)
 
 
 NOTES = (

@@ -71,3 +71,10 @@ def test_a_push_is_odd_until_it_is_said_to_be_like_the_others(case):
     assert again.odd == (1.0, 1.0, 1.0)
     np.testing.assert_allclose(again.features[1].sigmas, case.features[1].sigmas)
     assert not any("stand out" in warning for warning in again.noise.warnings)
+
+
+def test_pushes_that_are_not_looked_at_are_said(case):
+    assert case.warnings == case.noise.warnings
+    some = case_of(shipped_pushes(5), case.config, ThetaConfig(), jobs=1, most=2)
+    assert [problem.order for problem in some.problems] == [0, 4]
+    assert some.warnings[0].startswith("2 of the 5 pushes were looked at")
