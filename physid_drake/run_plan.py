@@ -143,7 +143,8 @@ def _learnt(folder: Path) -> Learnt:
             content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
             scatter = float(content["friction_scatter"])
             if name == "diagnosis.json":
-                fitted = pushes = len(content["fit"]["per_push"])
+                fitted = len(content["fit"]["per_push"])
+                pushes = int(content.get("pushes", fitted))
             else:
                 fitted = len(content["training"]["pushes"])
                 pushes = fitted + len(content["held_out"]["pushes"])

@@ -95,6 +95,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
         },
         warnings=case.warnings,
         rollouts=case.pool.count,
+        pushes=case.pushes,
     )
 
 

@@ -219,6 +219,7 @@ class Diagnosis:
         noise: ``position_m``, ``rotation_rad``, ``correlation_time_s`` (of both), ``jitter_s`` that were used.
         warnings: what was found odd, one line each.
         rollouts: how many were made.
+        pushes: of the whole recording, looked at or not.
     """
 
     recording: str
@@ -242,3 +243,4 @@ class Diagnosis:
     noise: dict[str, Any]
     warnings: tuple[str, ...]
     rollouts: int
+    pushes: int = 0

@@ -50,6 +50,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> str:
         },
         "next_push": None if d.next_push is None else dc.asdict(d.next_push),
         "seed": d.seed,
+        "pushes": d.pushes,
         "ranking": [dc.asdict(r) for r in d.ranking],
         "detectable": [dc.asdict(x) for x in d.detectable],
         "left": d.left,

@@ -75,9 +75,9 @@ def test_the_results_beside_a_model_give_scatter_and_order(folder, tmp_path, few
     assert belief["ends"][0]["x_m"] != belief["ends"][1]["x_m"]
     # Two pushes tell no scatter, so that it is as sure as its first guess; five add theirs.
     assert run_plan._learnt(folder) == run_plan.Learnt(friction_scatter=0.05, scatter_freedom=4.0, pushes=3)
-    diagnosis = {"friction_scatter": 0.02, "fit": {"per_push": [1, 2, 3, 4, 5]}}
+    diagnosis = {"friction_scatter": 0.02, "fit": {"per_push": [1, 2, 3, 4, 5]}, "pushes": 30}
     (folder / "diagnosis.json").write_text(json.dumps(diagnosis))
-    assert run_plan._learnt(folder) == run_plan.Learnt(friction_scatter=0.02, scatter_freedom=9.0, pushes=5)
+    assert run_plan._learnt(folder) == run_plan.Learnt(friction_scatter=0.02, scatter_freedom=9.0, pushes=30)
 
 
 @pytest.mark.parametrize(
