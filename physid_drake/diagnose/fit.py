@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses as dc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,6 +99,7 @@ class Fitter:
         like: Fitted | None = None,
         fresh_theta: bool = False,
         at: Fitted | None = None,
+        central: bool = False,
     ) -> Fitted:
         """All derivatives at a state, by differences.
 
@@ -109,12 +110,15 @@ class Fitter:
                 only those of the effects are taken.
             fresh_theta: take those of theta nevertheless.
             at: a model at this very state, whose rollouts need not be made again.
+            central: take central differences for theta and the effects. What pushes cannot tell apart (a mass and a
+                drag) has parallel derivatives; where an effect moves objects a hundred deviations, the error of
+                one-sided differences would tell them apart.
         """
         theta, own = like is None or fresh_theta, like is None
         tasks: list[Task] = []
         owners: list[int] = []
         for i in range(len(self.case.problems)):
-            mine = self._tasks_of(state, i, theta=theta, own=own)[0 if at is None else 1 :]
+            mine = self._tasks_of(state, i, theta=theta, own=own, central=central)[0 if at is None else 1 :]
             tasks += mine
             owners += [i] * len(mine)
         vectors = self.vectors(tasks)
@@ -122,9 +126,8 @@ class Fitter:
         for i in range(len(self.case.problems)):
             mine_vectors = [] if at is None else [at.predicted[i]]
             mine_vectors += [v for v, owner in zip(vectors, owners, strict=True) if owner == i]
-            pushes.append(
-                self._linear_push(state, i, mine_vectors, None if like is None else like.pushes[i], theta=theta)
-            )
+            near = None if like is None else like.pushes[i]
+            pushes.append(self._linear_push(state, i, mine_vectors, near, theta=theta, central=central))
             predicted.append(mine_vectors[0])
         return self._fitted(state, tuple(pushes), tuple(predicted), learn_scatter)
 
@@ -143,34 +146,36 @@ class Fitter:
         residual: Array = self.case.features[i].recorded - predicted + own[:, : len(values)] @ values
         return residual
 
-    def _theta_steps(self, state: State) -> list[Array]:
+    def _theta_steps(self, state: State, central: bool) -> list[tuple[float, list[Array]]]:
+        """For each parameter: the step, and points (d,) with it taken, and the opposite one if central."""
         steps = []
-        for j in range(len(state.u)):
-            u = state.u.copy()
-            u[j] += THETA_STEP if u[j] < 0.5 else -THETA_STEP
-            steps.append(u)
+        for j, value in enumerate(state.u):
+            step = THETA_STEP if value < 0.5 else -THETA_STEP
+            both = central and 0.0 < value - step < 1.0
+            unit = np.eye(len(state.u))[j]
+            steps.append((step, [state.u + sign * step * unit for sign in ((1.0, -1.0) if both else (1.0,))]))
         return steps
 
-    def _effect_steps(self, state: State) -> list[tuple[float, tuple[Effect, ...]]]:
-        """For each free coordinate of each effect: the step and all effects with it taken."""
+    def _effect_steps(self, state: State, central: bool) -> list[tuple[float, list[tuple[Effect, ...]]]]:
+        """For each free coordinate of each effect: the step, and all effects with it taken (and the opposite one)."""
         plain = [e.effect(self.case) for e in state.effects]
         steps = []
         for k, e in enumerate(state.effects):
             chart = e.chart(self.case)
             for j in e.free:
                 step = chart[j].step if e.point[j] + chart[j].step <= chart[j].upper else -chart[j].step
-                point = e.point.copy()
-                point[j] += step
-                moved = [*plain]
-                moved[k] = e.kind.at(point, self.case.around)
-                steps.append((step, tuple(moved)))
+                both = central and chart[j].lower <= e.point[j] - step <= chart[j].upper
+                unit = np.eye(len(e.point))[j]
+                points = [e.point + sign * step * unit for sign in ((1.0, -1.0) if both else (1.0,))]
+                moved = [(*plain[:k], e.kind.at(p, self.case.around), *plain[k + 1 :]) for p in points]
+                steps.append((step, moved))
         return steps
 
-    def _tasks_of(self, state: State, i: int, *, theta: bool, own: bool) -> list[Task]:
+    def _tasks_of(self, state: State, i: int, *, theta: bool, own: bool, central: bool) -> list[Task]:
         tasks = [self.task(state, i)]
         if theta:
-            tasks += [self.task(state, i, u=u) for u in self._theta_steps(state)]
-        tasks += [self.task(state, i, effects=effects) for _, effects in self._effect_steps(state)]
+            tasks += [self.task(state, i, u=u) for _, points in self._theta_steps(state, central) for u in points]
+        tasks += [self.task(state, i, effects=e) for _, moved in self._effect_steps(state, central) for e in moved]
         if own:
             tasks += [self.task(state, i, own=values) for _, values in self._own_steps(state, i)]
         return tasks
@@ -187,18 +192,17 @@ class Fitter:
         return steps
 
     def _linear_push(
-        self, state: State, i: int, vectors: list[Array], like: LinearPush | None, *, theta: bool
+        self, state: State, i: int, vectors: list[Array], like: LinearPush | None, *, theta: bool, central: bool
     ) -> LinearPush:
         """A push from its rollouts, in the order of ``_tasks_of``; what is not among them is that of ``like``."""
         base, rest = vectors[0], iter(vectors[1:])
         d = len(state.u)
         if theta:
-            steps = [float((u - state.u)[j]) for j, u in enumerate(self._theta_steps(state))]
-            columns = [(next(rest) - base) / step for step in steps]
+            columns = [_difference(base, rest, step, len(p)) for step, p in self._theta_steps(state, central)]
         else:
             assert like is not None
             columns = [like.shared[:, :d]]
-        columns += [(next(rest) - base) / step for step, _ in self._effect_steps(state)]
+        columns += [_difference(base, rest, step, len(p)) for step, p in self._effect_steps(state, central)]
         if like is None:
             own = np.column_stack([(next(rest) - base) / step for step, _ in self._own_steps(state, i)])
             all_own = own if self.extra is None else np.column_stack([own, self.extra[i]])
@@ -336,7 +340,7 @@ class Fitter:
 
     def refine(self, rough: Fitted) -> Fitted:
         """What another cell's fit left, here: derivatives of theta and effects anew, then steps while they help."""
-        best = self.linearise(rough.state, like=rough, fresh_theta=True)
+        best = self.linearise(rough.state, like=rough, fresh_theta=True, central=bool(rough.state.effects))
         for _ in range(REFINEMENTS):
             moved = self.seen_from(best, self.stepped(best))
             gained = actual_cost(best) - actual_cost(moved)
@@ -381,6 +385,12 @@ class Fitter:
             new = own_unknowns(push, state.scatter, fitted.solution.beta)[: len(old)]
             own.append(self._within(i, old + share * (new - old)))
         return State(u=u, effects=effects, own=tuple(own), scatter=state.scatter)
+
+
+def _difference(base: Array, rest: Iterator[Array], step: float, count: int) -> Array:
+    """A derivative (m,) from what is seen after a step, or after it and the opposite one."""
+    ahead = next(rest)
+    return (ahead - base) / step if count == 1 else (ahead - next(rest)) / (2.0 * step)
 
 
 def actual_cost(fitted: Fitted) -> float:
