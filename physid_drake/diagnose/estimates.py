@@ -12,7 +12,7 @@ from scipy import stats
 
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.evidence import Evidence
-from physid_drake.diagnose.model import Fitted
+from physid_drake.diagnose.model import EffectPoint, Fitted
 from physid_drake.diagnose.screen import (
     log_probability,
     projected,
@@ -54,7 +54,7 @@ def parameters_of(evidence: Evidence, k: int) -> dict[str, ParameterEstimate]:
     covariance = shared_covariance(final)[part, part]
     rng = np.random.default_rng(0)
     draws = rng.multivariate_normal(np.zeros(len(here.free)), covariance, SAMPLES, method="eigh") * _t_factor(final)
-    drawn = [here.moved(case, d).effect(case) for d in draws]
+    drawn = [here.moved(case, d).effect(case) for d in _more_than_nothing(here, case, draws)]
     effect = here.effect(case)
     return {
         name: ParameterEstimate(
@@ -65,6 +65,21 @@ def parameters_of(evidence: Evidence, k: int) -> dict[str, ParameterEstimate]:
         )
         for name, unit in effect.units().items()
     }
+
+
+def _more_than_nothing(here: EffectPoint, case: Case, moves: Array) -> Array:
+    """Moves (n, k) of free coordinates; those of an amplitude that cannot be negative are made in its logarithm.
+
+    An effect that is surely there is more than nothing, however little is known of its size: a drag, say, over a mass
+    that nobody weighed. Little changes where an amplitude is well known.
+    """
+    made = moves.copy()
+    for k, j in enumerate(here.free):
+        coordinate, value = here.chart(case)[j], here.point[j]
+        one_sided = coordinate.name in here.kind.amplitudes and coordinate.lower == 0.0 and not coordinate.log
+        if one_sided and value > np.std(moves[:, k]):
+            made[:, k] = value * np.expm1(moves[:, k] / value)
+    return made
 
 
 def _plain(value: Any) -> Any:
