@@ -31,7 +31,7 @@ def case(recording):
     return case_of(recording, cell_config(recording), ThetaConfig())
 
 
-def world(count=8, seed=11, **more):
+def world(count=6, seed=11, **more):
     return recorded(ERASER, THETA, pushes_of(ERASER, count, seed), seed, **more)
 
 
