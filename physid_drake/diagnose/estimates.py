@@ -71,7 +71,8 @@ def _more_than_nothing(here: EffectPoint, case: Case, moves: Array) -> Array:
     """Moves (n, k) of free coordinates; those of an amplitude that cannot be negative are made in its logarithm.
 
     An effect that is surely there is more than nothing, however little is known of its size: a drag, say, over a mass
-    that nobody weighed. Little changes where an amplitude is well known.
+    that nobody weighed. Little changes where an amplitude is well known, and nothing where it is within a deviation
+    of nothing.
     """
     made = moves.copy()
     for k, j in enumerate(here.free):
