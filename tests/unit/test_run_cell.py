@@ -179,16 +179,36 @@ def test_ctrl_c_keeps_what_was_found_and_the_same_command_goes_on(
     assert result_of(out) == uninterrupted
 
 
+def test_ctrl_c_after_the_identification_keeps_it_too(recording, tmp_path, monkeypatch):
+    """A plan and a diagnosis follow, which take longer."""
+
+    def interrupted(*args):
+        raise KeyboardInterrupt
+
+    out = tmp_path / "out"
+    with monkeypatch.context() as patch:
+        patch.setattr(run_cell, "_keep_plan", interrupted)
+        assert quick(out, recording=recording, **SEARCH) == 130
+    assert (out / "belief.npz").exists()
+    with monkeypatch.context() as patch:
+        count = _CtrlC(patch, trial=-1)
+        assert quick(out, recording=recording, **SEARCH) == 0
+    assert count.calls == 0
+    assert not (out / "belief.npz").exists()
+
+
 def test_another_configuration_does_not_go_on_from_there(recording, tmp_path, monkeypatch):
     out = tmp_path / "out"
     with monkeypatch.context() as patch:
         _CtrlC(patch)
         assert quick(out, recording=recording) == 130
+    (out / "stages.npz").touch()  # of a diagnosis
     other = laid_over(SEARCH, {"seed": 4})
     with monkeypatch.context() as patch:
         count = _CtrlC(patch, trial=-1)
         assert quick(out, recording=recording, **other) == 0
     assert count.calls == 6
+    assert not (out / "stages.npz").exists()
     assert np.isfinite(result_of(out)["reduced_chi2"])
 
 
