@@ -253,7 +253,8 @@ def slide_model(logs: np.ndarray) -> tuple[Model, float]:
     """Friction and its scatter as identification has them, from each push's ln mu (n,) but for ``SLIDE_NOISE``."""
     body, config = OBJECTS["box"], ThetaConfig(parameters=["support_friction"])
     shape = shape_of(body)
-    thetas = theta_map(ObjectModel(shape=shape, mass=body.mass), solid_of(shape).outline, (1, 1), config, body.mass)
+    known, density = ObjectModel(shape=shape, mass=body.mass), CELL.default_density_kgpm3
+    thetas = theta_map(known, solid_of(shape), (1, 1), config, density)
     space, middle, scatter = thetas.space, float(logs.mean()), FIRST_SCATTER
     residuals = [np.array([(middle - x) / SLIDE_NOISE]) for x in logs]
 

@@ -13,6 +13,7 @@ import yaml
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
 from physid_drake.errors import ConfigError
+from physid_drake.identify.theta import HEAVIEST, LIGHTEST
 from physid_drake.policies import POLICIES
 from physid_drake.resources import shipped
 from physid_drake.scenario_schema import Scenario
@@ -184,7 +185,8 @@ def _checked(scenario: Scenario, where: str) -> Scenario:
          "above 0 rad/s"),
         ("cell.friction_cells", cell.friction_cells,
          len(cell.friction_cells) == 2 and all(1 <= n <= 10 for n in cell.friction_cells), "[nx, ny] from 1 to 10"),
-        ("cell.default_mass_kg", cell.default_mass_kg, cell.default_mass_kg > 0.0, "above 0 kg"),
+        ("cell.default_density_kgpm3", cell.default_density_kgpm3,
+         LIGHTEST <= cell.default_density_kgpm3 <= HEAVIEST, f"from {LIGHTEST:g} to {HEAVIEST:g} kg/m^3"),
         ("search.method", search.method, search.method in SEARCHES, f"one of {', '.join(SEARCHES)}"),
         ("search.refine_every", search.refine_every, search.refine_every >= 0, "at least 0"),
         ("search.candidates", search.candidates, search.candidates >= 2, "at least 2"),

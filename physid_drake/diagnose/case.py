@@ -130,10 +130,8 @@ def case_of(
         for p, order in zip(problems_of(recording, sensors, solid.height), orders, strict=True)
     )
     _refuse_still(recording, problems, noise)
-    thetas = theta_map(
-        recording.object, solid, (config.friction_cells[0], config.friction_cells[1]), theta,
-        config.default_mass_kg,
-    )  # fmt: skip
+    grid = (config.friction_cells[0], config.friction_cells[1])
+    thetas = theta_map(recording.object, solid, grid, theta, config.default_density_kgpm3)
     pushes = recording.pushes
     return Case(
         recording=recording,

@@ -155,10 +155,8 @@ class Identifier:
         short = thinned(recording)
         self.noise = noise_of(short)
         self.problems = problems_of(short, self.noise, solid.height)
-        free = theta_map(
-            recording.object, solid, (cell.friction_cells[0], cell.friction_cells[1]), theta,
-            cell.default_mass_kg,
-        )  # fmt: skip
+        grid = (cell.friction_cells[0], cell.friction_cells[1])
+        free = theta_map(recording.object, solid, grid, theta, cell.default_density_kgpm3)
         self.thetas = tied_cells(free, solid.outline, theta)
         self._config, self._chooser = search, search_named(search.method)
         self.pool = RolloutPool(spec_of(recording, cell), self.thetas, jobs=search.jobs)

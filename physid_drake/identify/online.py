@@ -124,7 +124,7 @@ class OnlineIdentifier:
         """
         solid = solid_of(recording.object.shape)
         grid = (cell.friction_cells[0], cell.friction_cells[1])
-        free = theta_map(recording.object, solid, grid, theta, cell.default_mass_kg)
+        free = theta_map(recording.object, solid, grid, theta, cell.default_density_kgpm3)
         self.thetas: ThetaMap = tied_cells(free, solid.outline, theta)
         self.pool = pool or RolloutPool(spec_of(recording, cell), self.thetas, jobs=search.jobs)
         self._recording, self._height = recording, solid.height

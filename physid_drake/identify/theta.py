@@ -69,7 +69,7 @@ def friction_names(cells: tuple[int, int]) -> list[str]:
 
 
 def theta_map(
-    model: ObjectModel, solid: Solid, cells: tuple[int, int], config: ThetaConfig, default_mass: float
+    model: ObjectModel, solid: Solid, cells: tuple[int, int], config: ThetaConfig, density: float
 ) -> ThetaMap:
     """The parameter space of a recording's object.
 
@@ -78,12 +78,12 @@ def theta_map(
         solid: its shape, which bounds its centre of mass and its mass.
         cells: friction cells.
         config: the choice of parameters.
-        default_mass: nominal mass where the recording gives none [kg].
+        density: of the box around the object, where the recording gives no mass [kg/m^3].
 
     Raises:
         ConfigError: if a name is unknown or bounds are not a pair.
     """
-    known = _catalogue(model, solid, cells, default_mass, config.bounds.get("mass"))
+    known = _catalogue(model, solid, cells, density, config.bounds.get("mass"))
     for name in [*config.parameters, *config.bounds, *config.nominal]:
         if name not in known and name != "support_friction":
             raise ConfigError(f"theta: there is no parameter '{name}'; known are {', '.join(known)}.")
@@ -114,7 +114,7 @@ def _catalogue(
     model: ObjectModel,
     solid: Solid,
     cells: tuple[int, int],
-    default_mass: float,
+    density: float,
     mass_bounds: Sequence[float] | None,
 ) -> dict[str, Parameter]:
     x0, y0, x1, y1 = solid.outline.extent()
@@ -144,11 +144,11 @@ def _catalogue(
         Parameter(name="restitution", unit="-", lower=0.0, upper=0.9, prior_mean=0.0,
                   description="restitution between hand and object"),
     ]  # fmt: skip
-    everything = [_mass(model, solid, default_mass, mass_bounds), hand, *friction, *com, *rest]
+    everything = [_mass(model, solid, density, mass_bounds), hand, *friction, *com, *rest]
     return {parameter.name: parameter for parameter in everything}
 
 
-def _mass(model: ObjectModel, solid: Solid, default: float, bounds: Sequence[float] | None) -> Parameter:
+def _mass(model: ObjectModel, solid: Solid, density: float, bounds: Sequence[float] | None) -> Parameter:
     """A weighed mass is as well known as the scale says; any other to its order, from foam to steel."""
     if model.mass is not None and model.mass_std is not None:
         share = max(model.mass_std / model.mass, EXACT)
@@ -157,9 +157,9 @@ def _mass(model: ObjectModel, solid: Solid, default: float, bounds: Sequence[flo
                          prior_mean=model.mass, prior_std=share, scale="log", description="mass")  # fmt: skip
     x0, y0, x1, y1 = solid.outline.extent()
     volume = (x1 - x0) * (y1 - y0) * solid.height
-    return Parameter(name="mass", unit="kg", lower=min(0.5 * default, LIGHTEST * volume),
-                     upper=max(2.0 * default, HEAVIEST * volume), prior_mean=default,
-                     prior_std=None if bounds else UNWEIGHED, scale="log", description="mass")  # fmt: skip
+    std = None if bounds else UNWEIGHED
+    return Parameter(name="mass", unit="kg", lower=LIGHTEST * volume, upper=HEAVIEST * volume,
+                     prior_mean=density * volume, prior_std=std, scale="log", description="mass")  # fmt: skip
 
 
 def cell_error(space: ParameterSpace, theta: Array, j: int) -> float:

@@ -10,6 +10,7 @@ import pytest
 from reference.scenes import OBJECTS, Theta
 from runs import coarse_identifier, shipped_pushes
 from scipy import stats
+from twin import shape_of
 from worlds import POINTS, endpoints, pushes_of, recorded, slides
 
 from physid_drake.cell import CellConfig, ContactConfig
@@ -145,7 +146,8 @@ def test_a_free_slide_tells_the_tables_friction_and_nothing_else(slid):
 
 
 UNIFORM = tuple(np.exp(np.log(0.02) + np.array([0.05, 0.95]) * np.log(1.2 / 0.02)))  # on the logarithm
-NORMAL = tuple(0.3 * np.exp(UNWEIGHED * stats.norm.ppf([0.05, 0.95])))  # on the logarithm, and not cut by bounds
+GUESSED = CellConfig().default_density_kgpm3 * float(np.prod(shape_of(BOX).size))  # kg
+NORMAL = tuple(GUESSED * np.exp(UNWEIGHED * stats.norm.ppf([0.05, 0.95])))  # on the logarithm, and not cut by bounds
 
 
 @pytest.mark.parametrize(("name", "interval"), [("mass", NORMAL), ("hand_friction", UNIFORM)])

@@ -24,7 +24,7 @@ OUTLINE = rectangle(0.12, 0.06)
 def tied(cells, *parameters, **config):
     given = ThetaConfig(parameters=list(parameters or ("support_friction",)), **config)
     shape = Box(size=(0.12, 0.06, 0.03))
-    return tied_cells(theta_map(ObjectModel(shape=shape), solid_of(shape), cells, given, 0.3), OUTLINE, given)
+    return tied_cells(theta_map(ObjectModel(shape=shape), solid_of(shape), cells, given, 500.0), OUTLINE, given)
 
 
 # The prior.

@@ -14,9 +14,9 @@ WEIGHED = ObjectModel(shape=SHAPE, mass=0.054, mass_std=0.001)
 SOLID = solid_of(SHAPE)
 
 
-def thetas(*parameters, model=None, cells=(1, 1), bounds=None, nominal=None, mass=0.3):
+def thetas(*parameters, model=None, cells=(1, 1), bounds=None, nominal=None, density=500.0):
     config = ThetaConfig(parameters=list(parameters), bounds=bounds or {}, nominal=nominal or {})
-    return theta_map(model or ObjectModel(shape=SHAPE), SOLID, cells, config, mass)
+    return theta_map(model or ObjectModel(shape=SHAPE), SOLID, cells, config, density)
 
 
 ALL = ("mass", "hand_friction", "support_friction", "com_x", "com_y", "inertia_ratio", "static_ratio", "restitution")
@@ -96,16 +96,13 @@ def test_an_unweighed_mass_is_known_to_its_order_and_lies_between_foam_and_steel
     mass = thetas("mass").space.parameters[0]
     volume = 0.12 * 0.05 * 0.03
     assert (mass.lower, mass.upper) == pytest.approx((20.0 * volume, 8000.0 * volume))
-    assert (mass.prior_mean, mass.prior_std) == (0.3, 0.8)
-    heavy = thetas("mass", mass=2.0).space.parameters[0]
-    assert heavy.lower < 2.0 < heavy.upper
-    light = thetas("mass", mass=0.003).space.parameters[0]
-    assert light.lower < 0.003 < light.upper
+    assert (mass.prior_mean, mass.prior_std) == (pytest.approx(500.0 * volume), 0.8)
+    assert thetas("mass", density=20.0).space.parameters[0].prior_mean == pytest.approx(20.0 * volume)
 
 
 def test_bounds_that_are_asked_for_are_all_that_is_known_of_an_unweighed_mass():
     mass = thetas("mass", bounds={"mass": [0.1, 0.9]}).space.parameters[0]
-    assert (mass.lower, mass.upper, mass.prior_mean, mass.prior_std) == (0.1, 0.9, 0.3, None)
+    assert (mass.lower, mass.upper, mass.prior_mean, mass.prior_std) == (0.1, 0.9, 0.1, None)
 
 
 def test_the_centre_of_mass_stays_inside_the_outline():
