@@ -281,7 +281,7 @@ def _ranking(evidence: Evidence, findings: Sequence[EffectFinding], partly: Part
     named = {f.name for f in findings}
     some = set() if partly is None else set(partly.effects)
     classes = {name for f in findings for name in f.indistinguishable_from}
-    steps = (*evidence.steps, evidence.rejected)
+    steps = (*evidence.steps, evidence.rejected, *evidence.superfluous)
     fitted = {c.name: c for step in reversed(steps) for c in step}
     rows = []
     for one in evidence.screening.scores:
@@ -304,6 +304,8 @@ def _why(name: str, candidate: Candidate | None, named: set[str], classes: set[s
         return "found"
     if name in classes:
         return "these pushes cannot tell it from what was found"
+    if any(name == step[0].name for step in evidence.superfluous):
+        return "was taken back: without it the others do as well"
     return _why_not_fitted(name, evidence) if candidate is None else _why_fitted_in_vain(candidate, named, evidence)
 
 

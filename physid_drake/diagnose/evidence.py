@@ -46,6 +46,7 @@ class Evidence:
         signatures: of the catalogue at the plain cell.
         steps: one per accepted effect: all candidates of that step.
         rejected: candidates of a step in which none was accepted.
+        superfluous: steps that were taken back: the other effects do as well without theirs.
         final: the model at the end.
         errors_before: per push (m,), recorded less what ``nearest`` predicts, fitted without that push.
         errors_after: the same with the effects of ``confirmed``; those before where there are none.
@@ -71,6 +72,7 @@ class Evidence:
     remaining: Screening
     wrenches: tuple[MissingWrench, ...] = ()
     next_push: NextPush | None = None
+    superfluous: tuple[tuple[Candidate, ...], ...] = ()
     noise_share: float = 1.0
     detected: float | None = None
 

@@ -62,13 +62,15 @@ class Looked:
 class Grown:
     """A model grown effect by effect: the plain one, the last, the steps between, and what a last step rejected.
 
-    ``without`` has the last model's fits without one of its effects, by the effect's name, as far as they were made.
+    ``superfluous`` has steps that were taken back; ``without`` the last model's fits without one of its effects, by
+    the effect's name, as far as they were made.
     """
 
     base: Looked
     last: Looked
     steps: tuple[tuple[Candidate, ...], ...]
     rejected: tuple[Candidate, ...]
+    superfluous: tuple[tuple[Candidate, ...], ...] = ()
     without: Mapping[str, Fitted] = dc.field(default_factory=dict)
 
 
@@ -143,7 +145,8 @@ class Growth:
         One that a later effect made so had stood in for what was still missing. One with which left-out pushes are
         simulated no better took up what noise and the cell's own error leave.
         """
-        last, steps, made = grown.last, list(grown.steps), dict[str, Fitted]()
+        last, steps, taken_back = grown.last, list(grown.steps), list(grown.superfluous)
+        made = dict[str, Fitted]()
         for k in reversed(range(len(steps))):
             if len(steps) == 1:
                 break
@@ -155,8 +158,8 @@ class Growth:
                 missed = [s for s in grown.base.signatures if s.kind.name == name]
                 last = Looked.at(without, (*last.signatures, *missed), self.rng)
                 made.clear()
-                del steps[k]
-        return dc.replace(grown, last=last, steps=tuple(steps), without=made)
+                taken_back.append(steps.pop(k))
+        return dc.replace(grown, last=last, steps=tuple(steps), superfluous=tuple(taken_back), without=made)
 
     def _shows(self, without: Fitted, model: Fitted) -> bool:
         """Whether a model simulates left-out pushes visibly better than one without an effect of it."""

@@ -90,8 +90,8 @@ def _on_short_ticks(answer: _Answer, tick: Tick) -> Evidence:
     return Evidence(
         case=case, fitter=fine, plain=refined, nearest=closest or refined, errors_before=before, errors_after=after,
         screening=grown.base.screening, signatures=grown.base.signatures,
-        steps=grown.steps, rejected=grown.rejected, final=final, remaining=grown.last.screening,
-        noise_share=answer.noise_share, detected=answer.detected,
+        steps=grown.steps, rejected=grown.rejected, superfluous=grown.superfluous, final=final,
+        remaining=grown.last.screening, noise_share=answer.noise_share, detected=answer.detected,
     )  # fmt: skip
 
 

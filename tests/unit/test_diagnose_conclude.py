@@ -28,13 +28,14 @@ def features():
     return SimpleNamespace(poses=poses, sigmas=SIGMAS, middles=np.zeros(WINDOWS))
 
 
-def evidence(*, steps=(), rejected=(), final=None, after=10.0):
+def evidence(*, steps=(), rejected=(), superfluous=(), final=None, after=10.0):
     plain = model_that_leaves(100.0)
     screening = SimpleNamespace(scores=(SimpleNamespace(kind=SimpleNamespace(name="viscous_drag")),))
     return SimpleNamespace(
         case=SimpleNamespace(features=[features()] * PUSHES, noise=SimpleNamespace(position=3e-4)),
         plain=plain, nearest=plain, screening=screening,
-        remaining=SimpleNamespace(scores=()), steps=steps, rejected=rejected, final=final or plain,
+        remaining=SimpleNamespace(scores=()), steps=steps, rejected=rejected, superfluous=superfluous,
+        final=final or plain,
         errors_before=errors(10.0), errors_after=errors(after),
     )  # fmt: skip
 
@@ -83,6 +84,15 @@ def test_what_is_not_confirmed_or_takes_little_away_is_not_worth_a_word(rejected
 )
 def test_why_an_effect_that_was_fitted_is_not_what_is_missing(named, gain, why):
     assert conclude._why("viscous_drag", tried("viscous_drag", gain, None), named, set(), evidence(after=4.0)) == why
+
+
+def test_an_effect_that_was_taken_back_is_said_to_be():
+    one = tried("viscous_drag", 50.0, None)
+    told = evidence(
+        steps=((tried("magnet", 50.0, None),),), superfluous=((one, tried("tether", 9.0, None)),), after=1.0
+    )
+    assert conclude._why("viscous_drag", one, {"magnet"}, set(), told).startswith("was taken back")
+    assert conclude._why("tether", told.superfluous[0][1], {"magnet"}, set(), told).startswith("predicts pushes")
 
 
 def test_a_model_that_predicts_left_out_pushes_worse_explains_nothing(monkeypatch):

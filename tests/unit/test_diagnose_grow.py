@@ -114,6 +114,7 @@ def growth(fitter):
 def test_an_effect_that_a_later_one_makes_superfluous_is_taken_out(grown):
     pruned = growth(Refits({("magnet",): -9.0, ("table_tilt",): -1.2})).pruned(grown)
     assert names_of(pruned) == ["table_tilt"]
+    assert [step[0].name for step in pruned.superfluous] == ["magnet"]
     assert [e.kind.name for e in pruned.last.fitted.state.effects] == ["table_tilt"]
 
 
