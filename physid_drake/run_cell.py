@@ -22,7 +22,7 @@ from physid_drake.identify.rollouts import Task, simulate
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
 from physid_drake.plan import Plan
 from physid_drake.plan.system import Planner, PolicySystem, identified_model, planner_of
-from physid_drake.recording import Recording, read_recording
+from physid_drake.recording import Recording, digest_of, read_recording
 from physid_drake.report.cells import cells_table
 from physid_drake.report.page import result_page
 from physid_drake.report.plan import plan_table, push_files
@@ -86,7 +86,9 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     # Everything that can be refused is refused before anything is written.
     identifier = _identifier(scenario, recording, out)
     planner = None if arguments.no_plan else _planner(scenario, recording, identifier, console)
-    folder = RunFolder.open(out, dump_scenario(name, scenario), states=(BELIEF, STATE))
+    # A comment, so that the file is still a configuration that can be given to this command.
+    made_by = f"{dump_scenario(name, scenario)}# of recording {digest_of(recording)}\n"
+    folder = RunFolder.open(out, made_by, states=(BELIEF, STATE))
     stage = None if arguments.no_view else _live(recording, console)
     result, plan = _identify(identifier, planner, scenario, recording, console)
     console.print()

@@ -19,7 +19,7 @@ from physid_drake.effects import effect_named
 from physid_drake.errors import ConfigError
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.identify.rollouts import simulate
-from physid_drake.recording import read_recording
+from physid_drake.recording import digest_of, read_recording
 from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
 from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
 from physid_drake.report.progress import progress_bar
@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     config = cell_config(recording, contact=arguments.contact, time_step=arguments.time_step)
     case = case_of(recording, config, ThetaConfig(), jobs=arguments.jobs, most=arguments.pushes)
     settings = {"seed": arguments.seed, "alpha": arguments.alpha, "effects": arguments.effects,
-                "cell": dc.asdict(config), "recording": recording.name, "pushes": _fingerprint(case)}  # fmt: skip
+                "cell": dc.asdict(config), "pushes": arguments.pushes, "recording": digest_of(recording)}  # fmt: skip
     out = arguments.out or Path("diagnoses") / recording.name
     folder = RunFolder.open(out, json.dumps(settings, indent=2) + "\n", name="settings.json", states=(STATE,))
     diagnosis, evidence = run_case(
@@ -90,11 +90,6 @@ def recording_folder(text: str) -> Path:
     if not path.exists() and path.parent == Path() and (shipped("recordings") / text).is_dir():
         return shipped("recordings") / text
     return path
-
-
-def _fingerprint(case: Case) -> list[float]:
-    """What tells one recording from another: the sum of each push's poses."""
-    return [float(p.poses.sum() + p.times.sum()) for p in case.problems]
 
 
 def show(console: Console, diagnosis: Diagnosis) -> None:

@@ -1,5 +1,6 @@
 """Recordings: what was measured, how it is read and written, and what it says about its own noise."""
 
+from physid_drake.recording.digest import digest_of
 from physid_drake.recording.outlines import outline_distance, polygon_centroid
 from physid_drake.recording.planar import planar_poses
 from physid_drake.recording.reading import read_recording
@@ -44,6 +45,7 @@ __all__ = [
     "Sensors",
     "Shape",
     "Table",
+    "digest_of",
     "estimate_noise",
     "outline_distance",
     "planar_poses",

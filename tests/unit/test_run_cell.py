@@ -1,6 +1,7 @@
 """The main job: what a run leaves behind, and how it goes on after an interrupt."""
 
 import json
+import shutil
 from html.parser import HTMLParser
 
 import numpy as np
@@ -210,6 +211,19 @@ def test_another_configuration_does_not_go_on_from_there(recording, tmp_path, mo
     assert count.calls == 6
     assert not (out / "stages.npz").exists()
     assert np.isfinite(result_of(out)["reduced_chi2"])
+
+
+def test_a_recording_that_was_changed_since_is_not_gone_on_with(tmp_path, monkeypatch):
+    recording, out = write_small(tmp_path / "recording", 3), tmp_path / "out"
+    with monkeypatch.context() as patch:
+        _CtrlC(patch)
+        assert quick(out, recording=recording, **SEARCH) == 130
+    shutil.rmtree(recording)
+    write_small(recording, 2)
+    with monkeypatch.context() as patch:
+        count = _CtrlC(patch, trial=-1)
+        assert quick(out, recording=recording, **SEARCH) == 0
+    assert count.calls == 6
 
 
 def test_the_main_job_learns_push_by_push_on_request(tmp_path):

@@ -1,0 +1,38 @@
+"""A recording's digest: the same for the same recording, another one after any change."""
+
+import dataclasses as dc
+import shutil
+
+import pytest
+
+from physid_drake.recording import digest_of, read_recording
+from physid_drake.resources import shipped
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return read_recording(shipped("recordings") / "eraser_reference")
+
+
+def later(recording):
+    push, *rest = recording.pushes
+    stream = dc.replace(push.object, times=push.object.times + 1e-9)
+    return dc.replace(recording, pushes=(dc.replace(push, object=stream), *rest))
+
+
+def test_a_copy_has_the_same_digest(recording, tmp_path):
+    copy = shutil.copytree(shipped("recordings") / recording.name, tmp_path / recording.name)
+    assert digest_of(read_recording(copy)) == digest_of(recording)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        later,
+        lambda recording: dc.replace(recording, pushes=recording.pushes[1:]),
+        lambda recording: dc.replace(recording, pushes=recording.pushes[::-1]),
+        lambda recording: dc.replace(recording, object=dc.replace(recording.object, mass=0.06, mass_std=1e-3)),
+    ],
+)
+def test_any_change_changes_it(recording, changed):
+    assert digest_of(changed(recording)) != digest_of(recording)
