@@ -304,7 +304,7 @@ class Fitter:
                 say(f"round {k + 1} of at most {rounds}")
             held, released = k + 1 < careful, k + 1 >= careful
             trial = self._tried(best, cautious=k < careful, released=released)
-            gained = actual_cost(best) - actual_cost(trial)
+            gained = best.cost_here - trial.cost_here
             if held and gained <= 0.0:
                 k = careful - 1  # nothing more to gain with the unknowns at zero
                 continue
@@ -334,7 +334,7 @@ class Fitter:
             if cautious:
                 step = dc.replace(step, own=tuple(np.zeros_like(o) for o in step.own))
             trial = self.seen_from(best, step, learn_scatter=released)
-            if actual_cost(trial) < actual_cost(best) or (cautious and released):
+            if trial.cost_here < best.cost_here or (cautious and released):
                 break
         return trial
 
@@ -343,7 +343,7 @@ class Fitter:
         best = self.linearise(rough.state, like=rough, fresh_theta=True, central=bool(rough.state.effects))
         for _ in range(REFINEMENTS):
             moved = self.seen_from(best, self.stepped(best))
-            gained = actual_cost(best) - actual_cost(moved)
+            gained = best.cost_here - moved.cost_here
             best = moved if gained > 0.0 else best
             if gained < SETTLED:
                 break
@@ -391,11 +391,3 @@ def _difference(base: Array, rest: Iterator[Array], step: float, count: int) -> 
     """A derivative (m,) from what is seen after a step, or after it and the opposite one."""
     ahead = next(rest)
     return (ahead - base) / step if count == 1 else (ahead - next(rest)) / (2.0 * step)
-
-
-def actual_cost(fitted: Fitted) -> float:
-    """Twice the negative log posterior at the state itself, nothing left to move: what iterations compare."""
-    at_rest = np.zeros(len(fitted.prior_mean))
-    white = Whitened.of(fitted.pushes, fitted.state.scatter)
-    weight = 1.0 / fitted.prior_std**2
-    return float(white.y @ white.y) + white.log_determinant + float(weight @ (at_rest - fitted.prior_mean) ** 2)

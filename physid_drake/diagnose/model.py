@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.linear import LinearPush, Solution
+from physid_drake.diagnose.linear import LinearPush, Solution, Whitened
 from physid_drake.effects import Coordinate, Effect
 
 Array = NDArray[np.float64]
@@ -108,3 +108,10 @@ class Fitted:
     def reduced_chi2(self) -> float:
         """Cost per degree of freedom; 1 where the model explains the pushes."""
         return self.solution.chi2 / max(1, self.degrees)
+
+    @property
+    def cost_here(self) -> float:
+        """Twice the negative log posterior at the state itself, nothing left to move: what iterations compare."""
+        white = Whitened.of(self.pushes, self.state.scatter)
+        prior = float(np.sum((self.prior_mean / self.prior_std) ** 2))
+        return float(white.y @ white.y) + white.log_determinant + prior

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.fit import Fitter, actual_cost
+from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.screen import Score
 
@@ -69,7 +69,7 @@ def of_other_strength(fitter: Fitter, model: Fitted) -> State:
             stronger = last.origin[j] + strength * (last.point[j] - last.origin[j])
             point[j] = np.clip(stronger, chart[j].lower, chart[j].upper)
         states.append(fitter.start(model.state.u, (*others, dc.replace(last, point=point))))
-    return min(states, key=lambda state: actual_cost(fitter.seen_from(model, state)))
+    return min(states, key=lambda state: fitter.seen_from(model, state).cost_here)
 
 
 def of_other_shape(fitter: Fitter, model: Fitted, corner: tuple[int, ...]) -> State:

@@ -27,7 +27,7 @@ class Fitter:
 
     def seen_from(self, model, state):
         assert not state.own[0].any()
-        return float(abs(state.effects[-1].point[0] - self.best))
+        return SimpleNamespace(cost_here=float(abs(state.effects[-1].point[0] - self.best)))
 
 
 def model_with(*effects):
@@ -42,8 +42,7 @@ def point_of(kind, value):
     ("fitted", "best", "start"),
     [(0.40, 0.49, 0.48), (0.40, 0.41, 0.40), (0.40, 0.10, 0.28), (0.80, 1.3, 0.9)],  # 0.9 is the chart's bound
 )
-def test_the_last_effect_is_tried_weaker_and_stronger(monkeypatch, fitted, best, start):
-    monkeypatch.setattr(starts, "actual_cost", lambda cost: cost)
+def test_the_last_effect_is_tried_weaker_and_stronger(fitted, best, start):
     other = point_of(DRAG, 0.3)
     state = starts.of_other_strength(Fitter(best), model_with(other, point_of(BOUNCE, fitted)))
     assert state.effects[0] is other
