@@ -104,7 +104,7 @@ def test_what_no_push_can_tell_apart_has_parallel_derivatives(fitter):
     space = fitter.case.thetas.space
     mass = next(j for j, p in enumerate(space.parameters) if p.name == "mass")
     reach = np.log(space.parameters[mass].upper / space.parameters[mass].lower)
-    coefficient = 0.8  # N s^2/m^2: a quarter of friction at 0.5 m/s
+    coefficient = 2.7 * space.nominal[mass]  # N s^2/m^2: a quarter of friction at 0.5 m/s
     drag = EffectPoint(kind=QuadraticDrag, point=np.array([coefficient]), free=(0,), origin=np.zeros(1))
     state = fitter.start(np.asarray(space.to_unit(space.nominal)), (drag,))
 
