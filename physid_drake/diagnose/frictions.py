@@ -6,12 +6,11 @@ import numpy as np
 from scipy import stats
 
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.linear import LinearPush, own_unknowns
+from physid_drake.diagnose.linear import told_frictions
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import speed_of
 
 FEWEST = 6  # pushes that tell their friction
-TOLD = 0.5  # of a friction's spread: a push that leaves more of it does not tell it
 CHANCE = 0.05  # of the best of all looks
 
 
@@ -24,11 +23,9 @@ def friction_trend(case: Case, fitted: Fitted) -> str | None:
         case: the recording.
         fitted: the model whose pushes have frictions of their own.
     """
-    scatter, beta = fitted.state.scatter, fitted.solution.beta
-    told = [i for i, push in enumerate(fitted.pushes) if _left_open(push, scatter) < TOLD]
+    told, frictions = told_frictions(fitted.pushes, fitted.state.scatter, fitted.solution.beta)
     if len(told) < FEWEST:
         return None
-    frictions = [own_unknowns(fitted.pushes[i], scatter, beta)[fitted.pushes[i].friction] for i in told]
     looks = {
         "the further the object goes": [_way(case, i) for i in told],
         "the faster it is pushed": [speed_of(case, i) for i in told],
@@ -40,14 +37,6 @@ def friction_trend(case: Case, fitted: Fitted) -> str | None:
         return None
     tau = float(seen[best].statistic)
     return f"{'more' if tau > 0.0 else 'less'} {best} (rank correlation {tau:.2f})"
-
-
-def _left_open(push: LinearPush, scatter: float) -> float:
-    """The standard deviation that a push leaves of its friction, over the prior's."""
-    own = push.own.copy()
-    own[:, push.friction] *= scatter
-    precision = np.eye(own.shape[1]) + own.T @ np.linalg.solve(push.noise, own)
-    return float(np.sqrt(np.linalg.inv(precision)[push.friction, push.friction]))
 
 
 def _way(case: Case, i: int) -> float:

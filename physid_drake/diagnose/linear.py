@@ -142,6 +142,26 @@ def own_unknowns(push: LinearPush, scatter: float, beta: Array) -> Array:
     return values
 
 
+TOLD = 0.5  # of a friction's spread: a push that leaves more of it does not tell it
+
+
+def told_frictions(pushes: Sequence[LinearPush], scatter: float, beta: Array) -> tuple[list[int], Array]:
+    """Which pushes tell their own friction, and those frictions (k,), in units of the columns'.
+
+    The others' are what the prior says. Which pushes these are depends on what was pushed how, not on how it went.
+    """
+    told = [i for i, push in enumerate(pushes) if _left_open(push, scatter) < TOLD]
+    return told, np.array([own_unknowns(pushes[i], scatter, beta)[pushes[i].friction] for i in told])
+
+
+def _left_open(push: LinearPush, scatter: float) -> float:
+    """The standard deviation that a push leaves of its friction, over the prior's."""
+    own = push.own.copy()
+    own[:, push.friction] *= scatter
+    precision = np.eye(own.shape[1]) + own.T @ np.linalg.solve(push.noise, own)
+    return float(np.sqrt(np.linalg.inv(precision)[push.friction, push.friction]))
+
+
 def left_out_scores(
     pushes: Sequence[LinearPush],
     scatter: float,

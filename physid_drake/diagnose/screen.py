@@ -17,7 +17,7 @@ from scipy import stats
 
 from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.fit import Fitter
-from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, own_unknowns, solve
+from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve, told_frictions
 from physid_drake.diagnose.model import Fitted
 from physid_drake.effects import Effect, Family
 from physid_drake.identify.rollouts import Task
@@ -173,11 +173,10 @@ def by_trend(fitted: Fitted, one: Score) -> Score:
     """The score test or the rank correlation of the pushes' own frictions with the effect's, two looks.
 
     Frictions that differ much from push to push are far from where the pushes were linearised; their order is not.
-    The p-value of Kendall's correlation is exact for few pushes.
+    The p-value of Kendall's correlation is exact for few pushes. Those that do not tell their friction have no order.
     """
-    beta, scatter = fitted.solution.beta, fitted.state.scatter
-    frictions = np.array([own_unknowns(push, scatter, beta)[push.friction] for push in fitted.pushes])
-    changes = np.array(one.signature.friction_changes) / UNIT_SCATTER
+    told, frictions = told_frictions(fitted.pushes, fitted.state.scatter, fitted.solution.beta)
+    changes = np.array(one.signature.friction_changes)[told] / UNIT_SCATTER
     if len(frictions) < FEWEST_FOR_A_TREND or np.ptp(frictions) == 0.0:
         return one
     by_rank = math.log(max(1e-300, float(stats.kendalltau(frictions, changes).pvalue)))

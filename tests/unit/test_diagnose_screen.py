@@ -102,6 +102,15 @@ def test_a_perfect_order_of_few_pushes_is_no_certainty(columns):
     assert np.exp(trend.log_p) == pytest.approx(2.0 * 2.0 / 720.0)  # two looks, up or down, of 6! orders
 
 
+def test_pushes_that_do_not_tell_their_friction_have_no_place_in_the_order(columns):
+    frictions = 1.5 * ORDER - 8.0
+    frictions[[5, 9]] = frictions[[9, 5]]
+    slow = {**columns, "own": columns["own"].copy()}
+    slow["own"][:4] *= 1e-3  # no slide to tell it by: a fit leaves them in the middle
+    _, trend = drift_score(frictions, slow)
+    assert np.exp(trend.log_p) == pytest.approx(2.0 * stats.kendalltau(frictions[4:], ORDER[4:]).pvalue)
+
+
 def test_frictions_in_no_order_are_not_seen(columns):
     plain, trend = drift_score(np.random.default_rng(3).permutation(-3.0 + 0.5 * ORDER), columns)
     assert trend.gain == plain.gain
