@@ -27,8 +27,8 @@ THETA = Theta(support_friction=0.3, hand_friction=0.25)
 LOOKED_AT = ("viscous_drag", "table_tilt", "tether", "friction_gradient", "friction_drift", "com_offset")
 
 
-def case(recording):
-    return case_of(recording, cell_config(recording), ThetaConfig())
+def case(recording, **cell):
+    return case_of(recording, cell_config(recording, **cell), ThetaConfig())
 
 
 def world(count=6, seed=11, **more):
@@ -88,7 +88,7 @@ def test_the_model_that_leaves_predicts_what_the_diagnosis_says(tilted, tmp_path
 
 
 def test_an_interrupted_diagnosis_goes_on_to_the_same_bytes(tmp_path):
-    made = case(world(count=3, pull=(ERASER.mass * 9.81 * 0.02, 0.0)))
+    made = case(world(count=3, pull=(ERASER.mass * 9.81 * 0.02, 0.0)), time_step=4e-3)
     effects = ("table_tilt",)
 
     live, cut_off = tmp_path / "live.npz", tmp_path / "cut_off.npz"
@@ -98,6 +98,7 @@ def test_an_interrupted_diagnosis_goes_on_to_the_same_bytes(tmp_path):
             shutil.copy(live, cut_off)
 
     whole, _ = diagnose(made, effects=effects, tick=copy, memory=Memory(live))
+    assert cut_off.exists()
     again, _ = diagnose(made, effects=effects, memory=Memory(cut_off))
     assert diagnosis_json(again) == diagnosis_json(whole)
 
@@ -130,7 +131,7 @@ def test_a_noise_that_nothing_tells_is_what_the_plain_cell_leaves():
 
 def test_where_no_noise_is_known_an_effect_is_found_by_the_quiet_that_it_leaves():
     recording = endpoints(world(count=10, pull=(ERASER.mass * 9.81 * 0.03, 0.0)))  # eight are too few
-    made = case(replace(recording, sensors=Sensors()))
+    made = case(replace(recording, sensors=Sensors()), time_step=2e-3)
     diagnosis, evidence = diagnose(made, effects=("table_tilt",))
     assert not made.noise.known
     assert diagnosis.verdict in ("explained", "ambiguous")
