@@ -148,7 +148,7 @@ TOLD = 0.5  # of a friction's spread: a push that leaves more of it does not tel
 def told_frictions(pushes: Sequence[LinearPush], scatter: float, beta: Array) -> tuple[list[int], Array]:
     """Which pushes tell their own friction, and those frictions (k,), in units of the columns'.
 
-    The others' are what the prior says. Which pushes these are depends on what was pushed how, not on how it went.
+    The others' are what the prior says. Which pushes these are does not depend on their order.
     """
     told = [i for i, push in enumerate(pushes) if _left_open(push, scatter) < TOLD]
     return told, np.array([own_unknowns(pushes[i], scatter, beta)[pushes[i].friction] for i in told])
