@@ -136,9 +136,10 @@ def staged(diagnosis: Diagnosis, evidence: Evidence, meshcat: Meshcat | None = N
     """The pushes in Meshcat: recorded, and as the model that leaves has them, with what the plain cell lacks."""
     case, state = evidence.case, fit_that_leaves(diagnosis, evidence).state
     stage = Stage(case.recording, meshcat)
+    as_told = evidence.fitter.start(state.u, state.effects)  # nothing known of the pushes themselves
     scenes = []
     for i in range(min(SHOWN, len(case.problems))):
-        task = evidence.fitter.task(state, i, own=0.0 * state.own[i])
+        task = evidence.fitter.task(as_told, i)
         scenes.append(ShownMotion(push=case.recording.pushes[i], motion=simulate(case.pool.spec, case.thetas, task)))
     stage.play(scenes)
     stage.show_missing(evidence.wrenches, unit_force=0.1 * case.around.friction * case.around.weight)

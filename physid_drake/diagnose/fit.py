@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses as dc
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +18,12 @@ from physid_drake.diagnose.linear import (
     solve,
 )
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
+from physid_drake.diagnose.steps import Step, effect_steps, own_steps, theta_steps, with_theta
 from physid_drake.effects import Effect
 from physid_drake.identify.rollouts import Prediction, Task
 
 Array = NDArray[np.float64]
 
-THETA_STEP = 0.006  # of the unit cube
-OWN_STEP = 0.5  # of the prior standard deviation
 MOST_OWN = 3.0  # standard deviations: unknowns are linearised no further out
 MOST_FRICTION = 8.0  # in units of the usual scatter, which is itself learnt: 20 %
 FAILED = 1e4  # standard deviations: features of a rollout that diverged
@@ -63,16 +62,14 @@ class Fitter:
 
     # Rollouts.
 
-    def task(self, state: State, i: int, *, u: Array | None = None, own: Array | None = None,
-             effects: Sequence[Effect] | None = None) -> Task:  # fmt: skip
-        """The rollout of push i at a state, or with something changed."""
+    def task(self, state: State, i: int, *, effects: Sequence[Effect] | None = None) -> Task:
+        """The rollout of push i at a state, or with other effects."""
         case = self.case
-        values = state.own[i] if own is None else own
         return Task(
             problem=case.problems[i],
-            theta=np.asarray(case.thetas.space.from_unit(state.u if u is None else u)),
+            theta=np.asarray(case.thetas.space.from_unit(state.u)),
             nuisance=case.nuisances[i],
-            values=self._within(i, values) * case.nuisances[i].stds,
+            values=self._within(i, state.own[i]) * case.nuisances[i].stds,
             effects=tuple(e.effect(case) for e in state.effects) if effects is None else tuple(effects),
         )
 
@@ -99,7 +96,6 @@ class Fitter:
         like: Fitted | None = None,
         fresh_theta: bool = False,
         at: Fitted | None = None,
-        central: bool = False,
     ) -> Fitted:
         """All derivatives at a state, by differences.
 
@@ -110,15 +106,12 @@ class Fitter:
                 only those of the effects are taken.
             fresh_theta: take those of theta nevertheless.
             at: a model at this very state, whose rollouts need not be made again.
-            central: take central differences for theta and the effects. What pushes cannot tell apart (a mass and a
-                drag) has parallel derivatives; where an effect moves objects a hundred deviations, the error of
-                one-sided differences would tell them apart.
         """
         theta, own = like is None or fresh_theta, like is None
         tasks: list[Task] = []
         owners: list[int] = []
         for i in range(len(self.case.problems)):
-            mine = self._tasks_of(state, i, theta=theta, own=own, central=central)[0 if at is None else 1 :]
+            mine = self._tasks_of(state, i, theta=theta, own=own)[0 if at is None else 1 :]
             tasks += mine
             owners += [i] * len(mine)
         vectors = self.vectors(tasks)
@@ -127,7 +120,7 @@ class Fitter:
             mine_vectors = [] if at is None else [at.predicted[i]]
             mine_vectors += [v for v, owner in zip(vectors, owners, strict=True) if owner == i]
             near = None if like is None else like.pushes[i]
-            pushes.append(self._linear_push(state, i, mine_vectors, near, theta=theta, central=central))
+            pushes.append(self._linear_push(state, i, mine_vectors, near, theta=theta))
             predicted.append(mine_vectors[0])
         return self._fitted(state, tuple(pushes), tuple(predicted), learn_scatter)
 
@@ -146,65 +139,31 @@ class Fitter:
         residual: Array = self.case.features[i].recorded - predicted + own[:, : len(values)] @ values
         return residual
 
-    def _theta_steps(self, state: State, central: bool) -> list[tuple[float, list[Array]]]:
-        """For each parameter: the step, and points (d,) with it taken, and the opposite one if central."""
-        steps = []
-        for j, value in enumerate(state.u):
-            step = THETA_STEP if value < 0.5 else -THETA_STEP
-            both = central and 0.0 < value - step < 1.0
-            unit = np.eye(len(state.u))[j]
-            steps.append((step, [state.u + sign * step * unit for sign in ((1.0, -1.0) if both else (1.0,))]))
-        return steps
+    def _tasks_of(self, state: State, i: int, *, theta: bool, own: bool) -> list[Task]:
+        steps = theta_steps(self.case, state) if theta else []
+        steps += effect_steps(self.case, state)
+        steps += self._own_steps(state, i) if own else []
+        return [self.task(one, i) for one in (state, *(step.state for step in steps))]
 
-    def _effect_steps(self, state: State, central: bool) -> list[tuple[float, list[tuple[Effect, ...]]]]:
-        """For each free coordinate of each effect: the step, and all effects with it taken (and the opposite one)."""
-        plain = [e.effect(self.case) for e in state.effects]
-        steps = []
-        for k, e in enumerate(state.effects):
-            chart = e.chart(self.case)
-            for j in e.free:
-                step = chart[j].step if e.point[j] + chart[j].step <= chart[j].upper else -chart[j].step
-                both = central and chart[j].lower <= e.point[j] - step <= chart[j].upper
-                unit = np.eye(len(e.point))[j]
-                points = [e.point + sign * step * unit for sign in ((1.0, -1.0) if both else (1.0,))]
-                moved = [(*plain[:k], e.kind.at(p, self.case.around), *plain[k + 1 :]) for p in points]
-                steps.append((step, moved))
-        return steps
-
-    def _tasks_of(self, state: State, i: int, *, theta: bool, own: bool, central: bool) -> list[Task]:
-        tasks = [self.task(state, i)]
-        if theta:
-            tasks += [self.task(state, i, u=u) for _, points in self._theta_steps(state, central) for u in points]
-        tasks += [self.task(state, i, effects=e) for _, moved in self._effect_steps(state, central) for e in moved]
-        if own:
-            tasks += [self.task(state, i, own=values) for _, values in self._own_steps(state, i)]
-        return tasks
-
-    def _own_steps(self, state: State, i: int) -> list[tuple[float, Array]]:
-        """For each unknown of a push: the step and the unknowns with it taken."""
-        here = self._within(i, state.own[i])
-        steps = []
-        for j in range(len(here)):
-            step = OWN_STEP if here[j] <= 0.0 else -OWN_STEP
-            values = here.copy()
-            values[j] += step
-            steps.append((step, values))
-        return steps
+    def _own_steps(self, state: State, i: int) -> list[Step]:
+        """From where the unknowns of push i are linearised."""
+        within = (*state.own[:i], self._within(i, state.own[i]), *state.own[i + 1 :])
+        return own_steps(dc.replace(state, own=within), i)
 
     def _linear_push(
-        self, state: State, i: int, vectors: list[Array], like: LinearPush | None, *, theta: bool, central: bool
+        self, state: State, i: int, vectors: list[Array], like: LinearPush | None, *, theta: bool
     ) -> LinearPush:
         """A push from its rollouts, in the order of ``_tasks_of``; what is not among them is that of ``like``."""
-        base, rest = vectors[0], iter(vectors[1:])
-        d = len(state.u)
-        if theta:
-            columns = [_difference(base, rest, step, len(p)) for step, p in self._theta_steps(state, central)]
+        base, seen = vectors[0], iter(vectors[1:])
+        moved = [step.derivative(base, next(seen)) for step in (theta_steps(self.case, state) if theta else ())]
+        more = [step.derivative(base, next(seen)) for step in effect_steps(self.case, state)]
+        effects = np.column_stack([np.zeros((len(base), 0)), *more])
+        if like is None or theta:  # by the chain rule, without the forces that went with the mass
+            columns = [np.column_stack(moved) - effects @ with_theta(self.case, state), effects]
         else:
-            assert like is not None
-            columns = [like.shared[:, :d]]
-        columns += [_difference(base, rest, step, len(p)) for step, p in self._effect_steps(state, central)]
+            columns = [like.shared[:, : len(state.u)], effects]
         if like is None:
-            own = np.column_stack([(next(rest) - base) / step for step, _ in self._own_steps(state, i)])
+            own = np.column_stack([step.derivative(base, next(seen)) for step in self._own_steps(state, i)])
             all_own = own if self.extra is None else np.column_stack([own, self.extra[i]])
         else:
             all_own = like.own
@@ -340,7 +299,7 @@ class Fitter:
 
     def refine(self, rough: Fitted) -> Fitted:
         """What another cell's fit left, here: derivatives of theta and effects anew, then steps while they help."""
-        best = self.linearise(rough.state, like=rough, fresh_theta=True, central=bool(rough.state.effects))
+        best = self.linearise(rough.state, like=rough, fresh_theta=True)
         for _ in range(REFINEMENTS):
             moved = self.seen_from(best, self.stepped(best))
             gained = best.cost_here - moved.cost_here
@@ -385,9 +344,3 @@ class Fitter:
             new = own_unknowns(push, state.scatter, fitted.solution.beta)[: len(old)]
             own.append(self._within(i, old + share * (new - old)))
         return State(u=u, effects=effects, own=tuple(own), scatter=state.scatter)
-
-
-def _difference(base: Array, rest: Iterator[Array], step: float, count: int) -> Array:
-    """A derivative (m,) from what is seen after a step, or after it and the opposite one."""
-    ahead = next(rest)
-    return (ahead - base) / step if count == 1 else (ahead - next(rest)) / (2.0 * step)

@@ -46,6 +46,19 @@ class EffectPoint:
             point[j] = float(np.clip(point[j] + step, chart[j].lower, chart[j].upper))
         return dc.replace(self, point=point)
 
+    def heavier(self, case: Case, ratio: float) -> EffectPoint:
+        """What moves an object ``ratio`` times as heavy as this moves it, as far as free coordinates can."""
+        powers = self._mass_powers(case)
+        return dc.replace(self, point=self.point * ratio**powers)
+
+    def with_mass(self, case: Case) -> Array:
+        """Derivatives of the free coordinates of ``heavier`` with respect to the logarithm of the mass."""
+        return (self._mass_powers(case) * self.point)[list(self.free)]
+
+    def _mass_powers(self, case: Case) -> Array:
+        names = [c.name for c in self.chart(case)]
+        return np.array([self.kind.mass_powers.get(n, 0) if j in self.free else 0 for j, n in enumerate(names)])
+
     def freed(self, case: Case) -> EffectPoint:
         """All coordinates free."""
         return dc.replace(self, free=tuple(range(len(self.chart(case)))))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -28,6 +29,7 @@ class ViscousDrag(Effect):
     statement: ClassVar[str] = "a drag in proportion to the object's speed"
     frame: ClassVar[str] = "object_velocity"
     amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
+    mass_powers: ClassVar[Mapping[str, int]] = {"coefficient": 1}
 
     coefficient: float = parameter(0.0, "N*s/m")
 
@@ -64,6 +66,7 @@ class QuadraticDrag(Effect):
     statement: ClassVar[str] = "a drag in proportion to the square of the object's speed"
     frame: ClassVar[str] = "object_velocity"
     amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
+    mass_powers: ClassVar[Mapping[str, int]] = {"coefficient": 1}
 
     coefficient: float = parameter(0.0, "N*s^2/m^2")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -161,6 +161,9 @@ class Effect:
     amplitudes: ClassVar[tuple[str, ...]]
     # Parameters that the catalogue does not have.
     beyond: ClassVar[tuple[str, ...]] = ()
+    # Chart coordinates that change with this power of the object's mass where its motion stays the same: 1 for what
+    # is in proportion to a force, since friction and inertia are. Nothing but a force can tell mass and these apart.
+    mass_powers: ClassVar[Mapping[str, int]] = {}
 
     @property
     def is_null(self) -> bool:

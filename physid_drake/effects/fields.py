@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -62,6 +63,7 @@ class Tether(Effect):
     statement: ClassVar[str] = "a pull towards a point of the world that grows with the distance: a spring or a cable"
     frame: ClassVar[str] = "world"
     amplitudes: ClassVar[tuple[str, ...]] = ("stiffness",)
+    mass_powers: ClassVar[Mapping[str, int]] = {"stiffness": 1, "force_x": 1, "force_y": 1}
 
     stiffness: float = parameter(0.0, "N/m")
     x: float = parameter(0.0, "m")
@@ -138,6 +140,7 @@ class Magnet(Effect):
     statement: ClassVar[str] = "an attraction to a point of the table that fades with distance"
     frame: ClassVar[str] = "world"
     amplitudes: ClassVar[tuple[str, ...]] = ("strength",)
+    mass_powers: ClassVar[Mapping[str, int]] = {"strength": 1}
 
     strength: float = parameter(0.0, "N*m^2")
     x: float = parameter(0.0, "m")

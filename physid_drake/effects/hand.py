@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -54,6 +55,7 @@ class HandCompliance(_HandEffect):
     statement: ClassVar[str] = "the tip gives way under the force of the contact"
     frame: ClassVar[str] = "contact"
     amplitudes: ClassVar[tuple[str, ...]] = ("compliance",)
+    mass_powers: ClassVar[Mapping[str, int]] = {"compliance": -1}
 
     compliance: float = parameter(0.0, "m/N")
     damping: float = parameter(0.5, "-")
