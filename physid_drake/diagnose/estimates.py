@@ -27,6 +27,7 @@ from physid_drake.identify.theta import cell_error
 
 Array = NDArray[np.float64]
 
+Z90 = float(stats.norm.ppf(0.95))
 SAMPLES = 400  # of an effect's chart, for the intervals of its parameters
 JOINT_SAMPLES = 2000  # of theta and all charts, for how the estimates vary together
 IDENTIFIABLE = 0.5  # posterior over prior standard deviation
@@ -42,7 +43,7 @@ def shared_covariance(fitted: Fitted) -> Array:
 def _t_factor(fitted: Fitted) -> float:
     """How much wider than a normal interval one is with so few pushes."""
     free = max(2, len(fitted.pushes) - fitted.own_dimension)
-    return float(stats.t.ppf(0.95, free) / stats.norm.ppf(0.95))
+    return float(stats.t.ppf(0.95, free)) / Z90
 
 
 def parameters_of(evidence: Evidence, k: int) -> dict[str, ParameterEstimate]:
@@ -106,27 +107,34 @@ def theta_of(evidence: Evidence, fitted: Fitted) -> dict[str, ThetaEstimate]:
     space = evidence.case.thetas.space
     covariance = shared_covariance(fitted)
     _, prior = evidence.fitter.priors(fitted.state)
-    reach = float(stats.norm.ppf(0.95)) * _t_factor(fitted)
     before = np.asarray(space.from_unit(evidence.nearest.state.u))
     here = np.asarray(space.from_unit(fitted.state.u))
+    intervals = theta_intervals(evidence.case, fitted)
     result = {}
     for j, parameter in enumerate(space.parameters):
-        std = math.sqrt(covariance[j, j])
-        told = std < IDENTIFIABLE * prior[j]
-        std = math.hypot(std, cell_error(space, here, j))
-        ends = []
-        for sign in (-1.0, 1.0):
-            u = fitted.state.u.copy()
-            u[j] = float(np.clip(u[j] + sign * reach * std, 0.0, 1.0))
-            ends.append(float(space.from_unit(u)[j]))
+        told = math.sqrt(covariance[j, j]) < IDENTIFIABLE * prior[j]
         result[parameter.name] = ThetaEstimate(
             value=float(here[j]) if told else None,
             unit=parameter.unit,
-            ci90=(ends[0], ends[1]) if told else None,
+            ci90=intervals[parameter.name] if told else None,
             identifiable=bool(told),
             before=float(before[j]),
         )
     return result
+
+
+def theta_intervals(case: Case, fitted: Fitted) -> dict[str, tuple[float, float]]:
+    """90 % intervals of theta, whether these pushes tell it or not, the cell's own error in them."""
+    space, u = case.thetas.space, fitted.state.u
+    covariance, reach = shared_covariance(fitted), Z90 * _t_factor(fitted)
+    here = np.asarray(space.from_unit(u))
+    intervals = {}
+    for j, name in enumerate(space.names):
+        std = math.hypot(math.sqrt(covariance[j, j]), cell_error(space, here, j))
+        along = reach * std * np.eye(len(u))[j]
+        low, high = (float(space.from_unit(np.clip(end, 0.0, 1.0))[j]) for end in (u - along, u + along))
+        intervals[name] = (low, high)
+    return intervals
 
 
 def correlation_of(case: Case, fitted: Fitted) -> tuple[tuple[str, ...], Array]:
@@ -145,7 +153,8 @@ def correlation_of(case: Case, fitted: Fitted) -> tuple[tuple[str, ...], Array]:
     at = len(names)
     for point in state.effects:
         here = point.effect(case)
-        effects = [point.moved(case, move).effect(case) for move in moves[:, at : at + len(point.free)]]
+        drawn_moves = _more_than_nothing(point, case, moves[:, at : at + len(point.free)])
+        effects = [point.moved(case, move).effect(case) for move in drawn_moves]
         at += len(point.free)
         for name in here.units():
             if isinstance(getattr(here, name), float):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.estimates import correlation_of
+from physid_drake.diagnose.estimates import correlation_of, theta_intervals
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import Diagnosis
@@ -33,9 +33,8 @@ def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
     """The model that leaves, as ``model.yaml`` has it: with the effects if they were found, else plain."""
     case, fitted = evidence.case, fit_that_leaves(diagnosis, evidence)
     state, spec = fitted.state, case.pool.spec
-    intervals: dict[str, object] = {
-        f"theta.{name}": list(t.ci90) for name, t in diagnosis.theta.items() if t.ci90 is not None
-    }
+    # Also of what these pushes do not tell: a drag is known over a mass, and belief in one goes with the other.
+    intervals: dict[str, object] = {f"theta.{n}": list(ends) for n, ends in theta_intervals(case, fitted).items()}
     for effect in diagnosis.effects:
         intervals |= {f"{effect.name}.{name}": p.ci90 for name, p in effect.parameters.items()}
     names, matrix = correlation_of(case, fitted)

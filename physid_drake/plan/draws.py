@@ -60,7 +60,8 @@ def draws_of(
 ) -> tuple[Draw, ...]:
     """Draws from the belief that intervals, correlation and scatter are.
 
-    Each estimate is normal, log-normal where it is positive, with its interval; a Gaussian copula ties them.
+    Each estimate is normal, log-normal where it is positive or its interval is that of a logarithm; a Gaussian copula
+    ties them.
     Estimates that the model's correlation does not hold are independent. Friction's departure in this push is
     Student's: normal, with a variance that a few pushes have told.
 
@@ -143,13 +144,18 @@ def _moved(model: Model, scores: dict[str, float], scatter: float) -> Model:
 
 def _shifted(value: float, interval: tuple[float, float], score: float, *, positive: bool) -> float:
     low, high = interval
-    if positive and low > 0.0 and value > 0.0:
+    if low > 0.0 and value > 0.0 and (positive or _is_logarithms(value, low, high)):
         return value * math.exp(score * math.log(high / low) / (2.0 * Z90))
     moved = value + score * (high - low) / (2.0 * Z90)
     # An interval that stays on one side of zero is of something that has a sign.
     if low >= 0.0:
         return max(0.0, moved)
     return min(0.0, moved) if high <= 0.0 else moved
+
+
+def _is_logarithms(value: float, low: float, high: float) -> bool:
+    """Whether an interval lies about a value as one in the logarithm does."""
+    return abs(math.sqrt(low * high) - value) < abs(0.5 * (low + high) - value)
 
 
 def _body(body: Body, parameter: str, model: Model, shift: Callable[[float], float]) -> Body:

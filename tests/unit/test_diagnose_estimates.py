@@ -74,6 +74,15 @@ def test_an_effect_that_is_there_is_more_than_nothing_however_little_is_known_of
     np.testing.assert_allclose(np.log(np.array(told.ci90) / 5.0), [-reach, reach], rtol=0.15)  # of 400 draws
 
 
+def test_a_drag_over_a_mass_that_nobody_weighed_varies_with_it():
+    """Known to a factor of two at a deviation, both, and their ratio to a hundredth: no draw ends at no drag."""
+    drag = EffectPoint(kind=QuadraticDrag, point=np.array([5.0]), free=(0,), origin=np.zeros(1))
+    stds = np.array([0.1, 0.7 * 5.0])
+    ratio = np.array([[1.0, 0.9999], [0.9999, 1.0]])
+    _, found = correlation_of(CASE, fitted(drag, covariance=ratio * np.outer(stds, stds)))
+    assert found[0, 1] > 0.999  # 0.991 where the draws that end at nothing are tied
+
+
 def test_what_does_not_vary_or_is_no_single_number_is_left_out():
     names, found = correlation_of(CASE, fitted(point(TableTilt, (0,)), covariance=1e-4 * np.eye(2)))
     assert names == ("theta.support_friction", "table_tilt.x") and found.shape == (2, 2)

@@ -8,6 +8,7 @@ import pytest
 from plans import GOAL, MODEL, START, TILTED, made
 from scipy import stats
 
+from physid_drake.effects.drag import QuadraticDrag
 from physid_drake.errors import ConfigError
 from physid_drake.model import Correlation
 from physid_drake.plan import DistanceToGoal, Situation
@@ -55,6 +56,20 @@ def test_draws_vary_together_as_the_model_says_and_keep_their_intervals():
     assert abs(correlations[0, 1]) < 0.1 and abs(correlations[1, 2]) < 0.1
     np.testing.assert_allclose(values(together).std(axis=1), values(alone).std(axis=1), rtol=0.08)
     assert abs(np.corrcoef(values(alone))[0, 2]) < 0.1
+
+
+def test_a_drag_over_a_mass_that_nobody_weighed_stays_what_the_pushes_told():
+    """Both are unsure by a factor of four, in their logarithms, and go together."""
+    names = ("theta.mass", "quadratic_drag.coefficient")
+    intervals = {names[0]: [0.25 * MODEL.body.mass, 4.0 * MODEL.body.mass], names[1]: [1.6, 26.0]}
+    unweighed = replace(
+        MODEL, effects=(QuadraticDrag(coefficient=6.5),), intervals=intervals,
+        correlation=Correlation(names=names, matrix=((1.0, 1.0), (1.0, 1.0))),
+    )  # fmt: skip
+    drawn = models_from(unweighed)
+    drags, masses = (np.array(v) for v in zip(*((m.effects[0].coefficient, m.body.mass) for m in drawn), strict=True))
+    assert np.ptp(np.log(masses)) > np.log(16.0)
+    np.testing.assert_allclose(drags / masses, 6.5 / MODEL.body.mass, rtol=0.03)
 
 
 def test_friction_and_tilt_that_are_known_together_spread_the_end_less_than_each_alone():
