@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses as dc
 import hashlib
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,11 @@ from physid_drake.recording.values import Recording
 
 
 def digest_of(recording: Recording) -> str:
-    """SHA-256 of all that a recording says, wherever it lies, in hexadecimal."""
+    """SHA-256 of all that a recording says, its mesh among it and wherever it lies, in hexadecimal.
+
+    Raises:
+        OSError: if its mesh cannot be read any more.
+    """
     digest = hashlib.sha256()
     for piece in _pieces(recording):
         digest.update(piece)
@@ -24,6 +29,8 @@ def _pieces(value: Any) -> Iterator[bytes]:
     if isinstance(value, np.ndarray):
         yield repr(value.shape).encode()
         yield np.ascontiguousarray(value).tobytes()
+    elif isinstance(value, Path):
+        yield value.read_bytes()
     elif dc.is_dataclass(value):
         for field in (f for f in dc.fields(value) if f.compare):
             yield field.name.encode()

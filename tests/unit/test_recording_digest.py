@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from physid_drake.recording import digest_of, read_recording
+from physid_drake.recording import MeshShape, digest_of, read_recording
 from physid_drake.resources import shipped
 
 
@@ -36,3 +36,14 @@ def test_a_copy_has_the_same_digest(recording, tmp_path):
 )
 def test_any_change_changes_it(recording, changed):
     assert digest_of(changed(recording)) != digest_of(recording)
+
+
+def test_a_mesh_counts_by_what_is_in_it_and_not_by_where_it_is(recording, tmp_path):
+    def with_mesh(folder, text):
+        file = tmp_path / folder / "object.obj"
+        file.parent.mkdir()
+        file.write_text(text, encoding="utf-8")
+        return dc.replace(recording, object=dc.replace(recording.object, shape=MeshShape(file=file)))
+
+    first, copy, other = with_mesh("a", "v 0 0 0\n"), with_mesh("b", "v 0 0 0\n"), with_mesh("c", "v 0 0 1\n")
+    assert digest_of(first) == digest_of(copy) != digest_of(other)
