@@ -32,7 +32,6 @@ from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]
 
-SLENDER = 2.5  # height over radius above which an object leans notably under load transfer
 EDGE_POINTS = 200  # under an object where the table's edge cuts the underside
 
 
@@ -78,7 +77,6 @@ class Cell:
         self._at_edge: Cell | None = None
         edge = np.asarray(table, dtype=np.float64) if table is not None and with_edge else None
         self.solid: Solid = solid_of(shape)
-        self.mean_depth = self.config.contact.rest_depth_m * _stiffer(self.solid)
         builder = DiagramBuilder()
         self.scene: Scene = add_scene(
             builder, self.config, self.solid, hand_radius, edge=edge, pressure=pressure, gravity=gravity
@@ -87,7 +85,7 @@ class Cell:
         self._cells = cells
         self.setters: tuple[ParameterSetter, ...] = (
             InertiaSetter(self.scene),
-            SupportSetter(self.scene, self.config, cells, self.mean_depth),
+            SupportSetter(self.scene, self.config, cells),
             HandContactSetter(self.scene, self.config),
         )
         for setter in self.setters:
@@ -110,7 +108,7 @@ class Cell:
         hydroelastic = self.config.contact.model == "hydroelastic" and solver.scheme == "cenic"
         self._stepper = Stepper(
             self.scene, self.simulator, solver, hand_radius,
-            tilt_depth=self.mean_depth if hydroelastic and edge is None else None,
+            tilt_depth=self.scene.rest_depth if hydroelastic and edge is None else None,
         )  # fmt: skip
 
     def set_body(self, body: Body) -> None:
@@ -199,7 +197,7 @@ class Cell:
 
     def rest_pose(self, body: Body) -> Array:
         """Settled pose (7,) of B, quaternion wxyz and position, at the origin with yaw 0."""
-        depth = self.mean_depth
+        depth = self.scene.rest_depth
         if self.solid.rolling_radius is not None:
             return np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5 * self.solid.height - depth])
         plane, _ = rest_depths(self.scene.support, body.p_BBcm, depth)
@@ -207,15 +205,6 @@ class Cell:
         quaternion = np.array([1.0, 0.5 * roll, 0.5 * pitch, 0.0])
         z = 0.5 * self.solid.height - float(plane[0])
         return np.array([*(quaternion / np.linalg.norm(quaternion)), 0.0, 0.0, z])
-
-
-def _stiffer(solid: Solid) -> float:
-    """Share of the rest depth that a slender object gets: it leans in proportion to depth and slenderness squared."""
-    if solid.rolling_radius is not None:
-        return 1.0
-    x0, y0, x1, y1 = solid.underside.extent()
-    radius = 0.5 * min(x1 - x0, y1 - y0)
-    return float(np.clip((SLENDER * radius / solid.height) ** 2, 1.0 / 3.0, 1.0))
 
 
 def holding_body(body: Body, frictions: Sequence[FrictionLaw]) -> Body:

@@ -38,6 +38,7 @@ Array = NDArray[np.float64]
 
 GRAVITY = 9.81  # m/s^2, as Drake's default gravity field
 TABLE_FRICTION = 1e6  # so rough that each pair's friction is set by the other side alone (see `paired_friction`)
+SLENDER = 2.5  # height over radius above which an object leans notably under load transfer
 FOOT_RADIUS = 3e-3  # m, of a support sphere; only its lowest point matters
 # kg. Within a tick the contact slows the hand by its force times the tick over this mass, which lets a contact that
 # sticks creep: with 100 kg, ticks of 10 ms and a hand of 2 mm/s, forces turned by 5 deg. With this, by 0.02 deg;
@@ -71,6 +72,7 @@ class Scene:
         solid: the object's shape.
         joints: the hand's prismatic joints x, y, z; empty without a hand.
         gravity: m/s^2.
+        rest_depth: how deep an evenly loaded underside is in the table [m].
     """
 
     plant: MultibodyPlant
@@ -85,6 +87,7 @@ class Scene:
     solid: Solid
     joints: tuple[PrismaticJoint, ...]
     gravity: float
+    rest_depth: float
 
 
 def contact_properties(*, friction: float, static_friction: float | None = None, stiffness: float | None = None,
@@ -154,7 +157,17 @@ def add_scene(
     return Scene(
         plant=plant, scene_graph=scene_graph, object=body, table_geometry=table, feet=feet, foot_cells=foot_cells,
         hand_geometry=hand, face_geometries=faces, support=support, solid=solid, joints=joints, gravity=gravity,
+        rest_depth=config.contact.rest_depth_m * _stiffer(solid),
     )  # fmt: skip
+
+
+def _stiffer(solid: Solid) -> float:
+    """Share of the rest depth that a slender object gets: it leans in proportion to depth and slenderness squared."""
+    if solid.rolling_radius is not None:
+        return 1.0
+    x0, y0, x1, y1 = solid.underside.extent()
+    radius = 0.5 * min(x1 - x0, y1 - y0)
+    return float(np.clip((SLENDER * radius / solid.height) ** 2, 1.0 / 3.0, 1.0))
 
 
 def _axis_support(support: Support) -> Support:

@@ -77,6 +77,8 @@ class ObjectState:
         inertia: about the vertical through the centre of mass [kg m^2].
         underside: the support points.
         lean: depth of Bo's foot in the table [m], and how it grows along x and y of B [-].
+        stiffness: of the whole support [N/m], from which the contact takes what friction bears; None where the loads
+            together carry the weight, however deep the object is.
     """
 
     time: float
@@ -92,6 +94,7 @@ class ObjectState:
     inertia: float
     underside: Underside
     lean: tuple[float, float, float]
+    stiffness: float | None = None
 
     @cached_property
     def p_WBcm(self) -> Array:
@@ -144,10 +147,16 @@ class ObjectState:
 
     @cached_property
     def loads(self) -> Array:
-        """Normal forces (n,) on the support points [N]: in proportion to depth, carrying the weight together."""
+        """Normal forces (n,) on the support points [N]: in proportion to depth.
+
+        They are the contact's own: what laws give back of its friction must be a share of what it has. Of loads that
+        always carry the weight together, the difference leans a tall object that is pushed, and that makes it larger.
+        """
         foot, along_x, along_y = self.lean
         points = self.underside.points
         shares = self.underside.weights * np.maximum(foot + along_x * points.real + along_y * points.imag, 0.0)
+        if self.stiffness is not None:
+            return np.asarray(self.stiffness * shares)
         total = float(shares.sum())
         loads: Array = shares * (self.weight / total) if total > 0.0 else shares
         return loads
@@ -161,7 +170,8 @@ class ObjectState:
         point, centre = complex(base.points[i]), base.load_centre
         depth = foot + along_x * point.real + along_y * point.imag
         mean = foot + along_x * centre.real + along_y * centre.imag
-        return float(base.friction[i] * base.weights[i]) * self.weight * depth / mean
+        stiffness = self.weight / mean if self.stiffness is None else self.stiffness
+        return float(base.friction[i] * base.weights[i]) * stiffness * depth
 
     def slip_direction_at(self, i: int) -> complex:
         """Direction in which support point i slips, x + iy in W: that of ``slip_directions``."""
@@ -212,6 +222,7 @@ class StateReader:
         inertia: about the vertical through the centre of mass [kg m^2].
         p_BBcm: x + iy [m].
         half_height: of the object [m].
+        stiffness: of the whole support [N/m].
     """
 
     underside: Underside
@@ -220,8 +231,11 @@ class StateReader:
     inertia: float
     p_BBcm: complex
     half_height: float
+    stiffness: float
 
-    def at(self, time: float, span: float, X_WB: Sequence[float], V_WB: Sequence[float]) -> ObjectState:
+    def at(
+        self, time: float, span: float, X_WB: Sequence[float], V_WB: Sequence[float], *, settled: bool = False
+    ) -> ObjectState:
         """The state.
 
         Args:
@@ -229,6 +243,7 @@ class StateReader:
             span: how long the tick is that begins then [s].
             X_WB: (7,) quaternion wxyz and position [m].
             V_WB: (6,) angular and linear velocity in W.
+            settled: whether the friction of the tick will be mended to what the weight bears.
         """
         px, py, yaw = planar_pose(*X_WB[:6])
         return ObjectState(
@@ -245,6 +260,7 @@ class StateReader:
             inertia=self.inertia,
             underside=self.underside,
             lean=self.lean(X_WB),
+            stiffness=None if settled else self.stiffness,
         )
 
     def lean(self, X_WB: Sequence[float]) -> tuple[float, float, float]:
@@ -268,6 +284,7 @@ def reader_of(body: Body, scene: Scene) -> StateReader:
         inertia=body.mass * body.inertia_ratio * solid.gyration[2],
         p_BBcm=complex(float(body.p_BBcm[0]), float(body.p_BBcm[1])),
         half_height=0.5 * solid.height,
+        stiffness=body.mass * scene.gravity / scene.rest_depth,
     )
 
 

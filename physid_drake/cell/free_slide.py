@@ -45,6 +45,11 @@ class FreeSlide:
         state.set_twist((vx, vy, wz))
         return vx, vy, wz
 
+    @property
+    def mends_friction(self) -> bool:
+        """Whether ``without_tilt_friction`` has anything to take back."""
+        return self._tilt_gain > 0.0
+
     def mend_position(self, state: PlantState, before: Planar, after: Planar, span: float) -> None:
         """Move the object by half of what its velocity changed from ``before`` to ``after`` over a ``span`` [s]."""
         if self._trapezoid:

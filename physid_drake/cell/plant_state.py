@@ -113,10 +113,14 @@ class PlantState:
         py += 2.0 * (j * k - w * i) * above
         return (px, py, pose[2]), (vx + wy * above, vy - wx * above, wz)
 
-    def object_state(self, time: float, span: float) -> ObjectState:
-        """The object as force laws see it when a tick of ``span`` [s] begins, ``time`` [s] after the start."""
+    def object_state(self, time: float, span: float, *, settled: bool = False) -> ObjectState:
+        """The object as force laws see it when a tick of ``span`` [s] begins, ``time`` [s] after the start.
+
+        ``settled`` where the friction of the tick will be mended to what the weight bears.
+        """
         q, v = self._q, self._v
-        return self._reader.at(time, span, self._x[q : q + 7].tolist(), self._x[v : v + 6].tolist())
+        X_WB, V_WB = self._x[q : q + 7].tolist(), self._x[v : v + 6].tolist()
+        return self._reader.at(time, span, X_WB, V_WB, settled=settled)
 
     def turns(self) -> bool:
         """Whether the object turns about a place under it or close by."""

@@ -132,10 +132,9 @@ class InertiaSetter(ParameterSetter):
 class SupportSetter(ParameterSetter):
     """Static ratio, mass (the stiffness follows the weight), and kinetic friction per cell [-]."""
 
-    def __init__(self, scene: Scene, config: CellConfig, cells: int, mean_depth: float) -> None:
+    def __init__(self, scene: Scene, config: CellConfig, cells: int) -> None:
         super().__init__("support_friction", scene, 2 + cells)
         self._dissipation = config.contact.dissipation_s_per_m
-        self._mean_depth = mean_depth
         self._hydroelastic = scene.solid.rolling_radius is None and any(len(points) > 1 for _, points in scene.feet)
 
     def part_of(self, body: Body) -> Array:
@@ -145,7 +144,7 @@ class SupportSetter(ParameterSetter):
     def write(self, root: Context, value: Array) -> None:
         """Write friction per foot, and the stiffness that gives the chosen rest depth."""
         ratio, mass, friction = value[0], value[1], value[2:]
-        stiffness = mass * self.scene.gravity / self._mean_depth
+        stiffness = mass * self.scene.gravity / self.scene.rest_depth
         if self._hydroelastic:
             self._write_modulus(root, stiffness)
         for (geometry, points), cell in zip(self.scene.feet, self.scene.foot_cells, strict=True):

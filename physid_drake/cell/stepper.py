@@ -273,7 +273,7 @@ class Stepper:
         if push is not None:
             force = push.jx / span, push.jy / span, 0.0
             self._take(push)
-        pushed, after = self._advance(end, begin)
+        pushed, after = self._advance(end, begin, free=push is None)
         if push is None:
             after = self._slide.without_tilt_friction(self._state, pushed, after)
         self._slide.mend_position(self._state, old, after, span)
@@ -288,7 +288,7 @@ class Stepper:
             self._drift.forget()
         command = self._drift.command(before, move.velocity, span)
         state.set_hand(move.start, self._height, command)
-        pushed, after = self._advance(end, begin)
+        pushed, after = self._advance(end, begin, free=not touching)
         if touching:
             force = self._hand_force(command, span)
             if self._solver.drift_feedforward:
@@ -298,14 +298,16 @@ class Stepper:
             self._slide.mend_position(state, old, after, span)
         self._record(end, force)
 
-    def _advance(self, end: float, begin: float) -> tuple[Planar, Planar]:
+    def _advance(self, end: float, begin: float, *, free: bool) -> tuple[Planar, Planar]:
         """Let the laws act and Drake step; returns the object's twists before and after Drake's step.
+
+        ``free`` where nothing pushes the object.
 
         Raises:
             FloatingPointError: if the object has flown away.
         """
         state = self._state
-        self._laws.act(state, begin, end - begin)
+        self._laws.act(state, begin, end - begin, settled=free and self._slide.mends_friction)
         before = state.twist()
         state.send()
         self._simulator.AdvanceTo(end)
