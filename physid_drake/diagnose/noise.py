@@ -19,6 +19,7 @@ LONGEST = 60  # samples of a rest that are looked at together
 FEWEST = 40  # samples at rest, in all, that tell a noise
 FORCE_SCATTER = 0.03
 UNKNOWN = "neither stated nor seen at rest"
+UNUSUAL = 3.0  # times the median scatter of rests: one of more is none
 CONTRADICTS = 1.5  # seen over stated: beyond it the stated figure is not believed
 
 
@@ -93,7 +94,9 @@ def tracker_noise(recording: Recording) -> tuple[TrackerNoise, Noise]:
     part of a slow noise away, does not make the noise look smaller.
     """
     plain = noise_of(recording)
-    pieces = [(push.object.times[r], push.object.planar[r]) for push in recording.pushes for r in rest_segments(push)]
+    pieces = _usual(
+        [(push.object.times[r], push.object.planar[r]) for push in recording.pushes for r in rest_segments(push)]
+    )
     seen_xy = _reml([(t, p[:, k]) for t, p in pieces for k in (0, 1)], FINEST_POSITION)
     seen_yaw = _reml([(t, p[:, 2]) for t, p in pieces], FINEST_ROTATION)
     warnings: list[str] = []
@@ -101,16 +104,42 @@ def tracker_noise(recording: Recording) -> tuple[TrackerNoise, Noise]:
     rotation, tau_yaw = _chosen("rotation", plain.rotation, plain.source["rotation"], seen_yaw, warnings)
     if seen_yaw is None:  # too little rest for one stream, enough for two: it is the same tracker's filter
         tau_yaw = tau_xy
+    believed = not warnings
+    warnings += _of_hand_and_force(recording, plain)
     noise = TrackerNoise(
         position=position,
         rotation=rotation,
         correlation_time=(tau_xy, tau_yaw),
         jitter=_jitter(recording.pushes),
-        stated=plain.source["position"] == "stated" and not warnings,
-        known=seen_xy is not None or plain.source["position"] != "assumed",
+        stated=plain.source["position"] == "stated" and believed,
+        known=_known(plain, "position", seen_xy) and _known(plain, "rotation", seen_yaw),
         warnings=tuple(warnings),
     )
     return noise, dc.replace(plain, position=position, rotation=rotation)
+
+
+def _usual(pieces: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
+    """The rests (times, poses) that scatter about as the others do: what hardly moves may pass for a rest."""
+    if not pieces:
+        return []
+    spreads = np.array([poses.std(axis=0) for _, poses in pieces])
+    usual = (spreads <= UNUSUAL * np.median(spreads, axis=0)).all(axis=1)
+    return [piece for piece, kept in zip(pieces, usual, strict=True) if kept]
+
+
+def _known(plain: Noise, what: str, seen: tuple[float, float] | None) -> bool:
+    return seen is not None or plain.source[what] != "assumed"
+
+
+def _of_hand_and_force(recording: Recording, plain: Noise) -> list[str]:
+    """What contradicts the stated noise of hand and force."""
+    said = (("hand's", "hand", recording.sensors.hand_position_std, plain.hand, "mm", 1e3),
+            ("force's", "force", recording.sensors.force_std, plain.force, "N", 1.0))  # fmt: skip
+    return [
+        f"the {whose} noise is {scale * seen:.2g} {unit}, {seen / stated:.1f} times what the recording states"
+        for whose, name, stated, seen, unit, scale in said
+        if stated is not None and plain.source[name] == "seen"
+    ]
 
 
 def _chosen(

@@ -11,7 +11,7 @@ from physid_drake.cell import CellConfig, HandPath, Start
 from physid_drake.cell.hand_fit import fit_hand_paths, stream_std
 from physid_drake.errors import RecordingError
 from physid_drake.identify.force_windows import force_windows
-from physid_drake.recording import Box as BoxShape
+from physid_drake.identify.frames import check_hand_near, check_on_table, check_upright
 from physid_drake.recording import Cylinder as CylinderShape
 from physid_drake.recording import (
     Hand,
@@ -32,10 +32,10 @@ DEFAULT_HAND_STD = 1e-4  # m
 DEFAULT_FORCE_STD = 0.05  # N
 LARGEST_CORRELATION = 0.98
 STANDING = 0.3  # area that the x and y axes of the tip span in the plane: less, and the tip lies
+DISPROVED = 2.0  # times what is stated of hand or force: noise that is seen to be louder is believed
 MOVED = 5e-3  # m: more than a tracker's noise
 LONGEST_SLIDE = 1.5  # s: after it a released object rests
 BLINK = 0.1  # s: a hand that is away from the object for so long is not
-UPRIGHT = 0.87  # cosine of 30 degrees: an object that leans more does not stand on its face
 GRIP = 0.5  # of a round tip's radius: so far beyond the object's edge it still touches it nearly as wide as it is
 # A simulation without noise, or a tracker that is quiet at rest: below these the cell's own error is what differs.
 FINEST_POSITION = 1e-5  # m
@@ -78,7 +78,11 @@ def noise_of(recording: Recording) -> Noise:
     source: dict[str, str] = {}
 
     def choose(name: str, said: float | None, estimate: float | None, assumed: float, finest: float) -> float:
-        if said is not None:
+        # The object's is judged by a diagnosis, which knows how slow its noise is.
+        disproved = (
+            name in ("hand", "force") and estimate is not None and estimate > DISPROVED * max(said or 0.0, finest)
+        )
+        if said is not None and not disproved:
             source[name] = "stated"
             return max(said, finest)
         if estimate is not None and estimate > SILENT * finest:
@@ -176,8 +180,10 @@ def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[Push
         height: of the object [m].
 
     Raises:
-        RecordingError: if the hand passes above the object or an object cannot be compared.
+        RecordingError: if the hand passes above the object or never comes near it, or if an object stands beside the
+            table, tips, or cannot be compared.
     """
+    check_hand_near(recording)
     hands = {k: _beside(recording, push, height) for k, push in enumerate(recording.pushes)}
     moving = {k: hand for k, hand in hands.items() if hand is not None}
     fitted = fit_hand_paths([(hand.times, hand.positions[:, :2]) for hand in moving.values()], noise.hand)
@@ -189,7 +195,8 @@ def _problem(
     recording: Recording, order: int, hand: PoseStream | None, path: HandPath | None, noise: Noise, height: float
 ) -> PushProblem:
     push = recording.pushes[order]
-    _check_upright(recording, push)
+    check_upright(recording, push)
+    check_on_table(recording, push)
     planar = push.object.planar
     start, start_std = _start_of(push, planar, noise, free=path is None)
     compared = np.ones(len(planar), dtype=bool)
@@ -211,26 +218,6 @@ def _problem(
         forces=forces.means,
         force_std=forces.stds,
     )
-
-
-def _check_upright(recording: Recording, push: Push) -> None:
-    """Refuses an object that lies on another face than the recording says.
-
-    A lying cylinder may be turned; a box or a cylinder upside down is the same object.
-    """
-    shape = recording.object.shape
-    if isinstance(shape, CylinderShape) and shape.axis == "y":
-        return
-    _, x, y, _ = push.object.quaternions[0]
-    cosine = 1.0 - 2.0 * float(x * x + y * y)
-    if isinstance(shape, BoxShape | CylinderShape):
-        cosine = abs(cosine)
-    if cosine < UPRIGHT:
-        lean = np.degrees(np.arccos(cosine))
-        raise RecordingError(
-            f"push '{push.name}': the object's z axis is {lean:.0f} degrees from the vertical as the push begins;"
-            " give its shape in a frame B whose z axis points up."
-        )
 
 
 def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[Start, Array]:

@@ -48,7 +48,8 @@ def rests_of(stream: PoseStream) -> list[slice]:
     Windows of a quarter of a second find motion that rises above the noise within them. What is slower than that, a
     push at some millimetres per second, shows over a longer time: a rest that creeps is cut to the part before the
     creeping begins, or after it has ended. Noise that is slow itself looks like motion within a window: a stream that
-    does not seem to rest at both of its ends is looked at again, with as much of it as its bends show.
+    does not seem to rest at both of its ends is looked at again, with as much of it as its bends show. A slide that
+    ends would pass for such noise, but does not stay where it was.
     """
     count = len(stream)
     if count < 2 * SHORTEST_REST:
@@ -56,7 +57,7 @@ def rests_of(stream: PoseStream) -> list[slice]:
     found = _rests(stream.times, stream.planar, slow=False)
     if found and found[0].start == 0 and found[-1].stop == count:
         return found
-    again = _rests(stream.times, stream.planar, slow=True)
+    again = [r for r in _rests(stream.times, stream.planar, slow=True) if _stays(stream.times[r], stream.planar[r])]
     return max((found, again), key=lambda rests: sum(rest.stop - rest.start for rest in rests))
 
 
@@ -160,6 +161,14 @@ def _creeps(times: Array, planar: Array) -> bool:
     line, *_ = np.linalg.lstsq(design, planar, rcond=None)
     scatter = (planar - design @ line).std(axis=0)
     return bool((np.abs(line[1]) > CREEP * scatter + _LIMITS * span).any())
+
+
+def _stays(times: Array, planar: Array) -> bool:
+    """Whether the last third of a rest is where the first is, by what the quietest third scatters."""
+    thirds = np.array_split(planar, 3)
+    away = np.abs(thirds[-1].mean(axis=0) - thirds[0].mean(axis=0))
+    scatter = np.min([third.std(axis=0) for third in thirds], axis=0)
+    return bool((away <= CREEP * scatter + _LIMITS * (times[-1] - times[0])).all())
 
 
 def _before_creep(times: Array, planar: Array) -> int | None:

@@ -11,7 +11,9 @@ from physid_drake.diagnose import noise as noise_module
 from physid_drake.diagnose.features import features_of
 from physid_drake.diagnose.noise import _reml, tracker_noise
 from physid_drake.identify.problem import problems_of
-from physid_drake.recording import rest_segments
+from physid_drake.recording import PoseStream, Push, rest_segments
+
+RNG = np.random.default_rng(7)
 
 ERASER = OBJECTS["eraser"]
 
@@ -58,6 +60,43 @@ def test_a_stated_noise_that_the_rests_contradict_is_not_believed(recording):
     noise, _ = tracker_noise(wrong)
     assert noise.position == pytest.approx(POSITION_STD, rel=0.15)
     assert "position" in noise.warnings[0]
+
+
+def test_a_hands_noise_that_its_stream_contradicts_is_said(recording):
+    loud = [
+        dc.replace(
+            p, hand=dc.replace(p.hand, positions=p.hand.positions + 5e-4 * RNG.standard_normal((len(p.hand), 3)))
+        )
+        for p in recording.pushes
+    ]
+    sensors = dc.replace(recording.sensors, hand_position_std=5e-5)
+    noise, plain = tracker_noise(dc.replace(recording, pushes=tuple(loud), sensors=sensors))
+    assert plain.hand == pytest.approx(5e-4, rel=0.3)
+    assert "hand's noise" in noise.warnings[0] and noise.stated
+
+
+def test_a_rotation_that_is_neither_stated_nor_seen_is_not_known(recording):
+    ends = endpoints(dc.replace(recording, sensors=dc.replace(recording.sensors, object_rotation_std=None)))
+    assert not tracker_noise(ends)[0].known
+    assert tracker_noise(endpoints(recording))[0].known
+
+
+@pytest.mark.parametrize("rate", [30, 60, 120])
+def test_slides_that_come_to_rest_are_not_taken_for_noise(recording, rate):
+    """Let go at 0.2 m/s and recorded until half a second after they stopped: no rest is where they began."""
+    rng, pushes = np.random.default_rng(3), []
+    for k in range(8):
+        speed, braking = 0.2 * rng.uniform(0.7, 1.3), 0.27 * 9.81
+        times = np.arange(0.0, speed / braking + 0.5, 1.0 / rate)
+        moving = np.minimum(times, speed / braking)
+        x = speed * moving - 0.5 * braking * moving**2 + POSITION_STD * rng.standard_normal(len(times))
+        y, yaw = (std * rng.standard_normal(len(times)) for std in (POSITION_STD, 3e-3))
+        zeros = np.zeros(len(times))
+        quaternions = np.column_stack([np.cos(yaw / 2), zeros, zeros, np.sin(yaw / 2)])
+        stream = PoseStream(times=times, positions=np.column_stack([x, y, zeros]), quaternions=quaternions)
+        pushes.append(Push(name=f"{k}", object=stream, hand=None, force=None))
+    noise, _ = tracker_noise(dc.replace(recording, hand=None, pushes=tuple(pushes)))
+    assert noise.position < 1.5 * POSITION_STD  # up to 17 times before, from one slide of eight
 
 
 @pytest.mark.parametrize("std", [0.0, None])

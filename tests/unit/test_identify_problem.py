@@ -196,6 +196,46 @@ def test_an_object_on_another_face_is_refused(recording):
         first(with_pushes(recording, topple))
 
 
+def test_an_object_that_tips_on_its_way_is_refused(recording):
+    def tip_over(push):
+        half = 0.5 * np.linspace(0.0, np.pi / 2, len(push.object))
+        q = np.column_stack([np.cos(half), np.sin(half), 0.0 * half, 0.0 * half])
+        return replace(push, object=replace(push.object, quaternions=q))
+
+    with pytest.raises(RecordingError, match="the object tips by 90 degrees, from"):
+        first(with_pushes(recording, tip_over))
+
+
+def test_an_object_that_stands_beside_the_table_is_refused(recording):
+    elsewhere = replace(recording, table=replace(recording.table, centre=(9.0, 0.0)))
+    with pytest.raises(RecordingError, match=r"beside the table.*same frame"):
+        first(elsewhere)
+
+
+def test_a_hand_that_never_comes_near_what_moves_is_refused(recording):
+    def away(push):
+        return replace(push, hand=replace(push.hand, positions=push.hand.positions + np.array([0.5, 0.0, 0.0])))
+
+    with pytest.raises(RecordingError, match=r"never comes nearer to one than .* same frame"):
+        first(with_pushes(recording, away))
+    one, *others = recording.pushes
+    first(replace(recording, pushes=(away(one), *others)))  # a push that misses
+
+
+@pytest.mark.parametrize(("said", "believed"), [(5e-5, True), (5e-6, False)])
+def test_a_hand_that_is_louder_than_it_is_said_is_not_believed(recording, said, believed):
+    rng = np.random.default_rng(0)
+
+    def shaken(push):
+        noise = 5e-5 * rng.standard_normal(push.hand.positions.shape)
+        return replace(push, hand=replace(push.hand, positions=push.hand.positions + noise))
+
+    stated = replace(recording, sensors=replace(recording.sensors, hand_position_std=said))
+    noise = noise_of(with_pushes(stated, shaken))
+    assert (noise.source["hand"] == "stated") is believed
+    assert noise.hand == pytest.approx(5e-5, rel=0.6) and noise.hand > 2e-5
+
+
 def test_a_rolling_cylinder_is_touched_at_its_axis(recording):
     can = ObjectModel(shape=Cylinder(radius=0.033, length=0.1, axis="y"))
     assert first(replace(recording, object=can), height=0.066).hand_height == 0.033

@@ -242,10 +242,10 @@ def failing(monkeypatch, which, error):
         count["rollouts"] += 1
         begin(self, *args)
 
-    def fail(self, *args):
+    def fail(self, *args, **more):
         if which(count["rollouts"]):
             raise error
-        return advance(self, *args)
+        return advance(self, *args, **more)
 
     monkeypatch.setattr(Stepper, "_begin_at", begin_at)
     monkeypatch.setattr(Stepper, "_advance", fail)

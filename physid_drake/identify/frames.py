@@ -1,0 +1,84 @@
+"""Whether object, hand and table of a recording are where they can be: else a fit would call it missing physics."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.cell.solid import solid_of
+from physid_drake.errors import RecordingError
+from physid_drake.recording import Box, Cylinder, Push, Recording
+
+Array = NDArray[np.float64]
+
+UPRIGHT = 0.87  # cosine of 30 degrees: an object that leans more does not stand on its face
+TIPPED = 3  # samples: fewer are a tracker's error
+OFF_TABLE = 0.01  # m: a caliper's error
+MOVED = 0.01  # m
+BESIDE = 0.05  # m between tip and object that no error of calibration explains
+
+
+def check_upright(recording: Recording, push: Push) -> None:
+    """Refuses an object that lies on another face than the recording says, or tips on its way.
+
+    A lying cylinder may be turned; a box or a cylinder upside down is the same object.
+    """
+    shape = recording.object.shape
+    if isinstance(shape, Cylinder) and shape.axis == "y":
+        return
+    _, x, y, _ = push.object.quaternions.T
+    cosines = 1.0 - 2.0 * (x * x + y * y)
+    if isinstance(shape, Box | Cylinder):
+        cosines = np.abs(cosines)
+    over = np.flatnonzero(cosines < UPRIGHT)
+    lean = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
+    if len(over) and over[0] == 0:
+        raise RecordingError(
+            f"push '{push.name}': the object's z axis is {lean[0]:.0f} degrees from the vertical as the push begins;"
+            " give its shape in a frame B whose z axis points up."
+        )
+    if len(over) >= TIPPED:
+        begin = push.object.times[over[0]]
+        raise RecordingError(
+            f"push '{push.name}': the object tips by {lean.max():.0f} degrees, from {begin:.2f} s on;"
+            " cut the push before that, or leave it out."
+        )
+
+
+def check_on_table(recording: Recording, push: Push) -> None:
+    """Refuses an object that starts beside the table: in the simulation it would fall."""
+    place = push.object.positions[0, :2]
+    centre, half = np.array(recording.table.centre), 0.5 * np.array(recording.table.size)
+    if (np.abs(place - centre) > half + OFF_TABLE).any():
+        low, high = centre - half, centre + half
+        raise RecordingError(
+            f"push '{push.name}': the object starts at ({place[0]:.3f}, {place[1]:.3f}) m, beside the table, which is"
+            f" from ({low[0]:.3f}, {low[1]:.3f}) to ({high[0]:.3f}, {high[1]:.3f}) m; are both in the same frame?"
+        )
+
+
+def check_hand_near(recording: Recording) -> None:
+    """Refuses hands that never come near objects that move; a push without a touch may be among others."""
+    if recording.hand is None:
+        return
+    gaps = [_least_gap(recording, push) for push in recording.pushes if _moves(push) and push.hand is not None]
+    if gaps and min(gaps) > BESIDE:
+        raise RecordingError(
+            f"recording '{recording.name}': objects move, but the hand never comes nearer to one than"
+            f" {1e3 * min(gaps):.0f} mm; are both streams in the same frame?"
+        )
+
+
+def _moves(push: Push) -> bool:
+    return float(np.linalg.norm(np.ptp(push.object.positions[:, :2], axis=0))) > MOVED
+
+
+def _least_gap(recording: Recording, push: Push) -> float:
+    """Distance [m] that tip and object surely have at least, wherever the object is turned."""
+    assert push.hand is not None and recording.hand is not None
+    times, places = push.object.times, push.object.positions[:, :2]
+    there = np.column_stack([np.interp(push.hand.times, times, column) for column in places.T])
+    apart = np.linalg.norm(push.hand.positions[:, :2] - there, axis=1)
+    extent = np.abs(solid_of(recording.object.shape).outline.extent())
+    corner = float(np.hypot(max(extent[0], extent[2]), max(extent[1], extent[3])))
+    return float(apart.min()) - corner - recording.hand.radius
