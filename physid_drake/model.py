@@ -16,6 +16,7 @@ from physid_drake.cell import Body, Cell, CellConfig, HandPath, Motion, Start
 from physid_drake.cell.cell import holding_body
 from physid_drake.cell.config import ContactConfig, SolverConfig
 from physid_drake.cell.diagram import Scene
+from physid_drake.cell.plant_state import PlantState
 from physid_drake.effects import Effect, effect_named
 from physid_drake.effects.rollout import (
     Geometry,
@@ -179,6 +180,13 @@ class ModelCell:
         self.simulator = augmented.simulator
         self.diagram: Diagram = augmented.diagram
         self.cell.set_body(model.body)
+        self._stand(augmented, body)
+
+    def _stand(self, augmented: Cell, body: Body) -> None:
+        """Place the diagram's object on the table, and its hand far away."""
+        state = PlantState(augmented.scene, self.simulator.get_mutable_context())
+        state.begin(body, Start(pose=(0.0, 0.0, 0.0)), augmented.rest_pose(body))
+        state.send()
 
     def _cell_in(self, attach: Callable[[DiagramBuilder, Scene], object] | None = None) -> Cell:
         """The cell in the effects' geometry."""

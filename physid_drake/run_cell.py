@@ -105,6 +105,8 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     page = result_page(stage.meshcat.StaticHtml(), result, name=recording.name, marks=marks, note=note, plan=plan)
     folder.write("page.html", page)
     folder.write("result.json", result_json(result, recording, scenario.seed, versions()))
+    for stale in ("diagnosis.json", "diagnosis.html", "scene.html"):  # an earlier run's, of another model
+        folder.forget(stale)
     folder.write("model.yaml", identified_model(result, identifier.pool.spec, recording.name).dump())
     console.print(f"written: result.json, page.html and model.yaml in {folder.path}")
     _keep_plan(plan, scenario, folder, console)

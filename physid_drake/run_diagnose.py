@@ -26,7 +26,7 @@ from physid_drake.report.progress import progress_bar
 from physid_drake.report.stage import ShownMotion, Stage
 from physid_drake.report.terminal import terminal
 from physid_drake.resources import shipped
-from physid_drake.run_folder import RunFolder
+from physid_drake.run_folder import RunFolder, named_after
 
 STATE = "stages.npz"
 SHOWN = 12  # pushes in the animation
@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     case = case_of(recording, config, ThetaConfig(), jobs=arguments.jobs, most=arguments.pushes)
     settings = {"seed": arguments.seed, "alpha": arguments.alpha, "effects": arguments.effects,
                 "cell": dc.asdict(config), "pushes": arguments.pushes, "recording": digest_of(recording)}  # fmt: skip
-    out = arguments.out or Path("diagnoses") / recording.name
+    out = arguments.out or Path("diagnoses") / named_after(recording.name)
     folder = RunFolder.open(out, json.dumps(settings, indent=2) + "\n", name="settings.json", states=(STATE,))
     diagnosis, evidence = run_case(
         case, console, seed=arguments.seed, alpha=arguments.alpha, effects=arguments.effects,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,6 +25,11 @@ def versions() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             continue
     return found
+
+
+def named_after(name: str) -> str:
+    """A recording's name as the name of one folder: letters, digits, dots within, dashes and underscores."""
+    return re.sub(r"[^\w.-]+", "_", name).strip("._") or "recording"
 
 
 @dataclass(frozen=True, kw_only=True)

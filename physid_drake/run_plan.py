@@ -24,7 +24,7 @@ from physid_drake.report.plan import plan_json, plan_table, push_files
 from physid_drake.report.plan_page import plan_page, plan_png
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.terminal import terminal
-from physid_drake.run_folder import RunFolder
+from physid_drake.run_folder import RunFolder, named_after
 
 FEWEST_TRIALS, TRIALS_PER_SETTING = 24, 16  # of a search
 
@@ -71,10 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
             friction_scatter=learnt.friction_scatter, scatter_freedom=learnt.scatter_freedom, tick=tick,
         )  # fmt: skip
     with_effects = outcome_under(made, full) if arguments.plain and full.effects else None
-    folder = RunFolder.open(
-        arguments.out or Path("plans") / model.recording, json.dumps(_settings(arguments), indent=2) + "\n",
-        name="settings.json",
-    )  # fmt: skip
+    out = arguments.out or Path("plans") / named_after(model.recording)
+    folder = RunFolder.open(out, json.dumps(_settings(arguments), indent=2) + "\n", name="settings.json")
     write(folder, made, seed=arguments.seed, with_effects=with_effects)
     console.print(plan_table(made, with_effects=with_effects))
     if made.spread is None and arguments.draws:
@@ -126,7 +124,7 @@ def _read(arguments: argparse.Namespace) -> tuple[Model, Learnt]:
     assert file is not None
     model = load_model(file)
     uncertain_names(model)
-    return model, Learnt() if folder is None else _learnt(folder)
+    return model, _learnt(folder or (file if file.is_dir() else file.parent))
 
 
 def _learnt(folder: Path) -> Learnt:

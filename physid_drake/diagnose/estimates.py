@@ -109,7 +109,7 @@ def theta_of(evidence: Evidence, fitted: Fitted) -> dict[str, ThetaEstimate]:
     _, prior = evidence.fitter.priors(fitted.state)
     before = np.asarray(space.from_unit(evidence.nearest.state.u))
     here = np.asarray(space.from_unit(fitted.state.u))
-    intervals = theta_intervals(evidence.case, fitted)
+    intervals = theta_intervals(evidence, fitted)
     result = {}
     for j, parameter in enumerate(space.parameters):
         told = math.sqrt(covariance[j, j]) < IDENTIFIABLE * prior[j]
@@ -123,15 +123,16 @@ def theta_of(evidence: Evidence, fitted: Fitted) -> dict[str, ThetaEstimate]:
     return result
 
 
-def theta_intervals(case: Case, fitted: Fitted) -> dict[str, tuple[float, float]]:
-    """90 % intervals of theta, whether these pushes tell it or not, the cell's own error in them."""
-    space, u = case.thetas.space, fitted.state.u
+def theta_intervals(evidence: Evidence, fitted: Fitted) -> dict[str, tuple[float, float]]:
+    """90 % intervals of theta, told or not, the cell's own error in them, and none wider than the prior's."""
+    space, u = evidence.case.thetas.space, fitted.state.u
+    _, prior = evidence.fitter.priors(fitted.state)
     covariance, reach = shared_covariance(fitted), Z90 * _t_factor(fitted)
     here = np.asarray(space.from_unit(u))
     intervals = {}
     for j, name in enumerate(space.names):
         std = math.hypot(math.sqrt(covariance[j, j]), cell_error(space, here, j))
-        along = reach * std * np.eye(len(u))[j]
+        along = min(reach * std, Z90 * prior[j]) * np.eye(len(u))[j]
         low, high = (float(space.from_unit(np.clip(end, 0.0, 1.0))[j]) for end in (u - along, u + along))
         intervals[name] = (low, high)
     return intervals

@@ -34,7 +34,7 @@ def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
     case, fitted = evidence.case, fit_that_leaves(diagnosis, evidence)
     state, spec = fitted.state, case.pool.spec
     # Also of what these pushes do not tell: a drag is known over a mass, and belief in one goes with the other.
-    intervals: dict[str, object] = {f"theta.{n}": list(ends) for n, ends in theta_intervals(case, fitted).items()}
+    intervals: dict[str, object] = {f"theta.{n}": list(ends) for n, ends in theta_intervals(evidence, fitted).items()}
     for effect in diagnosis.effects:
         intervals |= {f"{effect.name}.{name}": p.ci90 for name, p in effect.parameters.items()}
     names, matrix = correlation_of(case, fitted)

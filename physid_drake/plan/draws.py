@@ -60,8 +60,8 @@ def draws_of(
 ) -> tuple[Draw, ...]:
     """Draws from the belief that intervals, correlation and scatter are.
 
-    Each estimate is normal, log-normal where it is positive or its interval is that of a logarithm; a Gaussian copula
-    ties them.
+    Each estimate has its interval, and is normal to either side, log-normal where it is positive or its interval is
+    that of a logarithm; a Gaussian copula ties them.
     Estimates that the model's correlation does not hold are independent. Friction's departure in this push is
     Student's: normal, with a variance that a few pushes have told.
 
@@ -145,12 +145,18 @@ def _moved(model: Model, scores: dict[str, float], scatter: float) -> Model:
 def _shifted(value: float, interval: tuple[float, float], score: float, *, positive: bool) -> float:
     low, high = interval
     if low > 0.0 and value > 0.0 and (positive or _is_logarithms(value, low, high)):
-        return value * math.exp(score * math.log(high / low) / (2.0 * Z90))
-    moved = value + score * (high - low) / (2.0 * Z90)
+        return math.exp(_drawn(math.log(value), math.log(low), math.log(high), score))
+    moved = _drawn(value, low, high, score)
     # An interval that stays on one side of zero is of something that has a sign.
     if low >= 0.0:
         return max(0.0, moved)
     return min(0.0, moved) if high <= 0.0 else moved
+
+
+def _drawn(value: float, low: float, high: float, score: float) -> float:
+    """As far towards an end of an interval as the score is, from the value, or from the middle if it is beside it."""
+    centre = value if low <= value <= high else 0.5 * (low + high)
+    return centre + score * (high - centre if score > 0.0 else centre - low) / Z90
 
 
 def _is_logarithms(value: float, low: float, high: float) -> bool:

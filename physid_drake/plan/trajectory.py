@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import HandPath, Motion, Outcome, SolverConfig, Start
 from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
-from physid_drake.errors import ConfigError
+from physid_drake.errors import ConfigError, ParameterError
 from physid_drake.identify.problem import CellSpec
 from physid_drake.identify.rollouts import cell_of
 from physid_drake.model import Model
@@ -130,7 +130,13 @@ def trajectory_of(
     times, poses, paths, ending = [], [], [], Ending.AT_REST
     for number, push in enumerate(pushes):
         paths.append(path_of(model, push, pose) if number or path is None else path)
-        motion = _roll(model, push, paths[-1], dc.replace(situation, start=pose, order=situation.order + number))
+        try:
+            motion = _roll(model, push, paths[-1], dc.replace(situation, start=pose, order=situation.order + number))
+        except ParameterError:  # a draw may be of an object that cannot be, or cannot stand
+            times.append(np.array([clock]))
+            poses.append(np.array([pose]))
+            ending = Ending.DIVERGED
+            break
         sampled = np.linspace(0.0, float(motion.times[-1]), MOST_SAMPLES)
         seen = tracked(motion, sampled, model.effects)
         times.append(clock + sampled)

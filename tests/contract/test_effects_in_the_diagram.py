@@ -1,5 +1,7 @@
 """``load_model(path).build()``: the effects' forces are a system of the diagram, and act as in a rollout."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -78,3 +80,14 @@ def test_liquid_shifts_the_pressure_in_the_diagram_as_in_the_rollout():
 def test_a_model_without_force_effects_has_the_plain_diagram():
     assert not model().build().diagram.HasSubsystemNamed(NAME)
     assert model(EFFECTS[0]).build().diagram.HasSubsystemNamed(NAME)
+
+
+@pytest.mark.parametrize("hand_radius", [None, 0.01])
+def test_the_diagram_begins_with_the_object_at_rest_on_the_table(hand_radius):
+    built = replace(model(), hand_radius=hand_radius).build()
+    plant, root = built.scene.plant, built.simulator.get_mutable_context()
+    before = plant.GetPositions(plant.GetMyContextFromRoot(root), built.scene.object.model_instance())
+    built.simulator.AdvanceTo(0.1)
+    after = plant.GetPositions(plant.GetMyContextFromRoot(root), built.scene.object.model_instance())
+    np.testing.assert_allclose(after, before, atol=1e-6)
+    assert after[-1] == pytest.approx(0.015, abs=1e-4)  # half its height

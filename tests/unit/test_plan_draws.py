@@ -9,6 +9,7 @@ from plans import GOAL, MODEL, START, TILTED, made
 from scipy import stats
 
 from physid_drake.effects.drag import QuadraticDrag
+from physid_drake.effects.liquid import Sloshing
 from physid_drake.errors import ConfigError
 from physid_drake.model import Correlation
 from physid_drake.plan import DistanceToGoal, Situation
@@ -70,6 +71,27 @@ def test_a_drag_over_a_mass_that_nobody_weighed_stays_what_the_pushes_told():
     drags, masses = (np.array(v) for v in zip(*((m.effects[0].coefficient, m.body.mass) for m in drawn), strict=True))
     assert np.ptp(np.log(masses)) > np.log(16.0)
     np.testing.assert_allclose(drags / masses, 6.5 / MODEL.body.mass, rtol=0.03)
+
+
+@pytest.mark.parametrize(
+    ("value", "interval"), [(0.9, (0.0245, 0.978)), (0.3, (0.0245, 0.978)), (0.0245, (0.05, 0.2))]
+)
+def test_draws_have_their_interval_wherever_in_it_or_beside_it_the_value_is(value, interval):
+    """What pushes do not tell has the prior's interval about whatever value the fit ended at."""
+    model = replace(
+        MODEL, body=replace(MODEL.body, hand_friction=value), intervals={"theta.hand_friction": list(interval)}
+    )
+    drawn = np.array([m.body.hand_friction for m in models_from(model, 1024)])
+    np.testing.assert_allclose(np.quantile(drawn, [0.05, 0.95]), interval, rtol=0.05)
+
+
+def test_a_draw_of_an_object_that_cannot_be_is_one_that_diverged():
+    half_full = replace(MODEL, effects=(Sloshing(fraction=0.9),), intervals={"sloshing.fraction": [0.6, 1.2]})
+    push = (PlannedPush(direction=0.0, speed=0.3, travel=0.1),)
+    draws = drawn_from(half_full, 8)
+    spread = spread_of(draws, push, DistanceToGoal(goal=GOAL), model=half_full, situation=Situation(start=START))
+    impossible = sum(draw.model.effects[0].fraction >= 1.0 for draw in draws)
+    assert 0 < impossible < 8 and spread.diverged >= impossible
 
 
 def test_friction_and_tilt_that_are_known_together_spread_the_end_less_than_each_alone():

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import yaml
 from plans import MODEL, TILTED
@@ -186,9 +187,12 @@ def test_the_planner_starts_where_the_recording_began():
 
 
 def test_no_goal_that_fits_is_no_reason_to_stop_but_a_wrong_one_is(capsys):
-    elsewhere = replace(shipped_pushes(2), table=Table(size=(0.1, 0.1), centre=(5.0, 5.0)))
-    identifier = coarse_identifier(elsewhere)
-    assert run_cell._planner(Scenario(), elsewhere, identifier, Console()) is None
+    pushes = shipped_pushes(2)
+    starts = np.array([push.object.positions[0, :2] for push in pushes.pushes])
+    middle, (wide, deep) = starts.mean(axis=0), np.ptp(starts, axis=0)
+    small = replace(pushes, table=Table(size=(wide + 0.01, deep + 0.01), centre=(middle[0], middle[1])))
+    identifier = coarse_identifier(small)
+    assert run_cell._planner(Scenario(), small, identifier, Console()) is None
     assert "not on the table" in " ".join(capsys.readouterr().out.split())
     with pytest.raises(ConfigError, match="not on the table"):
-        run_cell._planner(Scenario(plan=PlanConfig(goal_m=[0.0, 0.0])), elsewhere, identifier, Console())
+        run_cell._planner(Scenario(plan=PlanConfig(goal_m=[5.0, 5.0])), small, identifier, Console())
