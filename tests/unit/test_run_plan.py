@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 
-import numpy as np
 import pytest
 import yaml
 from plans import MODEL, TILTED
@@ -187,12 +186,13 @@ def test_the_planner_starts_where_the_recording_began():
 
 
 def test_no_goal_that_fits_is_no_reason_to_stop_but_a_wrong_one_is(capsys):
-    pushes = shipped_pushes(2)
-    starts = np.array([push.object.positions[0, :2] for push in pushes.pushes])
-    middle, (wide, deep) = starts.mean(axis=0), np.ptp(starts, axis=0)
-    small = replace(pushes, table=Table(size=(wide + 0.01, deep + 0.01), centre=(middle[0], middle[1])))
+    recording = shipped_pushes(2)
+    first = recording.pushes[0]
+    x, y = first.object.positions[0, :2]
+    again = replace(first, name="again.csv")
+    small = replace(recording, pushes=(first, again), table=Table(size=(0.01, 0.01), centre=(x, y)))
     identifier = coarse_identifier(small)
     assert run_cell._planner(Scenario(), small, identifier, Console()) is None
-    assert "not on the table" in " ".join(capsys.readouterr().out.split())
+    assert "No push is planned" in " ".join(capsys.readouterr().out.split())
     with pytest.raises(ConfigError, match="not on the table"):
         run_cell._planner(Scenario(plan=PlanConfig(goal_m=[5.0, 5.0])), small, identifier, Console())
