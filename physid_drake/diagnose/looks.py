@@ -25,6 +25,7 @@ from physid_drake.diagnose.values import Location, Window
 Array = NDArray[np.float64]
 
 FLIPS = 999
+WINDOWS = 6  # named as those in which most is missing
 CHANCE = 0.05  # of the best of all looks
 SURE = 2.5  # standard deviations of a window's wrench
 PHASES = ("contact", "free_slide")
@@ -260,10 +261,6 @@ def _location(case: Case, wrenches: Sequence[MissingWrench], seen: Sequence[_See
     """The statement: the best look if there is one, and the windows in which most is missing."""
     values = np.array([w.wrench / w.std for w in wrenches])
     size = np.sqrt((values**2).sum(axis=1))
-    windows = tuple(
-        Window(push=case.problems[wrenches[k].push].name, start=wrenches[k].start, end=wrenches[k].end)
-        for k in np.argsort(-size)[:6]
-    )
     if best is not None:
         phase, dof, frame = _phases(best, seen), best.look.dof, best.look.frame
         detail = best.look.words(best.coefficients)
@@ -276,6 +273,12 @@ def _location(case: Case, wrenches: Sequence[MissingWrench], seen: Sequence[_See
         dof = tuple(d for d, p in zip(DOFS, power.tolist(), strict=True) if p >= A_PART * power.max())
         few = len({w.push for w in wrenches}) < FEWEST_PUSHES
         frame, detail = "none", "in too few pushes to say where" if few else "in no one direction that stands out"
+    in_question = [k for k, w in enumerate(wrenches) if w.phase in phase]
+    much = np.sqrt((values[in_question] ** 2) @ [name in dof for name in DOFS])
+    windows = tuple(
+        Window(push=case.problems[wrenches[k].push].name, start=wrenches[k].start, end=wrenches[k].end)
+        for k in (in_question[i] for i in np.argsort(-much)[:WINDOWS])
+    )
     where = " and ".join(SAID[p] for p in phase)
     statement = f"{where}{_amount([w for w in wrenches if w.phase in phase], dof)}, {detail}"
     return Location(statement=statement, phase=phase, dof=dof, frame=frame, windows=windows)

@@ -96,7 +96,7 @@ def _problem(case: Case, direction: float, speed: float, offset: float) -> PushP
     path = HandPath(times=times, velocities=np.outer([0.0, speed, speed, 0.0], ahead), start=start - reach * ahead)
     end = float(times[-1]) + AFTER
     return dc.replace(
-        case.problems[0], name="next", order=len(case.problems), begin=0.0, end=end,
+        case.problems[0], name="next", order=case.pushes, pace=1.0, begin=0.0, end=end,
         start=Start(pose=(float(middle[0]), float(middle[1]), 0.0)), path=path, times=np.array([end]),
         poses=np.zeros((1, 3)), force_times=np.zeros(0), forces=np.zeros((0, 2)), force_std=np.zeros(0),
     )  # fmt: skip

@@ -102,6 +102,11 @@ def diagnosis_page(
     return environment.from_string(_TEMPLATE.read_text("utf-8")).render(content) + "\n"
 
 
+def _share(some: int, every: int) -> str:
+    """How many pushes were looked at, and of how many where not all were."""
+    return f"{some}" if some >= every else f"{some} of {every}"
+
+
 def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dict[str, Any]:
     """What the template is filled with."""
     order = _most_changed(diagnosis, view.shown)
@@ -111,7 +116,7 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "colours": {"ink": INK, "before": BEFORE, "after": AFTER, "contact": CONTACT, "free": FREE},
         "badge": BADGES.get(diagnosis.verdict, MUTED),
         "meaning": MEANING.get(diagnosis.verdict, ""),
-        "pushes": len(recording.pushes),
+        "pushes": _share(len(recording.pushes), diagnosis.pushes),
         "found": [_finding(e, k, view) for k, e in enumerate(diagnosis.effects)],
         "phases": [] if diagnosis.location is None else [SAID.get(p, p) for p in diagnosis.location.phase],
         "dofs": [] if diagnosis.location is None else [DOFS.get(x, x) for x in diagnosis.location.dof],

@@ -12,6 +12,7 @@ from physid_drake.diagnose.looks import locate, looks_at
 from physid_drake.diagnose.model import Fitted, State
 
 PUSHES, WINDOWS = 12, 4
+PHASED = ("contact", "contact", "free_slide", "free_slide")  # of a push's windows
 STD = 0.02  # N, N, N m, of a window's wrench
 
 
@@ -30,7 +31,7 @@ def world(planted, seed=0, *, loud=1.0):
             columns[3 * k : 3 * k + 3] = np.eye(3) / STD
             moment = SimpleNamespace(
                 push=push, heading=heading, yaw=yaw, speed=rng.uniform(0.05, 0.5), spin=rng.normal(),
-                place=rng.uniform(-0.2, 0.2, size=2), phase="contact" if k < 2 else "free_slide",
+                place=rng.uniform(-0.2, 0.2, size=2), phase=PHASED[k],
             )  # fmt: skip
             wrench = np.asarray(planted(moment)) * (loud if push == PUSHES - 1 else 1.0)
             residual += columns @ wrench
@@ -98,6 +99,9 @@ def test_the_frame_of_what_is_planted_is_found(name):
 def test_the_phase_in_which_it_acts_is_said(phases):
     found = locate(case(), *world(lambda m: force(0.06 * (m.phase in phases), 2.0, m)), np.random.default_rng(0))
     assert found.frame == "world" and found.phase == phases
+    named = {(w.push, w.start) for w in found.windows}
+    acting = {(f"pushes/{k:03d}.csv", 0.1 * j) for k in range(PUSHES) for j, p in enumerate(PHASED) if p in phases}
+    assert named and named <= acting
 
 
 def degrees_in(words, before):
