@@ -14,7 +14,7 @@ from physid_drake.cell.diagram import GRAVITY
 from physid_drake.cell.forces import FrictionLaw
 from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.support import PressureGrid
-from physid_drake.effects.effect import Effect, PushFacts
+from physid_drake.effects.effect import Effect, Pose, PushFacts
 from physid_drake.effects.friction import Together
 from physid_drake.recording import Shape
 
@@ -91,20 +91,34 @@ def roll(
     )
 
 
+def aimed(effects: Sequence[Effect], path: HandPath, facts: PushFacts) -> HandPath:
+    """The path to command, so that the tip begins where ``path`` does although it is not where it is told to be."""
+    start = path.start.copy()
+    for effect in effects:
+        if not effect.is_null:
+            start = start + path.start - effect.hand(path, facts).start
+    return dc.replace(path, start=start)
+
+
+def true_pose(effects: Sequence[Effect], pose: Pose) -> Pose:
+    """Pose of B for a pose that the tracker reports."""
+    for effect in reversed(effects):
+        if not effect.is_null:
+            pose = effect.true_pose(pose)
+    return pose
+
+
 def _true_start(effects: Sequence[Effect], start: Start) -> Start:
     """State of B for one that the tracker reports: a tracked point beside the centre has another velocity, too."""
 
-    def true_pose(time: float) -> Array:
+    def pose_at(time: float) -> Array:
         x, y, yaw = np.array(start.pose) + time * np.array(start.velocity)
-        pose = float(x), float(y), float(yaw)
-        for effect in reversed(effects):
-            pose = effect.true_pose(pose)
-        return np.array(pose)
+        return np.array(true_pose(effects, (float(x), float(y), float(yaw))))
 
     if all(type(effect).true_pose is Effect.true_pose for effect in effects):
         return start
-    pose = true_pose(0.0)
-    velocity = (true_pose(SHORT) - true_pose(-SHORT)) / (2.0 * SHORT) if any(start.velocity) else np.zeros(3)
+    pose = pose_at(0.0)
+    velocity = (pose_at(SHORT) - pose_at(-SHORT)) / (2.0 * SHORT) if any(start.velocity) else np.zeros(3)
     (x, y, yaw), (vx, vy, spin) = pose.tolist(), velocity.tolist()
     return dc.replace(start, pose=(x, y, yaw), velocity=(vx, vy, spin))
 

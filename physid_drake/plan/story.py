@@ -221,7 +221,8 @@ def spread_of(
 
 def outcome_under(made: Plan, model: Model) -> tuple[Trajectory, float]:
     """What another model says of a plan's push: its trajectory and cost [m]."""
-    trajectory = trajectory_of(model, made.policy.pushes(made.settings), made.situation)
+    pushes, path = made.policy.pushes(made.settings), made.predicted.paths[0]
+    trajectory = trajectory_of(model, pushes, made.situation, path=path)
     return trajectory, cost_of(made.cost_function, trajectory, model.table)
 
 

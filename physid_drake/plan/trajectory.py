@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from physid_drake.cell import HandPath, Motion, Outcome, SolverConfig, Start
 from physid_drake.cell.solid import Solid, solid_of
-from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
+from physid_drake.effects import PushFacts
+from physid_drake.effects.rollout import Geometry, Rollout, aimed, geometry_with, roll, tracked, true_pose
 from physid_drake.errors import ConfigError, ParameterError
 from physid_drake.identify.problem import CellSpec
 from physid_drake.identify.rollouts import cell_of
@@ -90,9 +91,14 @@ def _solid(shape: Shape) -> Solid:
     return solid_of(shape)
 
 
+def _true_solid(model: Model) -> Solid:
+    """Of the object as it is: a model may know that it is larger than was said."""
+    return _solid(geometry_with(model.effects, Geometry(shape=model.shape)).shape)
+
+
 def hand_height_of(model: Model, situation: Situation) -> float:
     """Height of the tip's centre above the table [m]."""
-    return 0.5 * _solid(model.shape).height if situation.hand_height is None else situation.hand_height
+    return 0.5 * _true_solid(model).height if situation.hand_height is None else situation.hand_height
 
 
 def hand_radius_of(model: Model) -> float:
@@ -107,12 +113,17 @@ def hand_radius_of(model: Model) -> float:
 
 
 def path_of(model: Model, push: PlannedPush, pose: Pose) -> HandPath:
-    """The hand's path of a planned push on the model's object.
+    """The path to command for a planned push on an object that the tracker reports at a pose.
+
+    What the model knows of where object and tip really are is in it: else the tip would begin inside the object, or
+    far away.
 
     Raises:
         ConfigError: if the model has no hand, or the hand would pass the object.
     """
-    return push.path(pose, _solid(model.shape).outline, hand_radius_of(model))
+    path = push.path(true_pose(model.effects, pose), _true_solid(model).outline, hand_radius_of(model))
+    facts = PushFacts(order=0, mass=model.body.mass, polar=0.0, hand_axes=np.array(model.hand_axes))
+    return aimed(model.effects, path, facts)
 
 
 def trajectory_of(

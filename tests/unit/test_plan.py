@@ -13,13 +13,17 @@ from runs import coarse_identifier
 from twin import body_of
 
 from physid_drake.cell import SolverConfig
+from physid_drake.effects.body import SizeError
+from physid_drake.effects.hand import HandOffset
+from physid_drake.effects.rollout import true_pose
+from physid_drake.effects.tracker import TrackerBias, TrackerScale
 from physid_drake.errors import ConfigError, RobotError
 from physid_drake.identify import SearchConfig, ThetaConfig
 from physid_drake.plan import DistanceToGoal, Ending, SimulatedRobot, Situation, plan
 from physid_drake.plan.story import outcome_under
 from physid_drake.plan.system import PolicySystem, identified_model
 from physid_drake.plan.task import Choices, default_goal, policy_for
-from physid_drake.plan.trajectory import _paced
+from physid_drake.plan.trajectory import _paced, path_of, trajectory_of
 from physid_drake.policies import PlannedPush
 from physid_drake.recording import Hand, ObjectModel, Recording, Sensors, Table
 
@@ -189,3 +193,23 @@ def test_a_robot_whose_object_fell_asks_for_it_back():
     assert robot.ending is Ending.FELL
     with pytest.raises(RobotError, match="put it back"):
         robot.execute(PlannedPush(direction=0.0, speed=0.1, travel=0.1))
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [TrackerBias(x=0.02), TrackerBias(x=-0.02), SizeError(ratio=1.2), TrackerScale(ratio=1.05), HandOffset(x=0.01)],
+    ids=lambda effect: effect.name,
+)
+def test_the_hand_aims_at_where_the_object_is_and_not_at_where_it_is_said_to_be(effect):
+    """The tip begins as far from the object as it would if all were as it is said."""
+    model = replace(MODEL, effects=(effect,))
+    start, push = (0.3, 0.0, 0.0), PlannedPush(direction=0.0, speed=0.05, travel=0.1)
+    path = path_of(model, push, start)
+    tip = path.start[0] + (effect.x if isinstance(effect, HandOffset) else 0.0)
+    (x, _, _), ratio = true_pose((effect,), start), effect.ratio if isinstance(effect, SizeError) else 1.0
+    gap = x - 0.5 * ratio * MODEL.shape.size[0] - MODEL.hand_radius - tip
+    plain = path_of(MODEL, push, start)
+    wanted = start[0] - 0.5 * MODEL.shape.size[0] - MODEL.hand_radius - plain.start[0]
+    assert gap == pytest.approx(wanted, abs=1e-6) and wanted > 0.0
+    motion = trajectory_of(model, (push,), Situation(start=start))
+    assert motion.poses[0] == pytest.approx(np.array(start), abs=1e-6)  # and nothing is moved out of its way
