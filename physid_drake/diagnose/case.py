@@ -15,6 +15,7 @@ from physid_drake.diagnose.noise import ForceNoise, TrackerNoise, tracker_noise
 from physid_drake.effects import Surroundings
 from physid_drake.errors import RecordingError
 from physid_drake.identify.config import ThetaConfig
+from physid_drake.identify.frames import unseen_motion
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
 from physid_drake.identify.problem import PushProblem, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool
@@ -74,7 +75,8 @@ class Case:
         thinned = (
             f"{some} of the {self.pushes} pushes were looked at, at equal distances (diagnose --pushes N for more)"
         )
-        return (*((thinned,) if some < self.pushes else ()), *self.noise.warnings)
+        unseen = unseen_motion(self.recording, self.noise.position)
+        return (*((thinned,) if some < self.pushes else ()), *self.noise.warnings, *unseen)
 
     def louder(self, factor: float, forces: ForceNoise, odd: Sequence[float] = ()) -> Case:
         """The case with more noise.

@@ -15,6 +15,10 @@ UPRIGHT = 0.87  # cosine of 30 degrees: an object that leans more does not stand
 TIPPED = 3  # samples: fewer are a tracker's error
 OFF_TABLE = 0.01  # m: a caliper's error
 MOVED = 0.01  # m
+AT_ONCE, SOON = 0.05, 0.1  # s
+SURE = 6.0  # standard deviations
+FEWEST = 4  # samples
+STILL_FAST = 0.5  # of a hand's speed: faster, it has not come to a stop
 BESIDE = 0.05  # m between tip and object that no error of calibration explains
 
 
@@ -82,3 +86,47 @@ def _least_gap(recording: Recording, push: Push) -> float:
     extent = np.abs(solid_of(recording.object.shape).outline.extent())
     corner = float(np.hypot(max(extent[0], extent[2]), max(extent[1], extent[3])))
     return float(apart.min()) - corner - recording.hand.radius
+
+
+def unseen_motion(recording: Recording, sigma: float) -> tuple[str, ...]:
+    """What begins or ends out of sight, in words: a simulation starts from rest, and its hand stops where it is lost.
+
+    Args:
+        recording: the pushes.
+        sigma: standard deviation of the object's place [m].
+    """
+    found = {
+        "the object already moves in the first poses, as if it had been pushed before": _already_moving,
+        "the hand's stream ends while it moves": _hand_lost,
+        "nothing moves at first, and no hand is recorded that moves it later": _moved_by_nothing,
+    }
+    return tuple(
+        f"{what}: {', '.join(names)}"
+        for what, is_so in found.items()
+        if (names := [push.name for push in recording.pushes if is_so(push, sigma)])
+    )
+
+
+def _already_moving(push: Push, sigma: float) -> bool:
+    return push.hand is not None and _way(push, AT_ONCE) > SURE * sigma
+
+
+def _moved_by_nothing(push: Push, sigma: float) -> bool:
+    return push.hand is None and _way(push, SOON) < SURE * sigma < _way(push, np.inf) - MOVED
+
+
+def _way(push: Push, within: float) -> float:
+    """How far the object comes from its first place within a time [s]; 0 where that is not seen."""
+    times, places = push.object.times, push.object.positions[:, :2]
+    seen = places[times <= times[0] + within]
+    if len(seen) < FEWEST:
+        return 0.0
+    return float(np.linalg.norm(seen[-2:].mean(axis=0) - seen[:2].mean(axis=0)))
+
+
+def _hand_lost(push: Push, sigma: float) -> bool:
+    del sigma
+    if push.hand is None or len(push.hand) < 2 * FEWEST or push.object.times[-1] < push.hand.times[-1] + SOON:
+        return False
+    steps = np.linalg.norm(np.diff(push.hand.positions[:, :2], axis=0), axis=1) / np.diff(push.hand.times)
+    return float(np.median(steps[-3:])) > STILL_FAST * float(np.quantile(steps, 0.9))

@@ -1,0 +1,56 @@
+"""What a recording does not show: motion before its first pose, and a hand that is lost on its way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from runs import shipped_pushes
+
+from physid_drake.identify.frames import unseen_motion
+from physid_drake.recording import PoseStream
+
+SIGMA = 3e-4
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return shipped_pushes(4)
+
+
+def cut(stream, kept):
+    return PoseStream(
+        times=stream.times[kept], positions=stream.positions[kept], quaternions=stream.quaternions[kept]
+    )
+
+
+def with_first(recording, change):
+    first, *others = recording.pushes
+    return replace(recording, pushes=(change(first), *others))
+
+
+def test_whole_pushes_show_all_that_moves(recording):
+    assert unseen_motion(recording, SIGMA) == ()
+
+
+def test_an_object_that_is_seen_too_late_already_moves(recording):
+    def late(push):
+        way = np.linalg.norm(push.object.positions[:, :2] - push.object.positions[0, :2], axis=1)
+        return replace(push, object=cut(push.object, way > 0.3 * way.max()))
+
+    (said,) = unseen_motion(with_first(recording, late), SIGMA)
+    assert said.startswith("the object already moves") and said.endswith(f": {recording.pushes[0].name}")
+
+
+def test_a_hand_that_is_lost_on_its_way_is_said(recording):
+    def lost(push):
+        way = np.linalg.norm(push.hand.positions[:, :2] - push.hand.positions[0, :2], axis=1)
+        return replace(push, hand=cut(push.hand, way < 0.6 * way.max()))
+
+    (said,) = unseen_motion(with_first(recording, lost), SIGMA)
+    assert said.startswith("the hand's stream ends while it moves")
+
+
+def test_without_a_hand_nothing_sets_a_resting_object_moving(recording):
+    bare = replace(recording, hand=None, pushes=tuple(replace(push, hand=None) for push in recording.pushes))
+    (said,) = unseen_motion(bare, SIGMA)
+    assert said.startswith("nothing moves at first")
