@@ -15,9 +15,10 @@ from physid_drake.diagnose.noise import ForceNoise, TrackerNoise, tracker_noise
 from physid_drake.effects import Surroundings
 from physid_drake.errors import RecordingError
 from physid_drake.identify.config import ThetaConfig
+from physid_drake.identify.force_windows import WINDOW
 from physid_drake.identify.frames import unseen_motion
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
-from physid_drake.identify.problem import PushProblem, problems_of, spec_of
+from physid_drake.identify.problem import Noise, PushProblem, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool
 from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.recording import Recording, thinned
@@ -45,6 +46,7 @@ class Case:
     Attributes:
         recording: the pushes.
         noise: of the tracker.
+        sensors: of hand and force.
         problems: one per push.
         nuisances: each push's own unknowns.
         features: what is compared, one per push.
@@ -58,6 +60,7 @@ class Case:
 
     recording: Recording
     noise: TrackerNoise
+    sensors: Noise
     problems: tuple[PushProblem, ...]
     nuisances: tuple[Nuisance, ...]
     features: tuple[PushFeatures, ...]
@@ -76,7 +79,18 @@ class Case:
             f"{some} of the {self.pushes} pushes were looked at, at equal distances (diagnose --pushes N for more)"
         )
         unseen = unseen_motion(self.recording, self.noise.position)
-        return (*((thinned,) if some < self.pushes else ()), *self.noise.warnings, *unseen)
+        few = (thinned,) if some < self.pushes else ()
+        return (*few, *self.noise.warnings, *unseen, *self._unused_forces())
+
+    def _unused_forces(self) -> tuple[str, ...]:
+        """That forces were recorded of which nothing could be compared."""
+        recorded = any(push.force is not None for push in self.recording.pushes)
+        if not recorded or any(len(problem.force_times) for problem in self.problems):
+            return ()
+        return (
+            f"none of the recorded forces could be compared: it takes two samples in {WINDOW:g} s, while the hand"
+            " pushes and after it has surely touched",
+        )
 
     def louder(self, factor: float, forces: ForceNoise, odd: Sequence[float] = ()) -> Case:
         """The case with more noise.
@@ -138,6 +152,7 @@ def case_of(
     return Case(
         recording=recording,
         noise=noise,
+        sensors=sensors,
         problems=problems,
         nuisances=tuple(nuisance_of(p, UNIT_SCATTER) for p in problems),
         features=tuple(features_of(push, p, noise) for push, p in zip(pushes, problems, strict=True)),

@@ -92,11 +92,19 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
             "rotation_rad": case.noise.rotation,
             "correlation_time_s": list(case.noise.correlation_time),
             "jitter_s": case.noise.jitter,
+            **_noise_of_sensors(case),
         },
         warnings=case.warnings,
         rollouts=case.pool.count,
         pushes=case.pushes,
     )
+
+
+def _noise_of_sensors(case: Case) -> dict[str, float]:
+    """Of the hand and of a force component, where they were recorded."""
+    hand = {} if case.recording.hand is None else {"hand_m": case.sensors.hand}
+    compared = any(len(problem.force_times) for problem in case.problems)
+    return hand | ({"force_n": case.sensors.force} if compared else {})
 
 
 def _p_value(evidence: Evidence) -> float:

@@ -18,7 +18,7 @@ from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import State
 from physid_drake.diagnose.values import NextPush
 from physid_drake.identify.problem import PushProblem
-from physid_drake.identify.rollouts import Task
+from physid_drake.identify.rollouts import RolloutPool, Task
 
 Array = NDArray[np.float64]
 
@@ -28,6 +28,7 @@ OFFSETS = (-0.3, 0.3)  # of the object's half width
 TRAVEL = 0.12  # m of the hand after the touch
 RUN_UP, RAMP, BRAKE = 0.02, 0.05, 0.05  # m, s, s
 AFTER = 1.0  # s
+LONGEST_TICK = 2e-3  # s, for hands as fast as these, which a recording's may not be
 REPEATS = 0.02  # of the motion: how well a push repeats
 
 
@@ -44,7 +45,7 @@ def next_push(case: Case, states: Sequence[State]) -> NextPush | None:
     if len(states) < 2 or case.recording.hand is None:
         return None
     pushes = [_problem(case, *choice) for choice in _choices()]
-    fitter = Fitter(case)
+    fitter, pool = Fitter(case), brisk_pool(case)
     tasks = []
     for state in states:
         for problem in pushes:
@@ -58,7 +59,8 @@ def next_push(case: Case, states: Sequence[State]) -> NextPush | None:
                     effects=tuple(e.effect(fitter.case) for e in state.effects),
                 )
             )
-    ends = [None if p is None else p.poses[-1] for p in case.pool.run(tasks)]
+    ends = [None if p is None else p.poses[-1] for p in pool.run(tasks)]
+    case.pool.count += pool.count
     chances = [_chance(case, ends[k :: len(pushes)], pushes[k]) for k in range(len(pushes))]
     best = int(np.argmax(chances))
     direction, speed, offset = _choices()[best]
@@ -66,6 +68,14 @@ def next_push(case: Case, states: Sequence[State]) -> NextPush | None:
         direction_deg=math.degrees(direction), speed_mps=speed, contact_offset_m=offset * 0.5 * _width(case),
         settles_with_probability=chances[best],
     )  # fmt: skip
+
+
+def brisk_pool(case: Case) -> RolloutPool:
+    """A pool like the case's, on ticks that suit a fast hand."""
+    spec = case.pool.spec
+    share = min(1.0, LONGEST_TICK / spec.config.solver.time_step_s)
+    config = dc.replace(spec.config, solver=spec.config.solver.scaled(share))
+    return RolloutPool(dc.replace(spec, config=config), case.thetas, jobs=case.pool.jobs)
 
 
 def _choices() -> list[tuple[float, float, float]]:

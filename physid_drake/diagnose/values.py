@@ -216,7 +216,8 @@ class Diagnosis:
         partly: what takes a part of an unexplained mismatch away.
         reduced_chi2_before, reduced_chi2_after: cost per degree of freedom, plain and with what was found.
         friction_scatter: of the last model's friction, push to push, relative.
-        noise: ``position_m``, ``rotation_rad``, ``correlation_time_s`` (of both), ``jitter_s`` that were used.
+        noise: ``position_m``, ``rotation_rad``, ``correlation_time_s`` (of both), ``jitter_s`` that were used, and
+            ``hand_m`` and ``force_n`` (of a component) where hand and force were.
         warnings: what was found odd, one line each.
         rollouts: how many were made.
         pushes: of the whole recording, looked at or not.

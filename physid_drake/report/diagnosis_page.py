@@ -256,6 +256,8 @@ def _noise(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         ("position", "position_m", MM, " mm"),
         ("rotation", "rotation_rad", math.degrees(1.0), "°"),
         ("jitter of time stamps", "jitter_s", MM, " ms"),
+        ("hand", "hand_m", MM, " mm"),
+        ("force", "force_n", 1.0, " N"),
     ]
     told = [(name, f"{number(scale * noise[key])}{unit}") for name, key, scale, unit in rows if key in noise]
     times = noise.get("correlation_time_s")

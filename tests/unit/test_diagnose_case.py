@@ -1,0 +1,64 @@
+"""A recording made ready for a diagnosis: what of it is used, and what is said of the rest."""
+
+import dataclasses as dc
+
+import pytest
+
+from physid_drake.diagnose.case import case_of, cell_config
+from physid_drake.diagnose.next_push import LONGEST_TICK, brisk_pool
+from physid_drake.diagnose.plain import coarse
+from physid_drake.identify.config import ThetaConfig
+from physid_drake.recording import ForceStream, Recording, read_recording
+from physid_drake.resources import shipped
+
+UNUSED = "none of the recorded forces"
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return read_recording(shipped("recordings") / "eraser_reference").subset(range(3))
+
+
+def case(recording: Recording):
+    return case_of(recording, cell_config(recording), ThetaConfig(), jobs=1)
+
+
+def with_forces(recording: Recording, keep: int) -> Recording:
+    """Forces as long as the hand's stream, of which one in ``keep`` is there."""
+    pushes = []
+    for push in recording.pushes:
+        times = push.hand.times[::keep]
+        forces = 0.3 * (push.hand.positions[::keep] - push.hand.positions[0])
+        pushes.append(dc.replace(push, force=ForceStream(times=times, forces=forces)))
+    return dc.replace(recording, pushes=tuple(pushes))
+
+
+def slowed(recording: Recording, factor: float) -> Recording:
+    pushes = [
+        dc.replace(
+            push,
+            hand=dc.replace(push.hand, times=factor * push.hand.times),
+            object=dc.replace(push.object, times=factor * push.object.times),
+        )
+        for push in recording.pushes
+    ]
+    return dc.replace(recording, pushes=tuple(pushes))
+
+
+def test_forces_that_are_too_far_apart_in_time_are_said_to_be_unused(recording):
+    few = case(with_forces(recording, 20))
+    assert not any(len(problem.force_times) for problem in few.problems)
+    assert any(w.startswith(UNUSED) for w in few.warnings)
+
+
+def test_forces_that_are_compared_or_were_not_recorded_need_no_word(recording):
+    for known in (recording, with_forces(recording, 1)):
+        assert not any(w.startswith(UNUSED) for w in case(known).warnings)
+
+
+def test_the_next_push_of_a_slow_recording_is_simulated_on_ticks_for_a_fast_hand(recording):
+    slow = coarse(case(slowed(recording, 100.0)))
+    assert slow.pool.spec.config.solver.time_step_s > 5.0 * LONGEST_TICK
+    assert brisk_pool(slow).spec.config.solver.time_step_s == pytest.approx(LONGEST_TICK)
+    usual = coarse(case(recording))
+    assert brisk_pool(usual).spec == usual.pool.spec
