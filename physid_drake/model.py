@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses as dc
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -108,6 +109,7 @@ class Model:
         intervals: 90 % intervals as they were found, by ``theta.<name>`` and ``<effect>.<parameter>``.
         correlation: of what has an interval of two numbers; None where it is not known.
         hand_axes: (2, 2) the axes of P, as columns, along x and y of W, if all pushes had about the same.
+        hand_turns: whether the hand turns with its pushes: then ``hand_axes`` are along and across a push's heading.
     """
 
     recording: str
@@ -120,6 +122,12 @@ class Model:
     intervals: dict[str, Any] = dc.field(default_factory=dict)
     correlation: Correlation | None = None
     hand_axes: Axes = AS_W
+    hand_turns: bool = False
+
+    def axes_on(self, path: HandPath | None) -> Array:
+        """The axes (2, 2) of P, as columns, along x and y of W, in a push along a path."""
+        axes = np.array(self.hand_axes)
+        return axes if path is None or not self.hand_turns else turned(path.heading) @ axes
 
     def build(self) -> ModelCell:
         """The Drake cell with theta in its Context and the effects at their seams."""
@@ -148,6 +156,8 @@ class Model:
             content["correlation"] = _plain(dc.asdict(self.correlation))
         if self.hand_axes != AS_W:
             content["hand_axes"] = _plain(self.hand_axes)
+        if self.hand_turns:
+            content["hand_turns"] = True
         return str(yaml.safe_dump(content, sort_keys=False))
 
 
@@ -219,7 +229,7 @@ class ModelCell:
             order: number of the push, for physics that changes from push to push.
             hand_axes: (2, 2) the axes of P, as columns, along x and y of W; None takes the model's.
         """
-        axes = np.array(self.model.hand_axes) if hand_axes is None else hand_axes
+        axes = self.model.axes_on(path) if hand_axes is None else hand_axes
         push = Rollout(
             start=start, path=path, begin=begin, end=end, hand_height=hand_height, order=order, hand_axes=axes
         )
@@ -228,6 +238,12 @@ class ModelCell:
     def tracked(self, motion: Motion, times: Array) -> Array:
         """What the recording's tracker would report (n, 3), x, y, yaw, at times (n,) [s]."""
         return tracked(motion, times, self.model.effects)
+
+
+def turned(angle: float) -> Array:
+    """The rotation (2, 2) by an angle [rad]."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[c, -s], [s, c]])
 
 
 def load_model(path: Path | str) -> Model:
@@ -274,6 +290,7 @@ def _model(content: dict[str, Any], file: Path) -> Model:
         intervals=content.get("intervals", {}),
         correlation=_load_correlation(content),
         hand_axes=_tuples(content.get("hand_axes", _plain(AS_W))),
+        hand_turns=bool(content.get("hand_turns", False)),
     )
 
 

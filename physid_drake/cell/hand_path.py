@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +32,13 @@ class HandPath:
         steps: Array = np.diff(self.times)[:, None] * 0.5 * (self.velocities[1:] + self.velocities[:-1])
         positions: Array = self.start + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
         return positions
+
+    @property
+    def heading(self) -> float:
+        """Of the way from its first knot to its last, in W [rad]."""
+        places = self.knot_positions()
+        dx, dy = (places[-1] - places[0]).tolist()
+        return math.atan2(dy, dx)
 
     def positions(self, times: Array) -> Array:
         """Positions (n, 2) at any times (n,) [m]."""

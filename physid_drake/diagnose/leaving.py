@@ -11,7 +11,8 @@ from physid_drake.diagnose.estimates import correlation_of, theta_intervals
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import Diagnosis
-from physid_drake.model import Axes, Correlation, Model
+from physid_drake.identify.problem import PushProblem
+from physid_drake.model import AS_W, Axes, Correlation, Model, turned
 
 Array = NDArray[np.float64]
 
@@ -38,6 +39,7 @@ def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
     for effect in diagnosis.effects:
         intervals |= {f"{effect.name}.{name}": p.ci90 for name, p in effect.parameters.items()}
     names, matrix = correlation_of(case, fitted)
+    hand_axes, hand_turns = hand_frame(case.problems)
     kept = [k for k, name in enumerate(names) if name in intervals]
     return Model(
         recording=case.recording.name,
@@ -49,12 +51,22 @@ def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
         effects=tuple(e.effect(case) for e in state.effects) if diagnosis.effects else (),
         intervals=intervals,
         correlation=Correlation.of([names[k] for k in kept], matrix[np.ix_(kept, kept)]),
-        hand_axes=_common_axes(np.array([p.hand_axes for p in case.problems])),
+        hand_axes=hand_axes,
+        hand_turns=hand_turns,
     )
 
 
-def _common_axes(axes: Array) -> Axes:
-    """The mean of pushes' axes (n, 2, 2) of P; those of W where they differ so much that it is no frame."""
-    mean = axes.mean(axis=0)
-    (a, b), (c, d) = (mean if abs(np.linalg.det(mean)) > SAME else np.eye(2)).tolist()
-    return (a, b), (c, d)
+def hand_frame(problems: Sequence[PushProblem]) -> tuple[Axes, bool]:
+    """The mean of the pushes' axes of P, and whether they are along and across the push instead of those of W.
+
+    Those of W where they differ so much, either way, that there is no frame.
+    """
+    pushed = [p for p in problems if p.path is not None]
+    fixed = [p.hand_axes for p in pushed]
+    along = [turned(-p.path.heading) @ p.hand_axes for p in pushed if p.path is not None]
+    for every, turns in ((fixed, False), (along, True)):
+        mean = np.mean(every, axis=0) if every else np.zeros((2, 2))
+        if abs(np.linalg.det(mean)) > SAME:
+            (a, b), (c, d) = mean.tolist()
+            return ((a, b), (c, d)), turns
+    return AS_W, False

@@ -122,7 +122,7 @@ def path_of(model: Model, push: PlannedPush, pose: Pose) -> HandPath:
         ConfigError: if the model has no hand, or the hand would pass the object.
     """
     path = push.path(true_pose(model.effects, pose), _true_solid(model).outline, hand_radius_of(model))
-    facts = PushFacts(order=0, mass=model.body.mass, polar=0.0, hand_axes=np.array(model.hand_axes))
+    facts = PushFacts(order=0, mass=model.body.mass, polar=0.0, hand_axes=model.axes_on(path))
     return aimed(model.effects, path, facts)
 
 
@@ -167,7 +167,7 @@ def _roll(model: Model, push: PlannedPush, path: HandPath, situation: Situation)
     spec = CellSpec(shape=model.shape, hand_radius=model.hand_radius, config=config, table=model.table)
     rollout = Rollout(
         start=Start(pose=situation.start), path=path, begin=0.0, end=float(path.times[-1]) + HORIZON,
-        hand_height=situation.hand_height, order=situation.order, hand_axes=np.array(model.hand_axes),
+        hand_height=situation.hand_height, order=situation.order, hand_axes=model.axes_on(path),
     )  # fmt: skip
     return roll(lambda g: cell_of(spec, g), Geometry(shape=model.shape), model.body, rollout, model.effects)
 

@@ -77,6 +77,14 @@ def test_two_pushes_start_where_the_first_one_ended():
     assert not np.allclose(first.start, second.start)
 
 
+@pytest.mark.parametrize("direction", [0.0, 0.7, -2.0])
+def test_a_hand_that_turns_with_its_pushes_aims_beside_its_own_axes(direction):
+    push = PlannedPush(direction=direction, speed=0.3, travel=0.1)
+    offset = replace(MODEL, effects=(HandOffset(y=0.004),), hand_turns=True)
+    aside = path_of(offset, push, START).start - path_of(MODEL, push, START).start
+    assert aside == pytest.approx([0.004 * math.sin(direction), -0.004 * math.cos(direction)], abs=1e-12)
+
+
 def test_the_mean_over_the_belief_stays_further_from_an_edge_that_it_may_fall_over():
     goal, far = (0.47, 0.0), Choices(travel=0.3)
     unsure = replace(MODEL, intervals={"theta.support_friction": [0.2, 0.36]})

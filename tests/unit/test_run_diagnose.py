@@ -1,6 +1,7 @@
 """The ``diagnose`` command's refusals, and models that cannot be read: one clear line, nothing half-written."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from physid_drake import load_model
 from physid_drake.cell import Body, CellConfig, Start
 from physid_drake.cell.hand_path import straight_path
 from physid_drake.cli import main
+from physid_drake.diagnose.leaving import hand_frame
 from physid_drake.diagnose.memory import Memory
 from physid_drake.effects.body import UnevenSupport
 from physid_drake.effects.drag import ViscousDrag
@@ -86,6 +88,39 @@ def test_a_tip_that_was_turned_stays_turned(model, tmp_path):
     assert np.array_equal(turned, aside)
     told = loaded.build().rollout(**push, hand_axes=np.eye(2)).poses[-1]
     assert not np.allclose(told, turned, atol=1e-3)
+
+
+def test_a_tip_that_turns_with_its_pushes_takes_its_offset_along(model, tmp_path):
+    assert "hand_turns" not in model.dump()
+    offset = replace(model, effects=(HandOffset(x=0.01, y=0.004),), hand_turns=True)
+    (tmp_path / "model.yaml").write_text(offset.dump(), encoding="utf-8")
+    loaded = load_model(tmp_path)
+    for heading in (0.0, 0.7, 2.5):
+        c, s = np.cos(heading), np.sin(heading)
+        path = straight_path(np.array([0.1, 0.2]), np.array([0.1 + 0.1 * c, 0.2 + 0.1 * s]), 0.0, 0.3)
+        assert loaded.axes_on(path) == pytest.approx(np.array([[c, -s], [s, c]]), abs=1e-12)
+        assert replace(loaded, hand_turns=False).axes_on(path) == pytest.approx(np.eye(2))
+
+
+def problems_with(headings, turns):
+    """Pushes whose hand's x is at an angle in W, less how much of it goes with the push."""
+    found = []
+    for heading, turn in zip(headings, turns, strict=True):
+        end = 0.1 * np.array([np.cos(heading), np.sin(heading)])
+        axes = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+        found.append(SimpleNamespace(path=straight_path(np.zeros(2), end, 0.0, 0.3), hand_axes=axes))
+    return found
+
+
+def test_whether_a_hand_turns_with_its_pushes_is_seen():
+    headings = np.array([0.0, 1.6, 3.1, -1.5])
+    axes, turns = hand_frame(problems_with(headings, headings + 0.3))
+    assert turns and np.arctan2(axes[1][0], axes[0][0]) == pytest.approx(0.3)
+    axes, turns = hand_frame(problems_with(headings, [0.3, 0.31, 0.29, 0.3]))
+    assert not turns and np.arctan2(axes[1][0], axes[0][0]) == pytest.approx(0.3, abs=1e-6)
+    assert hand_frame(problems_with(headings, [0.0, 1.0, -2.0, 2.0])) == (AS_W, False)
+    # In pushes of one direction both are true: nothing is known of others.
+    assert hand_frame(problems_with([0.1] * 3, [0.3] * 3))[1] is False
 
 
 def test_how_estimates_vary_together_survives_the_file_and_may_be_absent(model, tmp_path):
