@@ -23,7 +23,7 @@ from physid_drake.diagnose.values import (
     ThetaEstimate,
 )
 from physid_drake.effects import Effect
-from physid_drake.identify.theta import cell_error
+from physid_drake.identify.theta import CELL_ERROR, cell_error
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def parameters_of(evidence: Evidence, k: int) -> dict[str, ParameterEstimate]:
     here = final.state.effects[k]
     at = len(final.state.u) + sum(len(e.free) for e in final.state.effects[:k])
     part = slice(at, at + len(here.free))
-    covariance = shared_covariance(final)[part, part]
+    covariance = shared_covariance(final)[part, part] + np.diag(_own_error(here, case) ** 2)
     rng = np.random.default_rng(0)
     draws = rng.multivariate_normal(np.zeros(len(here.free)), covariance, SAMPLES, method="eigh") * _t_factor(final)
     drawn = [here.moved(case, d).effect(case) for d in _more_than_nothing(here, case, draws)]
@@ -66,6 +66,13 @@ def parameters_of(evidence: Evidence, k: int) -> dict[str, ParameterEstimate]:
         )
         for name, unit in effect.units().items()
     }
+
+
+def _own_error(here: EffectPoint, case: Case) -> Array:
+    """The cell's own error (k,) of free coordinates: a share of an amplitude, or of a speed, size or frequency."""
+    chart = here.chart(case)
+    amounts = [abs(here.point[j]) if np.isinf(chart[j].std) else float(chart[j].log) for j in here.free]
+    return CELL_ERROR * np.array(amounts)
 
 
 def _more_than_nothing(here: EffectPoint, case: Case, moves: Array) -> Array:

@@ -12,6 +12,8 @@ from physid_drake.effects import Surroundings
 from physid_drake.effects.body import UnevenSupport
 from physid_drake.effects.drag import QuadraticDrag
 from physid_drake.effects.fields import TableTilt
+from physid_drake.effects.friction import FrictionPatch
+from physid_drake.identify.theta import CELL_ERROR
 from physid_drake.space import Parameter, ParameterSpace
 
 AROUND = Surroundings(
@@ -70,8 +72,22 @@ def test_an_effect_that_is_there_is_more_than_nothing_however_little_is_known_of
     fit = fitted(drag, covariance=np.diag([0.01, 5.0 * share]) ** 2)
     told = parameters_of(SimpleNamespace(final=fit, case=CASE), 0)["coefficient"]
     assert told.value == 5.0
-    reach = share * stats.t.ppf(0.95, 8)
+    reach = np.hypot(share, CELL_ERROR) * stats.t.ppf(0.95, 8)
     np.testing.assert_allclose(np.log(np.array(told.ci90) / 5.0), [-reach, reach], rtol=0.15)  # of 400 draws
+
+
+def test_no_interval_of_an_effect_is_narrower_than_the_cells_own_error():
+    chart = FrictionPatch.chart(AROUND)
+    place = np.array([np.log(2.0), 0.1, -0.05, np.log(0.04)])
+    patch = EffectPoint(kind=FrictionPatch, point=place, free=(0, 1, 2, 3), origin=np.zeros(4))
+    fit = fitted(patch, covariance=1e-12 * np.eye(5))
+    told = parameters_of(SimpleNamespace(final=fit, case=CASE), 0)
+    reach = CELL_ERROR * stats.t.ppf(0.95, 5)  # ten pushes, five unknowns
+    assert [c.name for c in chart] == ["ratio", "x", "y", "radius"]
+    strength, radius = (np.log(np.array(told[name].ci90) / told[name].value) for name in ("ratio", "radius"))
+    np.testing.assert_allclose(strength, np.log(2.0) * reach * np.array([-1, 1]), rtol=0.15)
+    np.testing.assert_allclose(radius, reach * np.array([-1, 1]), rtol=0.15)
+    assert np.ptp(told["x"].ci90) < 1e-4  # a place has no size of its own
 
 
 def test_a_drag_over_a_mass_that_nobody_weighed_varies_with_it():
