@@ -31,6 +31,7 @@ Z90 = float(stats.norm.ppf(0.95))
 SAMPLES = 400  # of an effect's chart, for the intervals of its parameters
 JOINT_SAMPLES = 2000  # of theta and all charts, for how the estimates vary together
 IDENTIFIABLE = 0.5  # posterior over prior standard deviation
+DOUBTFUL = 0.5  # of its standard deviation: below, an amplitude may be nothing. A mass that nobody weighed leaves more
 
 
 def shared_covariance(fitted: Fitted) -> Array:
@@ -79,14 +80,13 @@ def _more_than_nothing(here: EffectPoint, case: Case, moves: Array) -> Array:
     """Moves (n, k) of free coordinates; those of an amplitude that cannot be negative are made in its logarithm.
 
     An effect that is surely there is more than nothing, however little is known of its size: a drag, say, over a mass
-    that nobody weighed. Little changes where an amplitude is well known, and nothing where it is within a deviation
-    of nothing.
+    that nobody weighed. Little changes where an amplitude is well known, and nothing where it is doubtful.
     """
     made = moves.copy()
     for k, j in enumerate(here.free):
         coordinate, value = here.chart(case)[j], here.point[j]
         one_sided = coordinate.name in here.kind.amplitudes and coordinate.lower == 0.0 and not coordinate.log
-        if one_sided and value > np.std(moves[:, k]):
+        if one_sided and value > DOUBTFUL * np.std(moves[:, k]):
             made[:, k] = value * np.expm1(moves[:, k] / value)
     return made
 

@@ -65,7 +65,7 @@ def test_no_interval_of_theta_is_narrower_than_the_cells_own_error():
         assert widths[0] < reach < widths[1]
 
 
-@pytest.mark.parametrize("share", [0.02, 0.7])
+@pytest.mark.parametrize("share", [0.02, 0.7, 1.1])
 def test_an_effect_that_is_there_is_more_than_nothing_however_little_is_known_of_it(share):
     """Its logarithm is normal; ten pushes with two unknowns leave eight degrees of freedom."""
     drag = EffectPoint(kind=QuadraticDrag, point=np.array([5.0]), free=(0,), origin=np.zeros(1))
