@@ -34,6 +34,9 @@ ANOTHER_BASIN = 10.0  # nats by which a fit must be better to be another one
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
 WIDE = 2.0  # times the usual scatter of friction: it may be what is missing in disguise
 HOP = 3  # steps of a fit from another shape: an effect that belongs there shows by then
+WORTH_ANOTHER_SHAPE = (
+    0.5  # of the plain cell's excess cost: an effect that leaves more is not near another shape of it
+)
 HOPELESS = 6.0  # cost per degree of freedom with two effects: no third one of the catalogue will make up for that
 
 
@@ -131,7 +134,7 @@ class Growth:
                 steps += steps_of(pairs)
                 state = pairs[0].fitted.state
             tick(f"model with {' and '.join(step[0].name for step in steps)}", 0, 0)
-            model = self._model_with(state)
+            model = self._model_with(state, base.fitted)
             hopeless = len(steps) > 1 and model.reduced_chi2 > HOPELESS
             more = not hopeless and len(steps) < MOST_EFFECTS and pool.count < longest
             last = self._what_is_left(model, last.signatures, self.alpha if more else 0.0)
@@ -203,7 +206,7 @@ class Growth:
         if best == step[0].name:
             return dc.replace(grown, steps=steps)
         self.tick(f"model with {best}", 0, 0)
-        swapped = self._model_with(models[best].state)
+        swapped = self._model_with(models[best].state, plain)
         missed = [s for s in grown.base.signatures if s.kind.name == step[0].name]
         left = [s for s in grown.last.signatures if s.kind.name != best]
         return dc.replace(grown, steps=steps, last=Looked.at(swapped, (*left, *missed), self.rng), without={})
@@ -221,8 +224,13 @@ class Growth:
         again = self.fitter.fit(near.state, rounds=2, like=near, renew=True)
         return again if again.score - plain.score > ANOTHER_BASIN else None
 
-    def _model_with(self, state: State) -> Fitted:
-        """A fitted model with all coordinates of its effects free, all derivatives taken where it is."""
+    def _model_with(self, state: State, plain: Fitted) -> Fitted:
+        """A fitted model with all coordinates of its effects free, all derivatives taken where it is.
+
+        Args:
+            state: where to start.
+            plain: the model without effects.
+        """
         fitter = self.fitter
         effects = tuple(e.freed(fitter.case) for e in state.effects)
         best = fitter.fit(dc.replace(state, effects=effects), rounds=3, renew=True)
@@ -232,14 +240,16 @@ class Growth:
             # The pushes' unknowns may have been imitating what is missing: once more, without them at first.
             far = fitter.fit(of_other_strength(fitter, best), rounds=4, careful=1, renew=True)
             best = max((best, far), key=lambda model: model.score)
-        return self._of_other_shape(best)
+        return self._of_other_shape(best, plain)
 
-    def _of_other_shape(self, model: Fitted) -> Fitted:
+    def _of_other_shape(self, model: Fitted, plain: Fitted) -> Fitted:
         """A model fitted again from other shapes of its last effect, as long as none explains the pushes.
 
         A patch that is found half as large and beside where it is takes most of a mismatch away, and no step leads on
-        from there.
+        from there. One that takes less away is not near.
         """
+        if model.reduced_chi2 - 1.0 > WORTH_ANOTHER_SHAPE * (plain.reduced_chi2 - 1.0):
+            return model
         best, ways = model, corners(self.fitter, model)
         for k, corner in enumerate(ways):
             if best.reduced_chi2 <= EXPLAINED:

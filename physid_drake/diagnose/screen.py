@@ -122,7 +122,7 @@ def signatures(
     for s, (kind, family) in enumerate((b.kind, b.family) for b in blank):
         chart = kind.chart(case.around)
         for i in range(len(case.problems)):
-            if blank[s].friction_changes or not _reaches(fitter, kind, family, i):
+            if blank[s].friction_changes or family.shares or not _reaches(fitter, kind, family, i):
                 continue
             for d, j in enumerate(family.free):
                 for sign in (1.0, -1.0) if family.central else (1.0,):
@@ -141,7 +141,20 @@ def signatures(
             columns[s][i][:, d] += 0.5 * sign * vector
         else:
             columns[s][i][:, d] = vector - base[i]
+    for s, one in enumerate(blank):
+        if one.family.shares:
+            simulated = [columns[k] for k, b in enumerate(blank) if b.kind is one.kind and not b.family.shares]
+            columns[s] = _added_up(simulated, one.family.shares)
     return [with_frictions(fitted, dc.replace(b, columns=tuple(c))) for b, c in zip(blank, columns, strict=True)]
+
+
+def _added_up(simulated: Sequence[Sequence[Array]], shares: Sequence[float]) -> list[Array]:
+    """Columns per push (m, p): so much of each of the families' (small effects add up)."""
+    total = [np.zeros_like(column) for column in simulated[0]]
+    for columns, share in zip(simulated, shares, strict=True):
+        for i, column in enumerate(columns):
+            total[i] += share * column
+    return total
 
 
 def with_frictions(fitted: Fitted, signature: Signature) -> Signature:

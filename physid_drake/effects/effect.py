@@ -105,12 +105,15 @@ class Family:
         central: take central differences, since the effect builds another cell, whose quadrature differs by more
             than a step does.
         size: steps to take: more than one where a large effect looks different from a small one.
+        shares: of the effect's simulated families, in their order: so much of each, added up, is this one, which then
+            needs no rollouts of its own; empty where it is simulated.
     """
 
     point: tuple[float, ...]
     free: tuple[int, ...]
     central: bool = False
     size: float = 1.0
+    shares: tuple[float, ...] = ()
 
 
 def families_of_sizes(*sizes: float) -> tuple[Family, ...]:

@@ -17,6 +17,8 @@ from physid_drake.effects.places import close_grid_of_places
 
 Array = NDArray[np.float64]
 SLIGHT_SHARE = 0.015  # of the friction
+BASE = 0.6  # of the distance between two places: a patch's radius that covers the gaps
+WIDE = (2.0, 3.5)  # times that radius: larger patches are made of those
 WIDER, NEARBY = 1.3, 0.02  # times a patch's radius, and m: a fit may move its edge by so much
 
 
@@ -207,9 +209,15 @@ class FrictionPatch(Effect):
 
     @classmethod
     def families(cls, around: Surroundings) -> tuple[Family, ...]:
-        """A grid of places, with a radius that covers the gaps between them."""
+        """A grid of places, with a radius that covers the gaps between them, and wider patches made of these.
+
+        A fit that starts from a patch of a third of the true radius does not find out.
+        """
         places, spacing = close_grid_of_places(around)
-        return tuple(Family(point=(0.0, float(x), float(y), math.log(0.6 * spacing)), free=(0,)) for x, y in places)
+        radius = BASE * spacing
+        simulated = tuple(_patch_family(place, radius) for place in places)
+        wide = (_patch_family(p, w * radius, _shares(places, p, w, radius, spacing)) for w in WIDE for p in places)
+        return (*simulated, *wide)
 
     def reaches(self, places: Array, around: Surroundings) -> bool:
         """Whether a corner of the object may have been on the patch, which a fit may still make a little larger."""
@@ -220,6 +228,19 @@ class FrictionPatch(Effect):
         """The law."""
         del facts
         return (_PatchLaw(self.ratio, self.x, self.y, self.radius),)
+
+
+def _patch_family(place: Array, radius: float, shares: tuple[float, ...] = ()) -> Family:
+    x, y = place.tolist()
+    return Family(point=(0.0, x, y, math.log(radius)), free=(0,), shares=shares)
+
+
+def _shares(places: Array, place: Array, wide: float, radius: float, spacing: float) -> tuple[float, ...]:
+    """How much of each patch of the grid lies in one ``wide`` times as large at a place; overlaps count once."""
+    away = np.hypot(*(places - place).T)
+    inside = np.clip(0.5 + 0.5 * (wide - away / radius), 0.0, 1.0)
+    overlap = math.pi * radius**2 / spacing**2
+    return tuple((inside / overlap).tolist())
 
 
 @dc.dataclass(frozen=True)

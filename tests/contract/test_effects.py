@@ -209,6 +209,32 @@ def test_an_effect_says_what_it_is_and_where_it_is_constant(kind):
     assert kind.__doc__
 
 
+SUMMED = [kind for kind in CATALOGUE if any(f.shares for f in kind.families(around(rolls_for(kind))))]
+
+
+@pytest.mark.parametrize("kind", SUMMED, ids=lambda kind: kind.name)
+def test_a_family_that_is_a_sum_of_others_moves_an_object_about_as_they_do_together(kind):
+    rolls = rolls_for(kind)
+    scene = around(rolls)
+    families = kind.families(scene)
+
+    def change(family):
+        point = np.array(family.point)
+        point[family.free[0]] += kind.chart(scene)[family.free[0]].step
+        return seen(kind.at(point, scene), rolls=rolls) - plain(rolls)
+
+    simulated = [change(f) for f in families if not f.shares]
+    wide = [f for f in families if f.shares]
+    assert all(len(f.shares) == len(simulated) for f in wide)
+    # In the middle of the grid: at its edge, what lies outside is in no other family.
+    family = wide[len(simulated) // 2]
+    alone = change(family) / SIGMA
+    summed = sum(share * one for share, one in zip(family.shares, simulated, strict=True)) / SIGMA
+    sizes = np.linalg.norm(alone), np.linalg.norm(summed)
+    assert (alone * summed).sum() > 0.95 * sizes[0] * sizes[1]
+    assert sizes[1] == pytest.approx(sizes[0], rel=0.35)
+
+
 @every_effect
 def test_a_chart_holds_the_points_of_its_families_and_has_positive_steps(kind):
     scene = around(rolls_for(kind))

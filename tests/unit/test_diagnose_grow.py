@@ -134,7 +134,7 @@ def test_an_effect_that_makes_no_simulated_push_better_is_taken_out(grown):
 def rivalled(grown, monkeypatch):
     """A magnet that a tilted table is like, and a drag beside it; (without the first effect, -60 a push)."""
     monkeypatch.setattr(grow, "class_of", lambda plain, step: ("table_tilt",))
-    monkeypatch.setattr(grow.Growth, "_model_with", lambda self, state: self.fitter.fit(state))
+    monkeypatch.setattr(grow.Growth, "_model_with", lambda self, state, plain: self.fitter.fit(state))
     magnet = dc.replace(step("magnet")[0], coordinates=4)
     rival = dc.replace(step("table_tilt")[0], fitted=fitted(("table_tilt",), -60.0), coordinates=1)
     last = dc.replace(grown.last, fitted=fitted(("magnet", "viscous_drag"), -5.0))
@@ -219,6 +219,9 @@ class Basins:
         return SimpleNamespace(state=state, score=score, reduced_chi2=1.1 if score >= self.explains else 3.0)
 
 
+FAR_OFF = SimpleNamespace(reduced_chi2=8.0)
+
+
 @pytest.fixture
 def four_corners(monkeypatch):
     monkeypatch.setattr(grow, "corners", lambda fitter, model: [0, 1, 2, 3])
@@ -236,7 +239,7 @@ def four_corners(monkeypatch):
 def test_a_shape_that_does_not_explain_is_looked_for_elsewhere(four_corners, scores, end, tried):
     basins = Basins(dict(enumerate(scores)) | {"here": -500.0}, explains=-100.0)
     here = basins.at("here")
-    model = growth(basins)._of_other_shape(here)
+    model = growth(basins)._of_other_shape(here, FAR_OFF)
     assert model.state.own == end
     assert basins.tried == tried
     assert (model is here) == (end == "here")
@@ -245,5 +248,13 @@ def test_a_shape_that_does_not_explain_is_looked_for_elsewhere(four_corners, sco
 def test_a_shape_that_explains_stays(four_corners):
     basins = Basins({"here": -50.0}, explains=-100.0)
     here = basins.at("here")
-    assert growth(basins)._of_other_shape(here) is here
+    assert growth(basins)._of_other_shape(here, FAR_OFF) is here
     assert basins.tried == 0
+
+
+def test_a_shape_that_takes_little_away_is_not_looked_for_elsewhere(four_corners):
+    basins = Basins(dict.fromkeys(range(4), -50.0) | {"here": -500.0}, explains=-100.0)
+    here = basins.at("here")
+    assert growth(basins)._of_other_shape(here, SimpleNamespace(reduced_chi2=4.5)) is here  # of 3.5, two are left
+    assert basins.tried == 0
+    assert growth(basins)._of_other_shape(here, SimpleNamespace(reduced_chi2=5.5)) is not here
