@@ -31,9 +31,8 @@ Z90 = float(stats.norm.ppf(0.95))
 SAMPLES = 400  # of an effect's chart, for the intervals of its parameters
 JOINT_SAMPLES = 2000  # of theta and all charts, for how the estimates vary together
 IDENTIFIABLE = 0.5  # posterior over prior standard deviation
-DOUBTFUL = (
-    0.5  # of its standard deviation: below, an amplitude may be nothing. A mass that nobody weighed leaves more
-)
+# Of its standard deviation: below, an amplitude may be nothing. What is known over an unweighed mass only is above.
+DOUBTFUL = 0.5
 
 
 def shared_covariance(fitted: Fitted) -> Array:

@@ -34,9 +34,7 @@ ANOTHER_BASIN = 10.0  # nats by which a fit must be better to be another one
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
 WIDE = 2.0  # times the usual scatter of friction: it may be what is missing in disguise
 HOP = 3  # steps of a fit from another shape: an effect that belongs there shows by then
-WORTH_ANOTHER_SHAPE = (
-    0.5  # of the plain cell's excess cost: an effect that leaves more is not near another shape of it
-)
+WORTH_ANOTHER_SHAPE = 0.5  # of the plain cell's excess cost: an effect that leaves more is not near another shape
 HOPELESS = 6.0  # cost per degree of freedom with two effects: no third one of the catalogue will make up for that
 
 
