@@ -23,6 +23,7 @@ from physid_drake.diagnose.values import (
     ThetaEstimate,
 )
 from physid_drake.effects import Effect
+from physid_drake.effects.effect import Coordinate
 from physid_drake.identify.theta import CELL_ERROR, cell_error
 
 Array = NDArray[np.float64]
@@ -71,10 +72,19 @@ def parameters_of(evidence: Evidence, k: int) -> dict[str, ParameterEstimate]:
 
 
 def _own_error(here: EffectPoint, case: Case) -> Array:
-    """The cell's own error (k,) of free coordinates: a share of an amplitude, or of a speed, size or frequency."""
+    """The cell's own error (k,) of free coordinates: a share of an amplitude, or of a speed, size or frequency.
+
+    Of a place, that share of what lies between two places that are looked at.
+    """
     chart = here.chart(case)
-    amounts = [abs(here.point[j]) if np.isinf(chart[j].std) else float(chart[j].log) for j in here.free]
+    amounts = [_amount(chart[j], float(here.point[j])) for j in here.free]
     return CELL_ERROR * np.array(amounts)
+
+
+def _amount(coordinate: Coordinate, value: float) -> float:
+    if np.isinf(coordinate.std):
+        return abs(value)
+    return 1.0 if coordinate.log else coordinate.std
 
 
 def _more_than_nothing(here: EffectPoint, case: Case, moves: Array) -> Array:

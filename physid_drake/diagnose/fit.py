@@ -298,8 +298,12 @@ class Fitter:
         return trial
 
     def refine(self, rough: Fitted) -> Fitted:
-        """What another cell's fit left, here: derivatives of theta and effects anew, then steps while they help."""
-        best = self.linearise(rough.state, like=rough, fresh_theta=True)
+        """What another cell's fit left, here: derivatives of theta and effects anew, then steps while they help.
+
+        Beside an effect those of the pushes' unknowns, too: a start beside a patch matters more than elsewhere.
+        """
+        like = None if rough.state.effects else rough
+        best = self.linearise(rough.state, like=like, fresh_theta=True)
         for _ in range(REFINEMENTS):
             moved = self.seen_from(best, self.stepped(best))
             gained = best.cost_here - moved.cost_here

@@ -183,7 +183,10 @@ class _EllipseLaw:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class FrictionPatch(Effect):
-    """A round region of the table whose friction is ``ratio`` times that of the rest."""
+    """A round region of the table whose friction is ``ratio`` times that of the rest; its edge is sharp.
+
+    Larger than what a support point stands for (a thirtieth of the base): that is how sharply the cell sees an edge.
+    """
 
     name: ClassVar[str] = "friction_patch"
     element: ClassVar[str] = "table"
@@ -256,10 +259,18 @@ class _PatchLaw:
 
     def refund(self, state: ObjectState) -> Array:
         away = np.abs(state.places - complex(self.x, self.y))
-        # A soft edge, so that a fit's cost has no steps as support points cross it.
-        inside = 1.0 / (1.0 + np.exp(np.clip((away - self.radius) / (0.05 * self.radius), -50.0, 50.0)))
-        ratio = 1.0 + (self.ratio - 1.0) * inside
+        ratio = 1.0 + (self.ratio - 1.0) * share_inside((away - self.radius) / state.underside.radii)
         return _along(state, self.largest - ratio)
+
+
+def share_inside(beyond: Array) -> Array:
+    """Of unit discs that lie ``beyond`` a straight edge (n,), as much as is on this side of it.
+
+    Of the disc that a support point stands for: an edge of the table is sharp, and crosses the base little by little.
+    """
+    s = np.clip(beyond, -1.0, 1.0)
+    inside: Array = (np.arccos(s) - s * np.sqrt(1.0 - s * s)) / math.pi
+    return inside
 
 
 @dc.dataclass(frozen=True, kw_only=True)

@@ -104,9 +104,9 @@ def test_a_slide_into_a_patch_is_that_of_the_points_that_have_entered(ratio):
         return -v / math.hypot(*v) * mu * G
 
     want = point_path(deceleration, (0.6, 0.0))
-    # The cell has thirty points, and its patch an edge of 5 mm.
+    # The cell has 36 points, each of which enters as a disc would.
     got = end(slide(patch, velocity=(0.6, 0.0, 0.0)))
-    np.testing.assert_allclose(got[:2], want, atol=4e-4)  # measured 0.9e-4 and 1.8e-4 m
+    np.testing.assert_allclose(got[:2], want, atol=4e-4)  # measured 2.4e-4 and 1.3e-4 m
 
 
 @pytest.mark.parametrize("slope", [1.5, -2.5])

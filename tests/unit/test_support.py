@@ -10,6 +10,7 @@ from physid_drake.cell import CellConfig
 from physid_drake.cell.forces import ObjectState, Underside, as_complex, as_plane, refund_wrench, total_wrenches
 from physid_drake.cell.outline import Disc, Polygon, rectangle
 from physid_drake.cell.support import FrictionGrid, Support, rest_depths, support_of
+from physid_drake.effects.friction import share_inside
 
 ELLIPSE = Polygon([(0.06 * math.cos(2 * math.pi * k / 64), 0.04 * math.sin(2 * math.pi * k / 64)) for k in range(64)])
 HEXAGON = Polygon([(0.05 * math.cos(math.pi * k / 3), 0.05 * math.sin(math.pi * k / 3)) for k in range(6)])
@@ -271,3 +272,20 @@ def test_a_line_of_points_is_no_base():
     )
     with pytest.raises(ValueError, match="above the base"):
         rest_depths(line, np.array([0.0, 0.005]), 3e-6)
+
+
+# -------------------------------------------------------------------------------------------------- places
+
+
+@every_outline
+@pytest.mark.parametrize("radius", [0.04, 0.08, 0.12])
+def test_the_share_of_a_base_on_a_patch_whose_edge_crosses_it(name, radius):
+    points, support, rng = fine_points(OUTLINES[name], 300), quadrature(name, points=POINTS), np.random.default_rng(0)
+    reach, errors = 0.5 * np.ptp(points, axis=0).max(), []
+    for _ in range(200):
+        centre = (radius + rng.uniform(-reach, reach)) * np.exp(1j * rng.uniform(-np.pi, np.pi))
+        inside = np.abs(as_complex(points) - centre) < radius
+        shares = share_inside((np.abs(as_complex(support.points) - centre) - radius) / support.radii)
+        errors.append(support.weights @ shares - inside.mean())
+    # Measured: 0.4 to 0.7 %, 1.2 % of the hexagon and 40 mm; of points that are in or out, 1.5 to 2.5 %.
+    assert np.sqrt(np.mean(np.square(errors))) < (0.008 if radius > 0.05 else 0.014)
