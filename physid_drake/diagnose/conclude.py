@@ -19,7 +19,7 @@ from physid_drake.diagnose.confirm import (
     rivals,
     standard_error,
 )
-from physid_drake.diagnose.estimates import parameters_of, rms, smallest, theta_of
+from physid_drake.diagnose.estimates import parameters_of, smallest, theta_of
 from physid_drake.diagnose.evidence import (
     MOST_OF_UNKNOWN,
     TOO_SCATTERED,
@@ -30,6 +30,7 @@ from physid_drake.diagnose.evidence import (
     unexplained,
 )
 from physid_drake.diagnose.frictions import friction_trend
+from physid_drake.diagnose.left_out import comes_nearer, errors_of, shown_by_several
 from physid_drake.diagnose.looks import locate
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import regime_gains
@@ -52,7 +53,6 @@ SCORE_ERROR = 2.0  # nats: of a difference of gains, beside its standard error
 CHANCE = 0.05  # of all looks: what explains no more is not worth a word
 FEWEST_PUSHES = 3
 GOOD_PART = 0.25  # of the squared error: less is not worth a word
-BETTER = 1.2  # times: as much nearer has a model to simulate pushes that were left out than the plain one
 QUIET = 5e-5  # m: a tracker's noise that is no longer what hides the cell's own error
 OWN_POSITION, OWN_ROTATION = 2e-4, 2e-3  # m, rad: of left-out pushes, what the cell itself may be off by
 PART = "takes a part away, and leaves more than noise"
@@ -122,7 +122,7 @@ def _p_value(evidence: Evidence) -> float:
 
 def _is_own_error(evidence: Evidence) -> bool:
     """Whether there is hardly any noise, and the plain cell predicts pushes to its own error."""
-    before = _errors(evidence.case, evidence.errors_before)
+    before = errors_of(evidence.case, evidence.errors_before)
     near = before.position < OWN_POSITION and before.rotation < OWN_ROTATION
     return evidence.case.noise.position < QUIET and near
 
@@ -143,22 +143,14 @@ def _predicts(evidence: Evidence) -> bool:
     return comes_nearer(evidence.case, evidence.errors_before, evidence.errors_after)
 
 
-def comes_nearer(case: Case, before: Sequence[Array], after: Sequence[Array]) -> bool:
-    """Whether errors (m_i,) of pushes that were left out, simulated, are visibly smaller than before.
-
-    Each push may be likelier than before and yet come out of the simulation no nearer to where it was: effects and a
-    friction that scatters share what is missing, or an effect took up the cell's own error. The push that speaks most
-    against the model is left out: an object that is about to slip off the hand goes one way or the other for next to
-    nothing.
-    """
-    old, new = (np.square(_errors(case, errors).per_push) for errors in (before, after))
-    others = np.arange(len(old)) != np.argmax(new - old)
-    return BETTER**2 * float(new[others].sum()) <= float(old[others].sum())
+def _by_several(evidence: Evidence) -> bool:
+    """Whether more than one of these pushes shows it."""
+    return shown_by_several(evidence.case, evidence.errors_before, evidence.errors_after)
 
 
 def _explained(evidence: Evidence) -> bool:
     """Whether the last model accounts for the pushes."""
-    if not _predicts(evidence):
+    if not _predicts(evidence) or not _by_several(evidence):
         return False
     if evidence.case.noise.known:
         return not unexplained(evidence.plain, evidence.final)
@@ -242,7 +234,7 @@ def _partly(evidence: Evidence) -> Partly | None:
     if found is None:
         return None
     names, model = found
-    before, after = (_errors(evidence.case, e) for e in (evidence.errors_before, evidence.errors_after))
+    before, after = (errors_of(evidence.case, e) for e in (evidence.errors_before, evidence.errors_after))
     share = 1.0 - (after.rms / before.rms) ** 2
     if share < GOOD_PART:
         return None
@@ -251,31 +243,11 @@ def _partly(evidence: Evidence) -> Partly | None:
     )  # fmt: skip
 
 
-@dc.dataclass(frozen=True, kw_only=True)
-class _Errors:
-    """Of pushes left out: root mean squares in standard deviations (of each push too), of place and yaw [m, rad]."""
-
-    rms: float
-    per_push: tuple[float, ...]
-    position: float
-    rotation: float
-
-
-def _errors(case: Case, residuals: Sequence[Array]) -> _Errors:
-    poses = [f.poses(r) for f, r in zip(case.features, residuals, strict=True)]
-    scaled = [p / f.sigmas for p, f in zip(poses, case.features, strict=True)]
-    every = np.concatenate(poses)
-    return _Errors(
-        rms=rms(np.concatenate(scaled)), per_push=tuple(rms(s) for s in scaled),
-        position=math.sqrt(2.0) * rms(every[:, :2]), rotation=rms(every[:, 2]),
-    )  # fmt: skip
-
-
 def _quality(evidence: Evidence, after: Fitted) -> FitQuality:
     case, plain = evidence.case, evidence.plain
     gains = push_scores(after) - push_scores(plain)
     left_out = (evidence.errors_before, evidence.errors_before if after is plain else evidence.errors_after)
-    old, new = (_errors(case, residuals) for residuals in left_out)
+    old, new = (errors_of(case, residuals) for residuals in left_out)
     return FitQuality(
         rms_before=old.rms, rms_after=new.rms, position_before=old.position, position_after=new.position,
         rotation_before=old.rotation, rotation_after=new.rotation,
@@ -326,8 +298,14 @@ def _why_fitted_in_vain(candidate: Candidate, named: set[str], evidence: Evidenc
         return "smaller than the cell's own error"
     if named:
         return "predicts pushes that were left out worse"
+    return _why_not_named(evidence)
+
+
+def _why_not_named(evidence: Evidence) -> str:
     if not _predicts(evidence):
         return "pushes that were left out are simulated hardly better with it"
+    if not _by_several(evidence):
+        return "one push that was left out is simulated better with it, the others hardly"
     return "pushes that were left out confirm it, but it leaves more than noise"
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from physid_drake.diagnose.conclude import class_of, comes_nearer
+from physid_drake.diagnose.conclude import class_of
 from physid_drake.diagnose.confirm import (
     A_LAW,
     EXPLAINED,
@@ -20,6 +20,7 @@ from physid_drake.diagnose.confirm import (
 )
 from physid_drake.diagnose.evidence import mismatch, unexplained
 from physid_drake.diagnose.fit import Fitter
+from physid_drake.diagnose.left_out import comes_nearer
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.pairs import confirmed_pairs, steps_of
 from physid_drake.diagnose.screen import Screening, Signature, screen, signatures, with_frictions

@@ -130,6 +130,20 @@ def test_one_push_that_goes_another_way_does_not_speak_against_a_model(odd, pred
     assert conclude._predicts(told) is predicts
 
 
+@pytest.mark.parametrize(("others", "explained"), [(10.5, False), (9.9, True), (7.0, True)])
+def test_a_model_with_which_one_push_alone_comes_nearer_is_no_answer(monkeypatch, others, explained):
+    """The mismatch stands; a little nearer will do where all pushes come nearer."""
+    monkeypatch.setattr(conclude, "unexplained", lambda plain, final: False)
+    told = evidence(steps=((tried("friction_patch", 50.0, model_that_leaves(1.0)),),), after=others)
+    told.case.noise.known = True
+    told.errors_before = errors(40.0)[:1] + told.errors_before[1:]
+    told.errors_after = errors(4.0)[:1] + told.errors_after[1:]
+    assert conclude._predicts(told)
+    assert conclude._explained(told) is explained
+    why = conclude._why("friction_patch", told.steps[0][0], set(), set(), told)
+    assert why.startswith("one push that was left out") is not explained
+
+
 def test_what_the_model_has_beside_an_effect_is_no_rival_of_it(monkeypatch):
     gains = {"size_error": 50.0, "stribeck_friction": 49.0, "viscous_drag": 49.0}
     size, stribeck, drag = (tried(name, gain, model_that_leaves(1.0)) for name, gain in gains.items())
