@@ -14,7 +14,7 @@ from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.linear import left_out_scores
 from physid_drake.diagnose.model import EffectPoint, Fitted
 from physid_drake.diagnose.screen import Score
-from physid_drake.diagnose.starts import scanned_start, start_of
+from physid_drake.diagnose.starts import elsewhere, scanned_start, start_of
 
 Array = NDArray[np.float64]
 Tick = Callable[[str, int, int], None]
@@ -31,6 +31,9 @@ UNLIKELY = 0.05  # of the signed-rank test of held-out gains
 BOUND = 10.0  # nats: no push counts more, for or against
 CLOSE = 1.5  # nats: gains that differ by less tell no rivals apart, however sure
 STUCK = 1.6  # cost per degree of freedom after which a fit is tried again from elsewhere
+NEAR = 0.5  # of the cost beyond noise: an effect that leaves more is not near another place or shape
+HOP = 3  # steps of a fit from another place or shape: an effect that belongs there shows by then
+ANOTHER_BASIN = 10.0  # nats by which a fit must be better to be another one
 FELL_SHORT = 0.8  # of the gain that the score test promised: such a fit is tried again too
 PERSISTENT = 2  # candidates that are worth that, where none explains the pushes
 EXPLAINED = 1.5  # cost per degree of freedom above which something is still missing
@@ -145,7 +148,7 @@ def confirm(
             break
         tick(f"fit with {one.kind.name}", k, len(worth))
         found.append(_candidate(fitter, one, _fit(fitter, before, one), plain))
-    found = ranked(found)
+    found = _tried_elsewhere(fitter, before, ranked(found), plain, tick)
     for k in _once_more(found):
         candidate = found[k]
         short = candidate.fitted.score - before.score < FELL_SHORT * 0.5 * candidate.score.gain
@@ -156,6 +159,25 @@ def confirm(
         if again.score > candidate.fitted.score:
             found[k] = _candidate(fitter, candidate.score, again, plain)
     return tuple(ranked(found))
+
+
+def _tried_elsewhere(
+    fitter: Fitter, before: Fitted, found: Sequence[Candidate], plain: Array, tick: Tick
+) -> list[Candidate]:
+    """The candidates, the best of them fitted from other places as long as none explains the pushes.
+
+    Only what may be near: a candidate that takes most of the mismatch away.
+    """
+    tried = list(found)
+    near = [k for k, c in enumerate(tried) if takes_most(before, c.fitted)]
+    for k in near[:PERSISTENT]:
+        if _explained(tried):
+            break
+        tick(f"fit with {tried[k].name} elsewhere", 0, 0)
+        better = _fit_elsewhere(fitter, before, tried[k])
+        if better is not None:
+            tried[k] = _candidate(fitter, tried[k].score, better, plain)
+    return ranked(tried)
 
 
 def _once_more(found: Sequence[Candidate]) -> list[int]:
@@ -216,6 +238,26 @@ def _fit(fitter: Fitter, before: Fitted, one: Score) -> Fitted:
     if before.reduced_chi2 > FAR_OFF:
         return fitter.fit(fitter.start(before.state.u, effects), rounds=7, careful=4, like=before)
     return fitter.fit(dc.replace(before.state, effects=effects), rounds=4, like=before)
+
+
+def takes_most(before: Fitted, after: Fitted) -> bool:
+    """Whether a model leaves less than half of the cost beyond noise, so that what is missing may be near."""
+    return after.reduced_chi2 - 1.0 <= NEAR * (before.reduced_chi2 - 1.0)
+
+
+def _fit_elsewhere(fitter: Fitter, before: Fitted, candidate: Candidate) -> Fitted | None:
+    """The best of a few steps from other places and of the other sign, fitted; None where none is better.
+
+    A score test takes the rim of a slippery patch for a rough one beside it, and no step leads on from there.
+    """
+    best = candidate.fitted
+    for other in elsewhere(fitter.case, candidate.score):
+        start = fitter.start(before.state.u, (*before.state.effects, start_of(fitter, other)))
+        tried = fitter.fit(start, rounds=HOP, careful=HOP, like=before)
+        best = tried if tried.score > best.score + ANOTHER_BASIN else best
+        if best.reduced_chi2 <= STUCK:
+            break
+    return None if best is candidate.fitted else fitter.fit(best.state, rounds=4, like=before)
 
 
 def _fit_from_afar(fitter: Fitter, before: Fitted, candidate: Candidate) -> Fitted:

@@ -10,12 +10,15 @@ import numpy as np
 from physid_drake.diagnose.conclude import class_of
 from physid_drake.diagnose.confirm import (
     A_LAW,
+    ANOTHER_BASIN,
     EXPLAINED,
+    HOP,
     Candidate,
     confirm,
     push_scores,
     ranked,
     rejudged,
+    takes_most,
     worthwhile,
 )
 from physid_drake.diagnose.evidence import mismatch, unexplained
@@ -31,11 +34,8 @@ Tick = Callable[[str, int, int], None]
 
 MOST_EFFECTS = 3
 LONGEST = 450  # rollouts per push, after the first score tests, after which no further effect is looked for
-ANOTHER_BASIN = 10.0  # nats by which a fit must be better to be another one
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
 WIDE = 2.0  # times the usual scatter of friction: it may be what is missing in disguise
-HOP = 3  # steps of a fit from another shape: an effect that belongs there shows by then
-WORTH_ANOTHER_SHAPE = 0.5  # of the plain cell's excess cost: an effect that leaves more is not near another shape
 HOPELESS = 6.0  # cost per degree of freedom with two effects: no third one of the catalogue will make up for that
 
 
@@ -247,7 +247,7 @@ class Growth:
         A patch that is found half as large and beside where it is takes most of a mismatch away, and no step leads on
         from there. One that takes less away is not near.
         """
-        if model.reduced_chi2 - 1.0 > WORTH_ANOTHER_SHAPE * (plain.reduced_chi2 - 1.0):
+        if not takes_most(plain, model):
             return model
         best, ways = model, corners(self.fitter, model)
         for k, corner in enumerate(ways):

@@ -7,17 +7,19 @@ place, from which a fit does not find out; a few rollouts of strong versions tel
 from __future__ import annotations
 
 import dataclasses as dc
-from itertools import product
+from itertools import product, zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
 
+from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.screen import Score
 
 Array = NDArray[np.float64]
 
+ELSEWHERE = 3  # other places from which an effect is fitted
 FAMILIES = 4  # of an effect, the best by their score tests
 MULTIPLES = (1.0, 2.5, 5.0)  # of what the score test says
 STRENGTHS = (1.0, 0.7, 0.85, 1.2, 1.4)  # times that of a fit
@@ -51,6 +53,30 @@ def scanned_start(
         seen.append(fitter.seen_from(before, dc.replace(before.state, effects=effects)))
     best = int(np.argmax([model.score for model in seen]))
     return points[best], seen[best].solution.beta[: len(before.state.u)]
+
+
+def elsewhere(case: Case, one: Score) -> list[Score]:
+    """Score tests of an effect at other places, those of the other sign and of its own in turn, no place twice."""
+    tried = {_place(case, one)}
+    turns: dict[bool, list[Score]] = {False: [], True: []}
+    for other in sorted((s for s in one.others if s.kept), key=lambda s: -s.gain):
+        alike = _sign(other) == _sign(one)
+        place = _place(case, other)
+        if place not in tried:
+            tried.add(place)
+            turns[alike].append(other)
+    mixed = zip_longest(turns[False], turns[True])
+    return [s for pair in mixed for s in pair if s is not None][:ELSEWHERE]
+
+
+def _place(case: Case, one: Score) -> tuple[float, ...]:
+    """What sets an effect's families apart but for scales: a place on the table; nothing where there is none."""
+    family, chart = one.signature.family, one.kind.chart(case.around)
+    return tuple(family.point[j] for j in range(len(chart)) if j not in family.free and not chart[j].log)
+
+
+def _sign(one: Score) -> float:
+    return float(np.sign(one.coefficients[0]))
 
 
 def of_other_strength(fitter: Fitter, model: Fitted) -> State:

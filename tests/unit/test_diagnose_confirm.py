@@ -173,3 +173,61 @@ def test_what_left_out_pushes_do_not_confirm_keeps_no_weaker_effect_from_a_try(m
 def test_the_effect_that_promised_most_is_tried_again_whatever_came_of_it(promised, again):
     found = [SimpleNamespace(score=SimpleNamespace(gain=gain)) for gain in promised]
     assert confirm._once_more(found) == again
+
+
+class Places:
+    """Fits that end where they start: at the value of the last effect, whose pushes cost what ``left`` says there."""
+
+    case = None
+
+    def __init__(self, left):
+        self.left, self.ended = left, []
+
+    def start(self, u, effects):
+        return SimpleNamespace(u=u, effects=effects)
+
+    def fit(self, state, *, rounds, careful=0, like):
+        self.ended.append((state.effects[-1], rounds))
+        left = self.left[state.effects[-1]]
+        return SimpleNamespace(state=state, reduced_chi2=left, score=-100.0 * left)
+
+
+@pytest.mark.parametrize(
+    ("left", "best", "fits"),
+    [
+        ({"a": 3.0, "b": 1.2, "c": 1.0}, "b", [("a", 3), ("b", 3), ("b", 4)]),
+        ({"a": 3.0, "b": 9.0, "c": 2.5}, "c", [("a", 3), ("b", 3), ("c", 3), ("c", 4)]),
+        ({"a": 5.0, "b": 9.0, "c": 6.0}, None, [("a", 3), ("b", 3), ("c", 3)]),
+    ],
+)
+def test_other_places_are_tried_until_one_explains_the_pushes(monkeypatch, left, best, fits):
+    monkeypatch.setattr(confirm, "elsewhere", lambda case, score: list(left))
+    monkeypatch.setattr(confirm, "start_of", lambda fitter, place: place)
+    before = SimpleNamespace(state=SimpleNamespace(u=np.zeros(1), effects=()), reduced_chi2=20.0)
+    candidate = SimpleNamespace(score=None, fitted=SimpleNamespace(score=-400.0, reduced_chi2=4.0))
+    places = Places(left)
+    found = confirm._fit_elsewhere(places, before, candidate)
+    assert (None if found is None else found.state.effects[-1]) == best
+    assert places.ended == fits
+
+
+@pytest.mark.parametrize(
+    ("left", "tried"),
+    [
+        ([1.5, 4.0], []),  # explained
+        ([10.4, 10.4, 10.4], ["magnet", "friction_patch"]),
+        ([10.6, 10.4], ["friction_patch"]),  # the other one left most of it
+    ],
+)
+def test_only_what_takes_most_away_and_does_not_explain_all_is_tried_elsewhere(monkeypatch, left, tried):
+    ended = []
+    monkeypatch.setattr(confirm, "ranked", list)
+    monkeypatch.setattr(confirm, "_fit_elsewhere", lambda fitter, before, one: ended.append(one.name))
+    names = ["magnet", "friction_patch", "tether"]
+    found = [
+        SimpleNamespace(name=name, fitted=SimpleNamespace(reduced_chi2=chi2))
+        for name, chi2 in zip(names, left, strict=False)
+    ]
+    before = SimpleNamespace(reduced_chi2=20.0)
+    assert confirm._tried_elsewhere(None, before, found, np.zeros(8), lambda *said: None) == found
+    assert ended == tried

@@ -76,3 +76,29 @@ def test_another_shape_is_a_corner_of_the_prior_around_it(name, shape):
         np.testing.assert_allclose(ways[ways != 0.0], starts.ASIDE * np.array(corner))
         # What was unsure is unsure about the new place, and the amplitude about where it was.
         np.testing.assert_array_equal(moved.origin, np.where(ways != 0.0, moved.point, 0.0))
+
+
+def scored(kind, family, coefficient, gain):
+    signature = SimpleNamespace(family=family)
+    return SimpleNamespace(
+        kind=kind, signature=signature, kept=(0,), coefficients=np.array([coefficient]), gain=gain, others=()
+    )  # fmt: skip
+
+
+def test_a_patch_is_tried_elsewhere_with_the_other_sign_and_its_own_in_turn_and_no_place_twice():
+    kind = effect_named("friction_patch")
+    families = kind.families(AROUND)
+    wide = next(k for k, family in enumerate(families) if family.shares)
+    steps = [(0, 9.0, 100.0), (wide, 8.0, 90.0), (1, 7.0, 80.0), (2, -6.0, 70.0), (3, 5.0, 60.0), (4, -4.0, 50.0)]
+    best, *others = (scored(kind, families[k], coefficient, gain) for k, coefficient, gain in steps)
+    assert families[wide].point[1:3] == families[0].point[1:3]
+    best.others = (*others, scored(kind, families[5], -1.0, 40.0))
+    tried = starts.elsewhere(SimpleNamespace(around=AROUND), best)
+    assert [one.gain for one in tried] == [70.0, 80.0, 50.0]
+
+
+def test_an_effect_without_a_place_is_tried_nowhere_else():
+    kind = effect_named("stribeck_friction")
+    best, *others = (scored(kind, family, 1.0, 9.0) for family in kind.families(AROUND))
+    best.others = tuple(others)
+    assert len(others) > 1 and starts.elsewhere(SimpleNamespace(around=AROUND), best) == []
