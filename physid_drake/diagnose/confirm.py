@@ -127,8 +127,8 @@ def confirm(
         before: the model so far.
         scores: of the effects that are not in it.
         tick: told which effect is fitted.
-        most: effects that are fitted in any case, if they are worth it; as long as none takes a good part of the
-            mismatch away, twice as many. Far from the plain cell a score test says little of what a fit will find.
+        most: effects that are fitted in any case, if they are worth it; as long as none leads near an explanation,
+            twice as many. Far from the plain cell a score test says little of what a fit will find.
     """
     ordered = sorted((s for s in scores if s.kept), key=lambda s: -s.gain)
     worth = [s for s in ordered if s.gain >= WORTH_A_FIT * ordered[0].gain][:most]
@@ -142,7 +142,7 @@ def confirm(
     spent = fitter.case.pool.count + ENOUGH * len(fitter.case.problems)
     found: list[Candidate] = []
     for k, one in enumerate((*worth, *more)):
-        if k >= len(worth) and (any(worthwhile(before, c) for c in found) or fitter.case.pool.count > spent):
+        if k >= len(worth) and (_some_leads_near(before, found) or fitter.case.pool.count > spent):
             break
         if _explained([c for c in found if c.accepted]) and one.gain < RIVAL * ordered[0].gain:
             break
@@ -161,15 +161,21 @@ def confirm(
     return tuple(ranked(found))
 
 
+def _some_leads_near(before: Fitted, found: Sequence[Candidate]) -> bool:
+    return any(worthwhile(before, c) and c.fitted.reduced_chi2 <= FAR_OFF for c in found)
+
+
 def _tried_elsewhere(
     fitter: Fitter, before: Fitted, found: Sequence[Candidate], plain: Array, tick: Tick
 ) -> list[Candidate]:
     """The candidates, the best of them fitted from other places as long as none explains the pushes.
 
-    Only what may be near: a candidate that takes most of the mismatch away.
+    Only what has a place and may be near: a candidate that takes most of the mismatch away.
     """
+    if _explained(found):
+        return list(found)
     tried = list(found)
-    near = [k for k, c in enumerate(tried) if takes_most(before, c.fitted)]
+    near = [k for k, c in enumerate(tried) if takes_most(before, c.fitted) and elsewhere(fitter.case, c.score)]
     for k in near[:PERSISTENT]:
         if _explained(tried):
             break

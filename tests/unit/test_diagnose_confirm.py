@@ -217,17 +217,20 @@ def test_other_places_are_tried_until_one_explains_the_pushes(monkeypatch, left,
         ([1.5, 4.0], []),  # explained
         ([10.4, 10.4, 10.4], ["magnet", "friction_patch"]),
         ([10.6, 10.4], ["friction_patch"]),  # the other one left most of it
+        ([10.4, 10.6, 10.6, 10.4], ["magnet"]),  # a drag has no place
     ],
 )
 def test_only_what_takes_most_away_and_does_not_explain_all_is_tried_elsewhere(monkeypatch, left, tried):
     ended = []
     monkeypatch.setattr(confirm, "ranked", list)
     monkeypatch.setattr(confirm, "_fit_elsewhere", lambda fitter, before, one: ended.append(one.name))
-    names = ["magnet", "friction_patch", "tether"]
+    monkeypatch.setattr(confirm, "elsewhere", lambda case, name: [] if name == "viscous_drag" else ["there"])
+    names = ["magnet", "friction_patch", "tether", "viscous_drag"]
     found = [
-        SimpleNamespace(name=name, fitted=SimpleNamespace(reduced_chi2=chi2))
+        SimpleNamespace(name=name, score=name, fitted=SimpleNamespace(reduced_chi2=chi2))
         for name, chi2 in zip(names, left, strict=False)
     ]
     before = SimpleNamespace(reduced_chi2=20.0)
-    assert confirm._tried_elsewhere(None, before, found, np.zeros(8), lambda *said: None) == found
+    fitter = SimpleNamespace(case=None)
+    assert confirm._tried_elsewhere(fitter, before, found, np.zeros(8), lambda *said: None) == found
     assert ended == tried
