@@ -264,9 +264,12 @@ class _PatchLaw:
 
 
 def share_inside(beyond: Array) -> Array:
-    """Of unit discs that lie ``beyond`` a straight edge (n,), as much as is on this side of it.
+    """Shares (n,) of discs that are on this side of a straight edge: areas of circular segments.
 
-    Of the disc that a support point stands for: an edge of the table is sharp, and crosses the base little by little.
+    An edge of the table is sharp, and crosses the disc that a support point stands for little by little.
+
+    Args:
+        beyond: (n,) how far their centres are beyond the edge, in radii of the discs.
     """
     s = np.clip(beyond, -1.0, 1.0)
     inside: Array = (np.arccos(s) - s * np.sqrt(1.0 - s * s)) / math.pi
