@@ -23,7 +23,7 @@ WORTH_A_FIT = 0.35  # of the best score test's gain
 RIVAL = 0.5  # where one explains the pushes already
 WORTH_A_TRY = 0.1  # where none takes a good part of the mismatch away
 IN_ORDER = math.log(1e-4)  # of a p-value
-ENOUGH = 180  # rollouts per push in one step after which no further effect is tried
+ENOUGH = 120  # rollouts per push in one step after which no further effect is tried
 SURE = 2.0  # standard errors
 LEAST = 4.0  # nats of held-out gain
 CERTAIN = 40.0  # nats of held-out gain, the best push not counted
@@ -151,8 +151,7 @@ def confirm(
     found = _tried_elsewhere(fitter, before, ranked(found), plain, tick)
     for k in _once_more(found):
         candidate = found[k]
-        short = candidate.fitted.score - before.score < FELL_SHORT * 0.5 * candidate.score.gain
-        if (_explained(found) and not short) or fitter.case.pool.count > spent:
+        if fitter.case.pool.count > spent or not _may_do_better(before, candidate, _explained(found)):
             continue
         tick(f"fit with {candidate.name} once more", 0, 0)
         again = _fit_from_afar(fitter, before, candidate)
@@ -184,6 +183,18 @@ def _tried_elsewhere(
         if better is not None:
             tried[k] = _candidate(fitter, tried[k].score, better, plain)
     return ranked(tried)
+
+
+def _may_do_better(before: Fitted, candidate: Candidate, explained: bool) -> bool:
+    """Whether a fit from elsewhere may find more.
+
+    Where an effect explains the pushes, only one that fell short of what its score test promised. Beside an effect
+    that leaves little, one that took little of that away found what there is.
+    """
+    if explained:
+        return candidate.fitted.score - before.score < FELL_SHORT * 0.5 * candidate.score.gain
+    far = not before.state.effects or before.reduced_chi2 > FAR_OFF
+    return far or takes_most(before, candidate.fitted)
 
 
 def _once_more(found: Sequence[Candidate]) -> list[int]:

@@ -28,6 +28,9 @@ MOST_OWN = 3.0  # standard deviations: unknowns are linearised no further out
 MOST_FRICTION = 8.0  # in units of the usual scatter, which is itself learnt: 20 %
 FAILED = 1e4  # standard deviations: features of a rollout that diverged
 SETTLED = 0.5  # of the cost: a step that gained less is the last
+# Far from an explanation, of the squares beyond twice what noise would leave:
+SLOW = 0.01  # a step that gained less is the last
+FAST, MORE = 0.3, 2  # while steps gain as much, a fit goes on, to so many times its rounds
 REFINEMENTS = 3  # steps on short ticks
 RENEWED = 5.0  # of the cost, per push: a step that gained as much has left the place of its derivatives
 MOST_THETA_MOVE = 0.25  # of the unit cube in one iteration
@@ -245,7 +248,7 @@ class Fitter:
 
         Args:
             state: where to start.
-            rounds: at most so many steps, not fewer than ``careful``.
+            rounds: at most so many steps, not fewer than ``careful``; more as long as they gain much.
             careful: in so many first rounds only the shared parameters move, the pushes' unknowns stay at zero and
                 the scatter at its prior's median: far from the answer they would explain anything.
             like: a fitted model whose derivatives for theta and the pushes' unknowns are near enough.
@@ -257,19 +260,20 @@ class Fitter:
         """
         best = self.linearise(state, learn_scatter=careful == 0, like=like)
         like = best if renew else like
-        k, stale = 0, False
-        while k < rounds:
+        k, stale, fast = 0, False, False
+        while k < rounds or (fast and k < MORE * rounds):
             if say is not None:
                 say(f"round {k + 1} of at most {rounds}")
             held, released = k + 1 < careful, k + 1 >= careful
             trial = self._tried(best, cautious=k < careful, released=released)
-            gained = best.cost_here - trial.cost_here
-            if held and gained <= 0.0:
+            gained, far = best.cost_here - trial.cost_here, max(0.0, best.excess_here - best.degrees)
+            fast, worth = k >= careful and 0.0 < FAST * far < gained, SLOW * far
+            if held and gained <= worth:
                 k = careful - 1  # nothing more to gain with the unknowns at zero
                 continue
-            if k >= careful and gained < SETTLED:
+            if k >= careful and gained < max(SETTLED, worth):
                 return trial if gained > 0.0 else best
-            anew = renew and k + 1 < rounds and gained > RENEWED * len(best.pushes)
+            anew = renew and (k + 1 < rounds or fast) and gained > RENEWED * len(best.pushes)
             # Unknowns that are held only weigh what is left: their derivatives may be those of nearby.
             stale, whole = (stale or anew) and held, (stale or anew) and released
             best = self.linearise(

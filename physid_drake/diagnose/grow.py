@@ -12,6 +12,7 @@ from physid_drake.diagnose.confirm import (
     A_LAW,
     ANOTHER_BASIN,
     EXPLAINED,
+    FAR_OFF,
     HOP,
     Candidate,
     confirm,
@@ -36,7 +37,8 @@ MOST_EFFECTS = 3
 LONGEST = 450  # rollouts per push, after the first score tests, after which no further effect is looked for
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
 WIDE = 2.0  # times the usual scatter of friction: it may be what is missing in disguise
-HOPELESS = 6.0  # cost per degree of freedom with two effects: no third one of the catalogue will make up for that
+HOPELESS = 6.0  # cost per degree of freedom: two effects that leave as much are not made right by a third one
+LEADS_ON = 0.25  # of the cost beyond noise: beside the right effect, the next one's score test promises more
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -58,6 +60,16 @@ class Looked:
     def p_value(self) -> float:
         """Of "nothing is missing"."""
         return mismatch(self.fitted, self.screening)
+
+    @property
+    def leads_on(self) -> bool:
+        """Whether another effect may explain the pushes.
+
+        Far from an explanation a model whose effects are right is near what is still missing, and a score test sees
+        it. One whose effects stand in for something else has no neighbour that is better.
+        """
+        promised = max((s.gain for s in self.screening.scores), default=0.0)
+        return self.fitted.reduced_chi2 <= FAR_OFF or promised >= LEADS_ON * self.fitted.excess
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -137,7 +149,7 @@ class Growth:
             hopeless = len(steps) > 1 and model.reduced_chi2 > HOPELESS
             more = not hopeless and len(steps) < MOST_EFFECTS and pool.count < longest
             last = self._what_is_left(model, last.signatures, self.alpha if more else 0.0)
-            if hopeless:
+            if hopeless or not last.leads_on:
                 break
         return Grown(base=base, last=last, steps=tuple(steps), rejected=rejected)
 

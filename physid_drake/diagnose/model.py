@@ -123,8 +123,19 @@ class Fitted:
         return self.solution.chi2 / max(1, self.degrees)
 
     @property
+    def excess(self) -> float:
+        """Cost beyond what noise would leave."""
+        return self.solution.chi2 - self.degrees
+
+    @property
     def cost_here(self) -> float:
         """Twice the negative log posterior at the state itself, nothing left to move: what iterations compare."""
         white = Whitened.of(self.pushes, self.state.scatter)
         prior = float(np.sum((self.prior_mean / self.prior_std) ** 2))
         return float(white.y @ white.y) + white.log_determinant + prior
+
+    @property
+    def excess_here(self) -> float:
+        """Squares at the state itself, in deviations, beyond what noise would leave."""
+        y = Whitened.of(self.pushes, self.state.scatter).y
+        return float(y @ y) - self.degrees

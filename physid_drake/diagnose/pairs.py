@@ -29,6 +29,7 @@ AMONG = 6  # effects, by their own score tests
 FITTED = 3  # pairs
 ROUNDS, CAREFUL = 6, 3  # of a fit; in the first of them the pushes' unknowns are held
 PROMISING = 0.5  # of the plain cell's cost: a pair that leaves more by then explains nothing in the end
+EXPECTED = 1.0  # cost per degree of freedom that the right pair leaves
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -70,6 +71,8 @@ def confirmed_pairs(
         tick: told which pair is fitted.
         most: rollouts of the pool after which no further pair is fitted.
     """
+    if PROMISING * plain.reduced_chi2 <= EXPECTED:
+        return []  # no pair could promise anything, and effects that leave so little do not bend far
     found: list[FittedPair] = []
     for k, pair in enumerate(promising(plain, scores)):
         if fitter.case.pool.count > most:

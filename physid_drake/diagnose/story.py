@@ -13,7 +13,7 @@ from physid_drake.diagnose.conclude import class_of, conclude
 from physid_drake.diagnose.confirm import WORTH_A_TRY
 from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, confirmed
 from physid_drake.diagnose.fit import Fitter
-from physid_drake.diagnose.grow import Grown, Growth, Looked
+from physid_drake.diagnose.grow import HOPELESS, Grown, Growth, Looked
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
 from physid_drake.diagnose.loudness import as_loud_as_left, quieter
 from physid_drake.diagnose.memory import Memory
@@ -77,15 +77,16 @@ def _on_short_ticks(answer: _Answer, tick: Tick) -> Evidence:
     case, grown, fitter = answer.case, answer.grown, answer.fitter
     plain, model = grown.base.fitted, grown.last.fitted
     fine = Fitter(case, fitter.extra, fitter.tolerances)
+    lost = grown.steps and model.reduced_chi2 > HOPELESS  # ticks make no difference to that
     tick("on short ticks", 0, 0)
     refined = fine.refine(plain)
-    final = fine.refine(model) if grown.steps else refined
+    final = model if lost else fine.refine(model) if grown.steps else refined
     closest = nearest(fitter.case, case, plain)
     tick("pushes left out", 0, 0)
     before = after = fine.left_out(closest or refined)
     best = confirmed(grown.steps, grown.rejected, final)
     if best is not None:
-        after = (fine if grown.steps else fitter).left_out(best[1])
+        after = (fine if grown.steps and not lost else fitter).left_out(best[1])
     case.pool.count += fitter.case.pool.count
     return Evidence(
         case=case, fitter=fine, plain=refined, nearest=closest or refined, errors_before=before, errors_after=after,
@@ -191,8 +192,8 @@ def _located(evidence: Evidence, tick: Tick) -> Evidence:
 
 
 def _rival_states(evidence: Evidence) -> list[State]:
-    """The models that are still in question: the final one, and the rivals of its last effect."""
-    if not evidence.steps:
+    """The models in question: the final one and the rivals of its last effect; none if it explains nothing."""
+    if not evidence.steps or evidence.final.reduced_chi2 > HOPELESS:
         return []
     last, final = evidence.steps[-1], evidence.final.state
     alike = class_of(evidence.plain, last)

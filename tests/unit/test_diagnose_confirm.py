@@ -175,6 +175,24 @@ def test_the_effect_that_promised_most_is_tried_again_whatever_came_of_it(promis
     assert confirm._once_more(found) == again
 
 
+@pytest.mark.parametrize(
+    ("effects", "before", "after", "promised", "explained", "again"),
+    [
+        ((), 2.5, 2.4, 50.0, False, True),  # alone: it may be in a wrong basin
+        (("a",), 2.5, 2.4, 50.0, False, False),  # beside another that leaves little, of which it takes little
+        (("a",), 2.5, 1.7, 50.0, False, True),
+        (("a",), 9.0, 8.0, 50.0, False, True),  # far from an explanation linear steps mislead
+        ((), 2.5, 1.2, 50.0, True, False),
+        ((), 2.5, 1.2, 500.0, True, True),  # fell short of its promise
+    ],
+)
+def test_a_fit_is_tried_again_where_that_may_find_more(effects, before, after, promised, explained, again):
+    start = SimpleNamespace(reduced_chi2=before, score=0.0, state=SimpleNamespace(effects=effects))
+    end = SimpleNamespace(reduced_chi2=after, score=25.0)
+    one = SimpleNamespace(fitted=end, score=SimpleNamespace(gain=promised))
+    assert confirm._may_do_better(start, one, explained) == again
+
+
 class Places:
     """Fits that end where they start: at the value of the last effect, whose pushes cost what ``left`` says there."""
 

@@ -1,6 +1,7 @@
 """Gauss-Newton on pushes: the rounds in which the pushes' unknowns are held, and those after."""
 
 import dataclasses as dc
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -122,3 +123,30 @@ def test_what_no_push_can_tell_apart_has_parallel_derivatives(fitter):
     assert moved - np.concatenate(made.predicted) == pytest.approx(
         0.004 * columns[:, 0], abs=0.1 * np.abs(0.004 * columns[:, 0]).max()
     )
+
+
+@pytest.mark.parametrize(
+    ("costs", "steps"),
+    [
+        ([400.0, 390.0, 389.9, 389.8], 2),  # near an explanation: until next to nothing is gained
+        ([9000.0, 8950.0, 8900.0, 8850.0, 8800.0], 1),  # far from one, and going nowhere
+        ([9000.0, 8000.0, 7000.0, 6000.0, 5000.0, 4000.0], 3),  # on its way, to the end of its rounds
+        ([9000.0, 5000.0, 3000.0, 1800.0, 1700.0, 1600.0], 4),  # far, but fast: beyond them
+        ([9e6 / 2.0**k for k in range(9)], 6),  # no further than twice as many
+    ],
+)
+def test_a_fit_goes_on_as_long_as_that_leads_somewhere(monkeypatch, costs, steps):
+    models = [
+        SimpleNamespace(state=k, cost_here=cost, excess_here=cost, degrees=500, pushes=())
+        for k, cost in enumerate(costs)
+    ]
+    one, taken = Fitter.__new__(Fitter), []
+
+    def tried(best, *, cautious, released):
+        taken.append(best.state)
+        return models[best.state + 1]
+
+    monkeypatch.setattr(one, "linearise", lambda state, **how: models[state])
+    monkeypatch.setattr(one, "_tried", tried)
+    one.fit(0, rounds=3)
+    assert taken == list(range(steps))

@@ -258,3 +258,14 @@ def test_a_shape_that_takes_little_away_is_not_looked_for_elsewhere(four_corners
     assert growth(basins)._of_other_shape(here, SimpleNamespace(reduced_chi2=4.5)) is here  # of 3.5, two are left
     assert basins.tried == 0
     assert growth(basins)._of_other_shape(here, SimpleNamespace(reduced_chi2=5.5)) is not here
+
+
+@pytest.mark.parametrize(
+    ("left", "promised", "leads"), [(2.9, 10.0, True), (20.0, 2000.0, False), (20.0, 3000.0, True)]
+)
+def test_far_from_an_explanation_the_next_effect_must_promise_much(left, promised, leads):
+    """The right first effect leads near the next one; 500 degrees of freedom, of which 20 times as much is left."""
+    model = SimpleNamespace(reduced_chi2=left, excess=500.0 * (left - 1.0))
+    scores = (SimpleNamespace(gain=promised), SimpleNamespace(gain=5.0))
+    looked = grow.Looked(fitted=model, signatures=(), screening=SimpleNamespace(scores=scores))
+    assert looked.leads_on == leads

@@ -45,7 +45,7 @@ def pair_of(first, second, score, *, chi2=1.0, adds=(20.0, 20.0)):
 def confirmed(monkeypatch):
     """Confirms pairs that are given instead of fitted; returns those, and how many were asked for."""
 
-    def of(*made, cost_each=10, most=1000):
+    def of(*made, cost_each=10, most=1000, plain=6.0):
         pool = SimpleNamespace(count=0)
         left = iter(made)
 
@@ -62,7 +62,7 @@ def confirmed(monkeypatch):
         monkeypatch.setattr(pairs, "_model_with", fitted)
         monkeypatch.setattr(pairs, "_judged", lambda fitter, pair, model: judged[pair])
         fitter = SimpleNamespace(case=SimpleNamespace(pool=pool))
-        found = pairs.confirmed_pairs(fitter, model(-50.0, 6.0), (), lambda *said: None, most=most)
+        found = pairs.confirmed_pairs(fitter, model(-50.0, plain), (), lambda *said: None, most=most)
         return found, pool.count // cost_each
 
     return of
@@ -101,6 +101,11 @@ def test_a_pair_that_explains_too_little_or_has_an_idle_member_is_none(confirmed
 def test_no_further_pair_is_fitted_beyond_the_budget(confirmed):
     made = [pair_of(TILT, SLOSHING, 10.0), pair_of(TETHER, SLOSHING, 10.0), pair_of(TILT, DRAG, 10.0)]
     assert confirmed(*made, cost_each=10, most=15)[1] == 2
+
+
+def test_no_pair_is_fitted_where_none_could_promise_enough(confirmed):
+    assert confirmed(pair_of(TILT, SLOSHING, 10.0), plain=1.9) == ([], 0)
+    assert confirmed(pair_of(TILT, SLOSHING, 10.0), plain=2.1)[1] == 1
 
 
 class Fits:
