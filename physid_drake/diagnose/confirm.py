@@ -155,7 +155,7 @@ def confirm(
             continue
         tick(f"fit with {candidate.name} once more", 0, 0)
         again = _fit_from_afar(fitter, before, candidate)
-        if again.score > candidate.fitted.score:
+        if again is not None and again.score > candidate.fitted.score:
             found[k] = _candidate(fitter, candidate.score, again, plain)
     return tuple(ranked(found))
 
@@ -277,9 +277,14 @@ def _fit_elsewhere(fitter: Fitter, before: Fitted, candidate: Candidate) -> Fitt
     return None if best is candidate.fitted else fitter.fit(best.state, rounds=4, like=before)
 
 
-def _fit_from_afar(fitter: Fitter, before: Fitted, candidate: Candidate) -> Fitted:
-    """The same from the best of a scan, all derivatives taken on the way: far off, the plain ones mislead."""
-    point, theta = scanned_start(fitter, before, candidate.score)
+def _fit_from_afar(fitter: Fitter, before: Fitted, candidate: Candidate) -> Fitted | None:
+    """The same from the best of a scan, all derivatives taken on the way: far off, the plain ones mislead.
+
+    None where all of the scan is worse than no effect: objects topple, or leave.
+    """
+    point, theta, score = scanned_start(fitter, before, candidate.score)
+    if score < before.score:
+        return None
     u = np.clip(before.state.u + np.clip(theta, -FAR, FAR), 1e-3, 1.0 - 1e-3)
     return fitter.fit(fitter.start(u, (*before.state.effects, point)), rounds=4, careful=2, renew=True)
 

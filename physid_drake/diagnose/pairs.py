@@ -154,8 +154,8 @@ def _with_coefficients(one: Score, coefficients: Sequence[float]) -> Score:
 
 def _model_with(fitter: Fitter, plain: Fitted, pair: Pair) -> Fitted | None:
     """The model with a pair, fitted from the best of two scans; None where it does not lead anywhere."""
-    first, _ = scanned_start(fitter, plain, pair[0], (start_of(fitter, pair[1]),))
-    second, _ = scanned_start(fitter, plain, pair[1], (first,))
+    first, *_ = scanned_start(fitter, plain, pair[0], (start_of(fitter, pair[1]),))
+    second, *_ = scanned_start(fitter, plain, pair[1], (first,))
     start = fitter.start(plain.state.u, (first, second))
     model = fitter.fit(start, rounds=CAREFUL, careful=CAREFUL, renew=True)
     if model.reduced_chi2 > PROMISING * plain.reduced_chi2:

@@ -33,7 +33,7 @@ def start_of(fitter: Fitter, one: Score) -> EffectPoint:
 
 def scanned_start(
     fitter: Fitter, before: Fitted, one: Score, beside: tuple[EffectPoint, ...] = ()
-) -> tuple[EffectPoint, Array]:
+) -> tuple[EffectPoint, Array, float]:
     """The best of an effect's families at several strengths, one rollout per push each.
 
     Args:
@@ -43,7 +43,7 @@ def scanned_start(
         beside: other effects that are in the model meanwhile.
 
     Returns:
-        The chart point, and the change (d,) of theta that goes with it.
+        The chart point, the change (d,) of theta that goes with it, and the log likelihood there.
     """
     points = [_started(fitter, family, multiple) for family in _families(one) for multiple in MULTIPLES]
     held = tuple(dc.replace(other, free=()) for other in beside)
@@ -52,7 +52,7 @@ def scanned_start(
         effects = (*before.state.effects, *held, dc.replace(point, free=()))
         seen.append(fitter.seen_from(before, dc.replace(before.state, effects=effects)))
     best = int(np.argmax([model.score for model in seen]))
-    return points[best], seen[best].solution.beta[: len(before.state.u)]
+    return points[best], seen[best].solution.beta[: len(before.state.u)], seen[best].score
 
 
 def elsewhere(case: Case, one: Score) -> list[Score]:

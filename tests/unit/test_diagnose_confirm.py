@@ -193,6 +193,21 @@ def test_a_fit_is_tried_again_where_that_may_find_more(effects, before, after, p
     assert confirm._may_do_better(start, one, explained) == again
 
 
+@pytest.mark.parametrize(("seen", "fits"), [(-500.0, 0), (-90.0, 1)])
+def test_no_fit_begins_where_all_of_a_scan_is_worse_than_no_effect(monkeypatch, seen, fits):
+    made = []
+
+    def fit(state, **how):
+        made.append(state)
+        return "fitted"
+
+    monkeypatch.setattr(confirm, "scanned_start", lambda fitter, before, one: ("point", np.zeros(1), seen))
+    fitter = SimpleNamespace(start=lambda u, effects: (u, effects), fit=fit)
+    before = SimpleNamespace(score=-100.0, state=SimpleNamespace(u=np.full(1, 0.5), effects=()))
+    again = confirm._fit_from_afar(fitter, before, SimpleNamespace(score=None))
+    assert (again, len(made)) == ("fitted" if fits else None, fits)
+
+
 class Places:
     """Fits that end where they start: at the value of the last effect, whose pushes cost what ``left`` says there."""
 
