@@ -263,7 +263,7 @@ class Fitter:
         k, stale, fast = 0, False, False
         while k < rounds or (fast and k < MORE * rounds):
             if say is not None:
-                say(f"round {k + 1} of at most {rounds}")
+                say(f"round {k + 1}")
             held, released = k + 1 < careful, k + 1 >= careful
             trial = self._tried(best, cautious=k < careful, released=released)
             gained, far = best.cost_here - trial.cost_here, max(0.0, best.excess_here - best.degrees)
