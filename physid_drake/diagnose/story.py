@@ -77,16 +77,17 @@ def _on_short_ticks(answer: _Answer, tick: Tick) -> Evidence:
     case, grown, fitter = answer.case, answer.grown, answer.fitter
     plain, model = grown.base.fitted, grown.last.fitted
     fine = Fitter(case, fitter.extra, fitter.tolerances)
-    lost = grown.steps and model.reduced_chi2 > HOPELESS  # ticks make no difference to that
+    # Shorter ticks make no difference to a model that explains nothing.
+    model_fitter = fine if grown.steps and model.reduced_chi2 <= HOPELESS else fitter
     tick("on short ticks", 0, 0)
     refined = fine.refine(plain)
-    final = model if lost else fine.refine(model) if grown.steps else refined
+    final = fine.refine(model) if model_fitter is fine else model if grown.steps else refined
     closest = nearest(fitter.case, case, plain)
     tick("pushes left out", 0, 0)
     before = after = fine.left_out(closest or refined)
     best = confirmed(grown.steps, grown.rejected, final)
     if best is not None:
-        after = (fine if grown.steps and not lost else fitter).left_out(best[1])
+        after = model_fitter.left_out(best[1])
     case.pool.count += fitter.case.pool.count
     return Evidence(
         case=case, fitter=fine, plain=refined, nearest=closest or refined, errors_before=before, errors_after=after,
