@@ -186,8 +186,6 @@ def search_trials(
         n_initial=0 if blind else None, batch=budget if blind else 1,
         entropy_tolerance=0.0, on_trial=lambda belief: told(belief.n_trials),
     )  # fmt: skip
-    if found.stop_reason == "interrupted":
-        raise KeyboardInterrupt
     return Trials(thetas=np.array(found.belief.thetas), misfits=np.array(found.belief.errors))
 
 

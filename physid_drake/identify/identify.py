@@ -178,8 +178,6 @@ class Identifier:
         """
         self._progress = progress or self._progress
         found = self.search()
-        if found.stop_reason == "interrupted":
-            raise KeyboardInterrupt
         start = found.theta_best if np.isfinite(found.error_best) else self.thetas.space.nominal
         polisher = Polisher(
             self.pool, self.training, self.noise, FIRST_SCATTER, tick=lambda what: self._progress(what, 0, 0)

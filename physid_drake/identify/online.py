@@ -160,8 +160,6 @@ class OnlineIdentifier:
         problem = dc.replace(problems_of(alone, noise, self._height)[0], order=count)
         expected = self._predicted(problem, [belief.theta])[0]
         found = self._search(belief, problem, noise, rng)
-        if found.stop_reason == "interrupted":
-            raise KeyboardInterrupt
         self._progress("what the push tells", count, 0)
         start = _best_start(belief, found, problem, noise, expected)
         learned = self._updated(dc.replace(belief, noise=noise, search=found), problem, start)

@@ -185,8 +185,6 @@ def plan(
         search_named(search), budget=budget, rng=streams[2], refine_every=REFINE_EVERY, entropy_tolerance=0.0,
         on_trial=lambda belief: story.tell_search(belief, budget),
     )  # fmt: skip
-    if found.stop_reason == "interrupted":
-        raise KeyboardInterrupt
     rows = story.sweep(found.theta_best, sweep)
     best = _better(policy, found, rows, risk=risk)
     predicted = story.trajectory(model, best)

@@ -15,7 +15,7 @@ from physid_drake.search.protocol import Indices, Search
 from physid_drake.space import Array, ParameterSpace
 
 Objective = Callable[[Array], Array]
-StopReason = Literal["budget spent", "time spent", "entropy settled", "candidates exhausted", "interrupted"]
+StopReason = Literal["budget spent", "time spent", "entropy settled", "candidates exhausted"]
 
 
 @final
@@ -71,8 +71,8 @@ def search_minimum(
     far. A search resumed with the same arguments and an `rng` seeded alike goes on with the very trials it
     would have made.
 
-    A `KeyboardInterrupt`, in the objective or the callback, ends the search with what was found; the batch
-    under way is lost.
+    A `KeyboardInterrupt`, in the objective or the callback, passes through: `on_trial` has had every belief until
+    then, the batch under way is lost.
 
     Args:
         objective: Errors (k,) at thetas (k, d); inf or nan where the rollout failed.
@@ -114,26 +114,18 @@ def search_minimum(
         belief = Belief.start(
             space, candidates, plan.generator(_START), prior_weights=prior_weights, settings=settings
         )
-    reason: StopReason = "interrupted"
-    try:
-        while True:
-            stop = plan.why_stop(belief)
-            if stop is not None:
-                reason = stop
-                break
-            step = plan.generator(belief.n_trials)
-            # Assigned only after the update, so that a resumed search repeats the refinement, not doubles it.
-            asked = _refined(belief, step) if plan.refines(belief) else belief
-            indices = _propose(asked, search, plan, step)
-            if not len(indices):
-                reason = "candidates exhausted"
-                break
-            thetas = asked.candidates[indices]
-            belief = asked.update(thetas, _evaluate(objective, thetas), step)
-            if on_trial is not None:
-                on_trial(belief)
-    except KeyboardInterrupt:
-        reason = "interrupted"
+    while (reason := plan.why_stop(belief)) is None:
+        step = plan.generator(belief.n_trials)
+        # Assigned only after the update, so that a resumed search repeats the refinement, not doubles it.
+        asked = _refined(belief, step) if plan.refines(belief) else belief
+        indices = _propose(asked, search, plan, step)
+        if not len(indices):
+            reason = "candidates exhausted"
+            break
+        thetas = asked.candidates[indices]
+        belief = asked.update(thetas, _evaluate(objective, thetas), step)
+        if on_trial is not None:
+            on_trial(belief)
     theta_best, error_best = belief.best
     return SearchResult(
         belief=belief,
