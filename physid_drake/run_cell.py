@@ -32,7 +32,7 @@ from physid_drake.report.stage import ShownMotion, Stage
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
 from physid_drake.report.terminal import terminal
 from physid_drake.run_diagnose import ALPHA, STATE, recording_folder, run_case, show, write
-from physid_drake.run_folder import RunFolder, versions
+from physid_drake.run_folder import RunFolder, made_with, versions
 from physid_drake.run_plan import forget as forget_plan
 from physid_drake.run_plan import write as write_plan
 from physid_drake.scenario import dump_scenario, load_scenario
@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     identifier = _identifier(scenario, recording, out)
     planner = None if arguments.no_plan else _planner(scenario, recording, identifier, console)
     # A comment, so that the file is still a configuration that can be given to this command.
-    made_by = f"{dump_scenario(name, scenario)}# of recording {digest_of(recording)}\n"
+    made_by = f"{dump_scenario(name, scenario)}# of recording {digest_of(recording)}\n# by {made_with()}\n"
     folder = RunFolder.open(out, made_by, states=(BELIEF, STATE))
     stage = None if arguments.no_view else _live(recording, console)
     result, plan = _identify(identifier, planner, scenario, recording, console)

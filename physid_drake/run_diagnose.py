@@ -26,7 +26,7 @@ from physid_drake.report.progress import progress_bar
 from physid_drake.report.stage import ShownMotion, Stage
 from physid_drake.report.terminal import terminal
 from physid_drake.resources import shipped
-from physid_drake.run_folder import RunFolder, named_after
+from physid_drake.run_folder import RunFolder, named_after, versions
 
 STATE = "stages.npz"
 SHOWN = 12  # pushes in the animation
@@ -56,7 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
     config = cell_config(recording, contact=arguments.contact, time_step=arguments.time_step)
     case = case_of(recording, config, ThetaConfig(), jobs=arguments.jobs, most=arguments.pushes)
     settings = {"seed": arguments.seed, "alpha": arguments.alpha, "effects": arguments.effects,
-                "cell": dc.asdict(config), "pushes": arguments.pushes, "recording": digest_of(recording)}  # fmt: skip
+                "cell": dc.asdict(config), "pushes": arguments.pushes, "recording": digest_of(recording),
+                "versions": versions()}  # fmt: skip
     out = arguments.out or Path("diagnoses") / named_after(recording.name)
     folder = RunFolder.open(out, json.dumps(settings, indent=2) + "\n", name="settings.json", states=(STATE,))
     diagnosis, evidence = run_case(
@@ -125,11 +126,11 @@ def write(
     Raises:
         OutputError: if one cannot be written.
     """
-    folder.write("diagnosis.json", diagnosis_json(diagnosis))
     pushes = shown_pushes(diagnosis, evidence)
     folder.write(page, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches, scene=scene))
     folder.write("model.yaml", model_of(diagnosis, evidence).dump())
     folder.write(scene, staged(diagnosis, evidence).StaticHtml())
+    folder.write("diagnosis.json", diagnosis_json(diagnosis))  # last: where it is, all is
 
 
 def staged(diagnosis: Diagnosis, evidence: Evidence, meshcat: Meshcat | None = None) -> Meshcat:

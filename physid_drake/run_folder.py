@@ -27,6 +27,11 @@ def versions() -> dict[str, str]:
     return found
 
 
+def made_with() -> str:
+    """The versions in one line."""
+    return ", ".join(f"{name} {version}" for name, version in versions().items())
+
+
 def named_after(name: str) -> str:
     """A recording's name as the name of one folder: letters, digits, dots within, dashes and underscores."""
     return re.sub(r"[^\w.-]+", "_", name).strip("._") or "recording"

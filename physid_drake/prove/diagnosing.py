@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Final
 
+from physid_drake.run_folder import RunFolder
+
 RESULT: Final = "diagnosis.json"
 ATTEMPT: Final = "attempt.json"
 """Beside a diagnosis: how long it took [s], or why there is none."""
@@ -120,7 +122,7 @@ def _is_open(task: Task, again: bool) -> bool:
 
 def _note(folder: Path, attempt: Attempt) -> None:
     content = {"seconds": round(attempt.seconds, 3), "error": attempt.error}
-    (folder / ATTEMPT).write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    RunFolder(path=folder).write(ATTEMPT, json.dumps(content, indent=2) + "\n")
 
 
 @dataclass(frozen=True, kw_only=True)
