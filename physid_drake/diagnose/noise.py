@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 from scipy.optimize import minimize
 
 from physid_drake.identify.problem import FINEST_POSITION, FINEST_ROTATION, SILENT, Noise, noise_of
@@ -20,6 +21,8 @@ FEWEST = 40  # samples at rest, in all, that tell a noise
 FORCE_SCATTER = 0.03
 UNKNOWN = "neither stated nor seen at rest"
 UNUSUAL = 3.0  # times the median scatter of rests: one of more is none
+SMALLEST = 1e-18  # m^2
+CHANCE = 0.05  # of pushes that agree on a jitter there is not; three of them cannot agree more than one in eight
 CONTRADICTS = 1.5  # seen over stated: beyond it the stated figure is not believed
 
 
@@ -192,24 +195,46 @@ def _reml(pieces: Sequence[tuple[Array, Array]], finest: float) -> tuple[float, 
 
 
 def _jitter(pushes: Sequence[Push]) -> float:
-    """Noise of moving samples beyond that of resting ones, over their speed [s], from third differences."""
-    ratios = []
+    """Noise of moving samples beyond that of resting ones, over their speed [s].
+
+    Whether samples are taken early and late or stamped so, a path through them is as rough as white noise of speed
+    times jitter makes it, along the motion only.
+    """
+    squares, rougher = [], []  # of the jitter, and by how much pushes are rougher in motion
     for push in pushes:
         times, planar = push.object.times, push.object.planar[:, :2]
         rests = rest_segments(push)
         if len(times) < 30 or not rests:
             continue
-        third = np.sqrt((np.diff(planar, 3, axis=0) ** 2).sum(axis=1) / 40.0)
+        rough = _roughness(times, planar)
         still = np.zeros(len(times), dtype=bool)
         for rest in rests:
             still[rest] = True
         resting, moving = still[:-3] & still[3:], ~still[:-3] & ~still[3:]
-        speed = np.linalg.norm(planar[3:] - planar[:-3], axis=1) / (times[3:] - times[:-3])
+        way = planar[3:] - planar[:-3]
+        length = np.linalg.norm(way, axis=1)
+        speed = length / (times[3:] - times[:-3])
         fast = moving & (speed > 0.05)
         if resting.sum() < 8 or fast.sum() < 8:
             continue
+        along = (rough[fast] * way[fast]).sum(axis=1) / length[fast]
         # Medians, since a touch and a brake are sharp too.
-        extra = np.median(third[fast]) ** 2 - np.median(third[resting]) ** 2
-        # Jitter of neighbouring stamps adds like white noise of speed times jitter.
-        ratios.append(extra * 1.44 / float(np.median(speed[fast])) ** 2)
-    return math.sqrt(max(0.0, float(np.median(ratios)))) if len(ratios) >= 3 else 0.0
+        in_motion, at_rest = float(np.median(along**2)), float(np.median(rough[resting] ** 2))
+        squares.append((in_motion - at_rest) / float(stats.chi2.median(1)) / float(np.median(speed[fast])) ** 2)
+        rougher.append(math.log(max(in_motion, SMALLEST) / max(at_rest, SMALLEST)))
+    # A median of few samples is unsure; jitter is what the pushes agree on.
+    seen = len(squares) >= 3 and float(stats.wilcoxon(rougher, alternative="greater").pvalue) < CHANCE
+    return math.sqrt(max(0.0, float(np.median(squares)))) if seen else 0.0
+
+
+def _roughness(times: Array, values: Array) -> Array:
+    """What no parabola through four neighbours (n, k) follows, (n - 3, k), as large as one of them is noisy.
+
+    Their third divided difference by the stamps, so that gaps are none, with weights whose squares add up to one.
+    """
+    count = len(times) - 3
+    stamps = np.column_stack([times[k : k + count] for k in range(4)])
+    apart = stamps[:, :, None] - stamps[:, None, :] + np.eye(4)
+    weights = 1.0 / apart.prod(axis=2)
+    weights /= np.linalg.norm(weights, axis=1)[:, None]
+    return sum((weights[:, [k]] * values[k : k + count] for k in range(4)), np.zeros((count, values.shape[1])))

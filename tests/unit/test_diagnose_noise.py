@@ -9,7 +9,7 @@ from reference.scenes import OBJECTS, Theta
 
 from physid_drake.diagnose import noise as noise_module
 from physid_drake.diagnose.features import features_of
-from physid_drake.diagnose.noise import _reml, tracker_noise
+from physid_drake.diagnose.noise import _jitter, _reml, _roughness, tracker_noise
 from physid_drake.identify.problem import problems_of
 from physid_drake.recording import PoseStream, Push, rest_segments
 
@@ -157,3 +157,44 @@ def test_features_of_pure_noise_have_the_covariance_that_is_written_down(recordi
     # What is written down beyond the tracker's noise is the cell's own error: smooth and small.
     assert np.abs(np.diag(floor)).max() < 0.2
     assert (np.linalg.eigvalsh(features.noise) > 0).all()
+
+
+def streams(rng, jitter, *, stamped, dropout=0.0, noise=2e-4, count=10):
+    """Slides of 0.2 to 0.3 m/s between two rests at 100 Hz, samples taken or stamped early and late [s]."""
+    pushes = []
+    for k in range(count):
+        even = np.arange(0.0, 2.0, 0.01)
+        late = jitter * rng.uniform(-(3.0**0.5), 3.0**0.5, len(even))
+        taken, stamps = (even, even + late) if stamped else (even + late, even)
+        moving = np.clip(taken - 0.5, 0.0, 1.0)
+        way, heading = (0.2 + 0.1 * rng.random()) * moving, rng.uniform(0.0, 2.0 * np.pi)
+        places = np.column_stack([way * np.cos(heading), way * np.sin(heading), 0.0 * way])
+        places[:, :2] += noise * rng.standard_normal((len(even), 2))
+        kept = rng.random(len(even)) >= dropout
+        quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(even), 1))
+        stream = PoseStream(times=stamps[kept], positions=places[kept], quaternions=quaternions[kept])
+        pushes.append(Push(name=f"{k}", object=stream, hand=None, force=None))
+    return pushes
+
+
+@pytest.mark.parametrize("stamped", [False, True])
+@pytest.mark.parametrize("dropout", [0.0, 0.2])
+def test_jitter_is_seen_in_samples_that_are_taken_or_stamped_early_and_late(stamped, dropout):
+    seen = [
+        _jitter(streams(np.random.default_rng(seed), 2e-3, stamped=stamped, dropout=dropout)) for seed in range(8)
+    ]
+    # Evenly spread jitter has a larger median square than normal one of the same deviation: 2.1 to 2.3 ms.
+    assert np.mean(seen) == pytest.approx(2e-3, rel=0.2)
+
+
+def test_where_stamps_are_right_pushes_seldom_agree_on_a_jitter():
+    seen = [_jitter(streams(np.random.default_rng(seed), 0.0, stamped=True, dropout=0.2)) for seed in range(40)]
+    assert np.mean(np.array(seen) > 0.0) <= 0.2  # 5 % by chance; rests are where it is quiet: 12 % of 200
+
+
+def test_white_noise_is_as_rough_as_it_is_noisy():
+    rng = np.random.default_rng(5)
+    times = np.cumsum(rng.uniform(0.005, 0.05, 20000))
+    parabola = np.column_stack([0.3 * times**2 - times, 2.0 * times])
+    assert np.std(_roughness(times, rng.standard_normal((20000, 2)))) == pytest.approx(1.0, rel=0.03)
+    assert np.abs(_roughness(times[:50], parabola[:50])).max() < 1e-12
