@@ -44,7 +44,7 @@ def shared_covariance(fitted: Fitted) -> Array:
 
 
 def _t_factor(fitted: Fitted) -> float:
-    """How much wider than a normal interval one is with so few pushes."""
+    """How much wider than a normal interval one is with so few pushes; the cell's own error does not grow with it."""
     free = max(2, len(fitted.pushes) - fitted.own_dimension)
     return float(stats.t.ppf(0.95, free)) / Z90
 
@@ -55,9 +55,10 @@ def parameters_of(evidence: Evidence, k: int) -> dict[str, ParameterEstimate]:
     here = final.state.effects[k]
     at = len(final.state.u) + sum(len(e.free) for e in final.state.effects[:k])
     part = slice(at, at + len(here.free))
-    covariance = shared_covariance(final)[part, part] + np.diag(_own_error(here, case) ** 2)
+    seen = _t_factor(final) ** 2 * shared_covariance(final)[part, part]
+    covariance = seen + np.diag(_own_error(here, case) ** 2)
     rng = np.random.default_rng(0)
-    draws = rng.multivariate_normal(np.zeros(len(here.free)), covariance, SAMPLES, method="eigh") * _t_factor(final)
+    draws = rng.multivariate_normal(np.zeros(len(here.free)), covariance, SAMPLES, method="eigh")
     drawn = [here.moved(case, d).effect(case) for d in _more_than_nothing(here, case, draws)]
     effect = here.effect(case)
     return {
@@ -145,12 +146,12 @@ def theta_intervals(evidence: Evidence, fitted: Fitted) -> dict[str, tuple[float
     """90 % intervals of theta, told or not, the cell's own error in them, and none wider than the prior's."""
     space, u = evidence.case.thetas.space, fitted.state.u
     _, prior = evidence.fitter.priors(fitted.state)
-    covariance, reach = shared_covariance(fitted), Z90 * _t_factor(fitted)
+    seen = _t_factor(fitted) * np.sqrt(np.diag(shared_covariance(fitted)))
     here = np.asarray(space.from_unit(u))
     intervals = {}
     for j, name in enumerate(space.names):
-        std = math.hypot(math.sqrt(covariance[j, j]), cell_error(space, here, j))
-        along = min(reach * std, Z90 * prior[j]) * np.eye(len(u))[j]
+        std = math.hypot(seen[j], cell_error(space, here, j))
+        along = Z90 * min(std, prior[j]) * np.eye(len(u))[j]
         low, high = (float(space.from_unit(np.clip(end, 0.0, 1.0))[j]) for end in (u - along, u + along))
         intervals[name] = (low, high)
     return intervals

@@ -120,7 +120,8 @@ def _averaging(push: Push, problem: PushProblem) -> Array:
     else:
         windows = min(WINDOWS, (last - first) // 2)
         edges = np.linspace(times[first], times[min(last, n - 1)], windows + 1)
-        index = np.clip(np.searchsorted(edges, times, side="right") - 1, -1, windows)
+        # The last sample of a stream that ends in motion is on the last edge.
+        index = np.minimum(np.searchsorted(edges, times, side="right") - 1, windows - 1)
         rows = [
             np.flatnonzero((index == k) & (np.arange(n) >= first) & (np.arange(n) < last)) for k in range(windows)
         ]

@@ -18,7 +18,7 @@ from physid_drake.diagnose.linear import (
     solve,
 )
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
-from physid_drake.diagnose.steps import Step, effect_steps, own_steps, theta_steps, with_theta
+from physid_drake.diagnose.steps import FAILED, Step, diverged, effect_steps, own_steps, theta_steps, with_theta
 from physid_drake.effects import Effect
 from physid_drake.identify.rollouts import Prediction, Task
 
@@ -26,7 +26,6 @@ Array = NDArray[np.float64]
 
 MOST_OWN = 3.0  # standard deviations: unknowns are linearised no further out
 MOST_FRICTION = 8.0  # in units of the usual scatter, which is itself learnt: 20 %
-FAILED = 1e4  # standard deviations: features of a rollout that diverged
 SETTLED = 0.5  # of the cost: a step that gained less is the last
 # Far from an explanation, of the squares beyond twice what noise would leave:
 SLOW = 0.01  # a step that gained less is the last
@@ -327,7 +326,7 @@ class Fitter:
         predicted = self.vectors([self.task(state, i) for i, state in enumerate(states)])
         known = fitted.own_dimension
         return tuple(
-            push.residual - push.shared[:, :known] @ beta[:known] if np.all(vector == FAILED) else f.recorded - vector
+            push.residual - push.shared[:, :known] @ beta[:known] if diverged(vector) else f.recorded - vector
             for f, vector, push, beta in zip(self.case.features, predicted, fitted.pushes, betas, strict=True)
         )
 

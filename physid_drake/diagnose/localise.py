@@ -21,6 +21,7 @@ from physid_drake.cell.solid import solid_of
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import Fitted
+from physid_drake.diagnose.steps import difference
 from physid_drake.effects import Effect, PushFacts
 
 Array = NDArray[np.float64]
@@ -120,7 +121,7 @@ def missing_wrenches(fitter: Fitter, plain: Fitted) -> tuple[MissingWrench, ...]
     base, pulses = vectors[: len(case.problems)], vectors[len(case.problems) :]
     found: list[MissingWrench] = []
     for i, mine in enumerate(windows):
-        columns = [(pulses.pop(0) - base[i]) / PULSE for _ in range(3 * len(mine))]
+        columns = [difference(base[i], pulses.pop(0)) / PULSE for _ in range(3 * len(mine))]
         found += _solved(plain, i, mine, np.column_stack(columns), units) if mine else []
     return tuple(found)
 

@@ -14,6 +14,7 @@ from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.confirm import FAR_OFF
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import Fitted, State
+from physid_drake.diagnose.steps import difference
 from physid_drake.identify.problem import spec_of
 from physid_drake.identify.rollouts import RolloutPool
 from physid_drake.search import GreedyEntropySearch, search_minimum
@@ -68,7 +69,7 @@ def numerics(case: Case, state: State) -> tuple[Array, ...]:
         vectors = other.vectors([other.task(state, i) for i in range(len(case.problems))])
         case.pool.count += pool.count
         for own, changed, plain in zip(columns, vectors, base, strict=True):
-            own.append(changed - plain)
+            own.append(difference(plain, changed))
     return tuple(np.column_stack(own) for own in columns)
 
 

@@ -19,6 +19,7 @@ from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve, told_frictions
 from physid_drake.diagnose.model import Fitted
+from physid_drake.diagnose.steps import difference
 from physid_drake.effects import Effect, Family
 from physid_drake.identify.rollouts import Task
 
@@ -116,7 +117,7 @@ def signatures(
     case, state = fitter.case, fitted.state
     base = fitter.vectors([fitter.task(state, i) for i in range(len(case.problems))])
     present = [e.effect(case) for e in state.effects]
-    plan: list[tuple[int, int, int, float]] = []  # signature, push, direction, step's sign and size in steps
+    plan: list[tuple[int, int, int]] = []  # signature, push, direction
     tasks: list[Task] = []
     blank = empty_signatures(fitter, kinds)
     for s, (kind, family) in enumerate((b.kind, b.family) for b in blank):
@@ -125,10 +126,10 @@ def signatures(
             if blank[s].friction_changes or family.shares or not _reaches(fitter, kind, family, i):
                 continue
             for d, j in enumerate(family.free):
-                for sign in (1.0, -1.0) if family.central else (1.0,):
+                plan.append((s, i, d))
+                for sign in (-1.0, 1.0) if family.central else (1.0,):
                     point = np.array(family.point)
                     point[j] += sign * family.size * chart[j].step
-                    plan.append((s, i, d, sign))
                     tasks.append(fitter.task(state, i, effects=[*present, kind.at(point, case.around)]))
     vectors: list[Array] = []
     for k in range(0, len(tasks), 64):
@@ -136,11 +137,11 @@ def signatures(
         if tick is not None:
             tick(min(k + 64, len(tasks)), len(tasks))
     columns = [[np.zeros((len(f.recorded), b.steps)) for f in case.features] for b in blank]
-    for (s, i, d, sign), vector in zip(plan, vectors, strict=True):
-        if blank[s].family.central:
-            columns[s][i][:, d] += 0.5 * sign * vector
-        else:
-            columns[s][i][:, d] = vector - base[i]
+    seen = iter(vectors)
+    for s, i, d in plan:
+        central = blank[s].family.central
+        before = next(seen) if central else base[i]
+        columns[s][i][:, d] = (0.5 if central else 1.0) * difference(before, next(seen))
     for s, one in enumerate(blank):
         if one.family.shares:
             simulated = [columns[k] for k, b in enumerate(blank) if b.kind is one.kind and not b.family.shares]

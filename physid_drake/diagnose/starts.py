@@ -86,12 +86,13 @@ def of_other_strength(fitter: Fitter, model: Fitted) -> State:
     one of them belong to it.
     """
     *others, last = model.state.effects
-    leading = last.kind.leading(fitter.case.around)
+    shape = _shape(last, fitter)
+    strong = [j for j in last.kind.leading(fitter.case.around) if j not in shape]
     chart = last.chart(fitter.case)
     states = []
     for strength in STRENGTHS:
         point = last.point.copy()
-        for j in leading:
+        for j in strong:
             stronger = last.origin[j] + strength * (last.point[j] - last.origin[j])
             point[j] = np.clip(stronger, chart[j].lower, chart[j].upper)
         states.append(fitter.start(model.state.u, (*others, dc.replace(last, point=point))))

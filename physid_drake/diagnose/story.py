@@ -27,7 +27,7 @@ from physid_drake.diagnose.screen import (
     tolerances,
 )
 from physid_drake.diagnose.values import Diagnosis
-from physid_drake.effects import Effect, applicable
+from physid_drake.effects import Effect, applicable, tolerated
 
 Array = NDArray[np.float64]
 Tick = Callable[[str, int, int], None]
@@ -127,9 +127,12 @@ class _Search:
 
     def answer(self, case: Case, rough: Case, first: Fitted, memory: Memory) -> _Answer:
         """Look at the whole catalogue, add effects, and take out what became superfluous."""
-        guard, found = _looks(rough, first, self.kinds, self.tick, memory)
+        # What pushes may share without its being physics does not depend on what is looked for.
+        unasked = [kind for kind in tolerated(rough.around) if kind not in self.kinds]
+        guard, found = _looks(rough, first, [*self.kinds, *unasked], self.tick, memory)
         fitter = Fitter(rough, guard, tolerances(rough, found))
-        looked = Looked.at(fitter.guard(first), found, self.rng)
+        asked = [s for s in found if s.kind in self.kinds]
+        looked = Looked.at(fitter.guard(first), asked, self.rng)
         growth = Growth(fitter=fitter, kinds=self.kinds, alpha=self.alpha, rng=self.rng, tick=self.tick)
         return _Answer(case=case, fitter=fitter, grown=growth.grow(looked))
 
@@ -138,7 +141,7 @@ class _Search:
         loud = self.answer(*as_loud_as_left(case, rough, first), memory)
         if not loud.grown.steps:
             return loud
-        model = Fitter(loud.fitter.case).linearise(loud.grown.last.fitted.state)
+        model = Fitter(rough).linearise(loud.grown.last.fitted.state)
         quiet, rough, _ = as_loud_as_left(case, rough, model)
         share, detected = quieter(loud.case, quiet), loud.grown.base.p_value
         if share > MOST_OF_UNKNOWN:

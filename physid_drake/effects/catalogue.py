@@ -49,3 +49,8 @@ def applicable(around: Surroundings, names: Sequence[str] | None = None) -> tupl
     """
     kinds: Iterable[type[Effect]] = CATALOGUE if names is None else [effect_named(name) for name in names]
     return tuple(kind for kind in kinds if kind.applies(around))
+
+
+def tolerated(around: Surroundings) -> tuple[type[Effect], ...]:
+    """The effects that can be in a recording and of which a little is no physics (``Coordinate.tolerance``)."""
+    return tuple(kind for kind in applicable(around) if any(c.tolerance > 0.0 for c in kind.chart(around)))

@@ -16,7 +16,10 @@ Array = NDArray[np.float64]
 
 @dc.dataclass(frozen=True, kw_only=True)
 class TrackerLatency(Effect):
-    """The object's stream is late."""
+    """The object's stream is late.
+
+    Late by the hand's clock: without a hand the recorded start is as late as all that follows, and nothing tells.
+    """
 
     name: ClassVar[str] = "tracker_latency"
     element: ClassVar[str] = "sensor"
@@ -25,6 +28,11 @@ class TrackerLatency(Effect):
     amplitudes: ClassVar[tuple[str, ...]] = ("delay",)
 
     delay: float = parameter(0.0, "s")
+
+    @classmethod
+    def applies(cls, around: Surroundings) -> bool:
+        """With a hand."""
+        return around.has_hand
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:

@@ -9,9 +9,10 @@ from runs import shipped_pushes
 from physid_drake.cell import CellConfig
 from physid_drake.cell.hand_path import HandPath
 from physid_drake.diagnose import case_of
-from physid_drake.diagnose.features import FORCE_MEMORY, PushFeatures, _way
+from physid_drake.diagnose.features import FORCE_MEMORY, PushFeatures, _averaging, _way
 from physid_drake.diagnose.noise import ForceNoise
 from physid_drake.identify.config import ThetaConfig
+from physid_drake.recording import PoseStream, Push
 
 FORCE = 3.0  # N
 SCATTER = 0.05
@@ -48,6 +49,19 @@ def test_a_force_that_is_off_is_off_over_the_whole_push():
     noise = far.force_noise(ForceNoise(scatter=0.0, offset=OFFSET))
     assert noise[0, 2] == pytest.approx((OFFSET * FORCE) ** 2 / 0.1**2)
     assert noise[0, 0] == pytest.approx(1.0 + noise[0, 2])
+
+
+@pytest.mark.parametrize("count", [4, 5, 9, 40, 41, 200])
+def test_the_last_sample_of_a_stream_that_ends_in_motion_counts(count):
+    """A slide without a hand: no rest at either end."""
+    times = 0.01 * np.arange(count)
+    places = np.column_stack([times * (1.0 + times), 0.0 * times, 0.0 * times])
+    stream = PoseStream(times=times, positions=places, quaternions=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
+    push = Push(name="slide", object=stream, hand=None, force=None)
+    averaging = _averaging(push, SimpleNamespace(times=times, path=None))
+    np.testing.assert_allclose(averaging.sum(axis=1), 1.0)
+    assert (averaging[:, -1] > 0.0).sum() == 1
+    assert (averaging > 0.0).any(axis=0).all()
 
 
 @pytest.fixture(scope="module")

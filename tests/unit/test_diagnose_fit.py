@@ -9,9 +9,11 @@ from runs import shipped_pushes
 
 from physid_drake.cell import CellConfig
 from physid_drake.diagnose import case_of
-from physid_drake.diagnose.fit import FAILED, Fitter
+from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint
-from physid_drake.diagnose.plain import coarse
+from physid_drake.diagnose.plain import coarse, search_theta
+from physid_drake.diagnose.screen import signatures
+from physid_drake.diagnose.steps import FAILED, difference
 from physid_drake.effects.body import ComOffset
 from physid_drake.effects.drag import QuadraticDrag
 from physid_drake.effects.fields import Tether
@@ -50,6 +52,35 @@ def test_a_centre_of_mass_beside_the_base_is_a_failed_rollout_and_ends_nothing(f
     )
     assert np.all(tips == FAILED)
     assert np.abs(stands - fitter.case.features[0].recorded).max() < 0.1 * FAILED
+
+
+def test_a_rollout_that_diverged_is_no_derivative(fitter, monkeypatch):
+    here, there = np.array([1.0, 2.0]), np.array([1.5, 4.0])
+    fallen = np.full(2, FAILED)
+    np.testing.assert_array_equal(difference(here, there), [0.5, 2.0])
+    for before, after in ((here, fallen), (fallen, there), (fallen, fallen)):
+        np.testing.assert_array_equal(difference(before, after), 0.0)
+
+    simulate = fitter.vectors
+
+    def all_but_the_plain_fall(tasks):
+        seen = simulate(tasks)
+        return [v if k % len(fitter.case.problems) == 0 else np.full(len(v), FAILED) for k, v in enumerate(seen)]
+
+    whole = fitter.linearise(fitter.start(np.full(3, 0.5)), learn_scatter=False)
+    monkeypatch.setattr(fitter, "vectors", all_but_the_plain_fall)
+    fallen = fitter.linearise(fitter.start(np.full(3, 0.5)), learn_scatter=False)
+    assert max(np.abs(p.shared).max() for p in fallen.pushes) <= max(np.abs(p.shared).max() for p in whole.pushes)
+    for signature in signatures(fitter, whole, [ComOffset, QuadraticDrag]):
+        assert max(np.abs(c).max() for c in signature.columns) < 0.1 * FAILED
+
+
+def test_an_interrupted_search_for_a_start_is_not_taken_for_a_whole_one(fitter):
+    def interrupt(stage, done, total):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        search_theta(fitter.case, np.random.default_rng(0), interrupt)
 
 
 def test_a_push_that_is_left_out_does_not_tell_its_own_prediction(fitter):

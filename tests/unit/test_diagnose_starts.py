@@ -50,6 +50,15 @@ def test_the_last_effect_is_tried_weaker_and_stronger(fitted, best, start):
     np.testing.assert_array_equal(state.u, [0.4])
 
 
+def test_a_weaker_patch_is_where_the_patch_is_and_as_large():
+    kind = effect_named("friction_patch")
+    names = [c.name for c in kind.chart(AROUND)]
+    point, origin = np.full(len(names), 0.3), np.zeros(len(names))
+    patch = EffectPoint(kind=kind, point=point, free=tuple(range(len(names))), origin=origin)
+    moved = starts.of_other_strength(Fitter(0.0), model_with(patch)).effects[0].point
+    assert [name for name, a, b in zip(names, moved, point, strict=True) if a != b] == ["ratio"]
+
+
 @pytest.mark.parametrize(
     ("name", "shape"),
     [
