@@ -321,7 +321,7 @@ def test_effects_apply_where_they_can():
     assert {kind.name for kind in CATALOGUE} - {kind.name for kind in round_} == {"com_offset", "uneven_support"}
     free = dc.replace(around(False), has_hand=False)
     gone = {kind.name for kind in flat} - {kind.name for kind in applicable(free)}
-    assert gone == {"restitution", "hand_compliance", "actuator_lag", "hand_offset"}
+    assert gone == {"restitution", "hand_compliance", "actuator_lag", "hand_offset", "tracker_latency"}
     assert [kind.name for kind in applicable(free, ["table_tilt"])] == ["table_tilt"]
     with pytest.raises(ConfigError, match="'ghost' is unknown"):
         effect_named("ghost")

@@ -72,7 +72,7 @@ def test_an_effect_that_is_there_is_more_than_nothing_however_little_is_known_of
     fit = fitted(drag, covariance=np.diag([0.01, 5.0 * share]) ** 2)
     told = parameters_of(SimpleNamespace(final=fit, case=CASE), 0)["coefficient"]
     assert told.value == 5.0
-    reach = np.hypot(share, CELL_ERROR) * stats.t.ppf(0.95, 8)
+    reach = np.hypot(share * stats.t.ppf(0.95, 8), CELL_ERROR * stats.norm.ppf(0.95))
     np.testing.assert_allclose(np.log(np.array(told.ci90) / 5.0), [-reach, reach], rtol=0.15)  # of 400 draws
 
 
@@ -82,7 +82,7 @@ def test_no_interval_of_an_effect_is_narrower_than_the_cells_own_error():
     patch = EffectPoint(kind=FrictionPatch, point=place, free=(0, 1, 2, 3), origin=np.zeros(4))
     fit = fitted(patch, covariance=1e-12 * np.eye(5))
     told = parameters_of(SimpleNamespace(final=fit, case=CASE), 0)
-    reach = CELL_ERROR * stats.t.ppf(0.95, 5)  # ten pushes, five unknowns
+    reach = CELL_ERROR * stats.norm.ppf(0.95)  # however few pushes
     assert [c.name for c in chart] == ["ratio", "x", "y", "radius"]
     strength, radius = (np.log(np.array(told[name].ci90) / told[name].value) for name in ("ratio", "radius"))
     np.testing.assert_allclose(strength, np.log(2.0) * reach * np.array([-1, 1]), rtol=0.15)
