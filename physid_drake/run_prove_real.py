@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from physid_drake.errors import ConfigError, OutputError, PhysidError
+from physid_drake.cell import Outcome
+from physid_drake.errors import ConfigError, OutputError, ParameterError, PhysidError
 from physid_drake.identify.problem import PushProblem, noise_of, problems_of
 from physid_drake.model import ModelCell, load_model
 from physid_drake.prove.diagnosing import RESULT, Task, diagnose_command
@@ -92,7 +93,9 @@ def fresh_errors(diagnosis: Path, held: Path) -> np.ndarray:
         held: folder of the recording.
 
     Raises:
-        PhysidError: if the model or the recording cannot be read.
+        PhysidError: if the model or the recording cannot be read, or a rollout diverges.
+
+    Nothing tells where these pushes were among the others: a friction that drifts is that of the first push.
     """
     recording = read_recording(held)
     shape = recording.object.shape
@@ -108,6 +111,8 @@ def _end_error(cell: ModelCell, problem: PushProblem) -> tuple[float, float]:
         start=problem.start, path=problem.path, begin=problem.begin, end=problem.end,
         hand_height=problem.hand_height, hand_axes=problem.hand_axes,
     )  # fmt: skip
+    if motion.outcome is Outcome.DIVERGED:
+        raise ParameterError(f"push {problem.name}: the model's rollout diverges.")
     dx, dy, turn = (cell.tracked(motion, problem.times[-1:])[0] - problem.poses[-1]).tolist()
     return math.hypot(dx, dy), (turn + math.pi) % (2.0 * math.pi) - math.pi
 

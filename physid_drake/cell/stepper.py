@@ -129,8 +129,8 @@ class Stepper:
         """Let Drake begin anew from the state as it is."""
         self._root.SetTime(time)
         self._state.send()
+        self._record(time, (0.0, 0.0, 0.0))  # first, so that a motion that fails here has a pose
         self._simulator.Initialize()
-        self._record(time, (0.0, 0.0, 0.0))
 
     def _record(self, time: float, force: Planar) -> None:
         self._log.add(self._begin + time, self._state.pose(), force)

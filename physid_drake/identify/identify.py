@@ -30,6 +30,7 @@ from physid_drake.space import ParameterSpace
 Array = NDArray[np.float64]
 
 IDENTIFIABLE = 0.5  # a parameter counts as told if the pushes halve its prior's standard deviation
+EXPLAINED = 1.5  # reduced chi-square below which the plain cell leaves no more than noise and its own error
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -107,6 +108,11 @@ class Identification:
     fitted: Accuracy
     cells: CellsTold | None = None
     foreseen: Accuracy | None = None
+
+    @property
+    def explains(self) -> bool:
+        """Whether the plain cell explains the pushes to their noise."""
+        return self.reduced_chi2 < EXPLAINED
 
 
 Progress = Callable[[str, int, int], None]

@@ -205,7 +205,8 @@ class OnlineIdentifier:
             if term.diverged and best is None:
                 return belief  # no trial of this push ends: it says nothing
             trial = _solved(dc.replace(belief, terms=(*terms, term)))
-            cost = _cost_at(trial, u)
+            # Weighed as before the push: a trial that learned more scatter would seem to cost less.
+            cost = _cost_at(dc.replace(trial, scatter=belief.scatter, inflation=belief.inflation), u)
             if best is not None and (term.diverged or cost > best[0]):
                 u = 0.5 * (u + best[1].terms[-1].u)  # the linear step went too far
                 continue
@@ -286,10 +287,10 @@ def _with_scales(belief: OnlineBelief, samples: int) -> OnlineBelief:
 
 
 def _cost_at(belief: OnlineBelief, u: Array) -> float:
-    """Posterior cost at u (d,), where the newest push was simulated."""
+    """Posterior cost at u (d,), where the newest push was simulated, with the belief's scatter and inflation."""
     squares = [float((term.marginal(u, belief.scatter)[0] ** 2).sum()) for term in belief.terms]
     prior = prior_rows(belief.space, belief.space.from_unit(u))
-    return sum(squares) + float(prior @ prior)
+    return sum(squares) / belief.inflation + float(prior @ prior)
 
 
 def _polished(belief: OnlineBelief) -> Polished:

@@ -64,7 +64,7 @@ def accuracy_cells(accuracy: Accuracy) -> list[str]:
 def verdict(result: Identification) -> str:
     """In one sentence, how well the plain cell explains the pushes."""
     chi2 = result.reduced_chi2
-    if chi2 < 1.5:
+    if result.explains:
         return f"The plain cell explains these pushes to their noise (reduced chi-square {chi2:.2f})."
     return (
         f"The plain cell does not explain these pushes to their noise (reduced chi-square {chi2:.2f}, 1 expected): "
