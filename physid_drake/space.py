@@ -1,5 +1,6 @@
 """The named unknowns: parameters with unit, bounds, scale and prior, and the space they span."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -156,6 +157,12 @@ class ParameterSpace:
     @cached_property
     def _scale_width(self) -> Array:
         return read_only([p.to_scale(p.upper) - p.to_scale(p.lower) for p in self.parameters])
+
+    @cached_property
+    def prior_std_unit(self) -> Array:
+        """Prior standard deviations (d,) in the unit cube, each parameter's own; a uniform one's is 1/sqrt(12)."""
+        stds = [math.inf if p.prior_std is None else p.prior_std for p in self.parameters]
+        return read_only(np.where(np.isinf(stds), 1.0 / math.sqrt(12.0), stds / self._scale_width))
 
     def index(self, name: str) -> int:
         """Position of parameter `name` in `theta`.

@@ -19,7 +19,7 @@ from physid_drake.identify.force_windows import WINDOW
 from physid_drake.identify.frames import unseen_motion
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
 from physid_drake.identify.problem import Noise, PushProblem, problems_of, spec_of
-from physid_drake.identify.rollouts import Prediction, RolloutPool
+from physid_drake.identify.rollouts import RolloutPool
 from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.recording import Recording, thinned
 
@@ -110,10 +110,6 @@ class Case:
         said = (f"pushes that stand out count as so many times noisier: {', '.join(strange)}",) if strange else ()
         warnings = (*(w for w in common.warnings if not w.startswith("pushes that stand out")), *said)
         return dc.replace(self, noise=dc.replace(common, warnings=warnings), features=features, odd=odd)
-
-    def vectors(self, predictions: Sequence[Prediction | None], owners: Sequence[int]) -> list[Array | None]:
-        """Features of predictions, each of the push ``owners`` says."""
-        return [None if p is None else self.features[i].of(p) for p, i in zip(predictions, owners, strict=True)]
 
 
 def case_of(

@@ -184,22 +184,8 @@ class Fitter:
     def priors(self, state: State) -> tuple[Array, Array]:
         """Mean and standard deviation (d,) of a change of the shared parameters from a state."""
         space = self.case.thetas.space
-        nominal = np.asarray(space.to_unit(space.nominal))
-        lower = np.asarray(space.to_unit(space.nominal))
-        means, stds = [], []
-        for j, parameter in enumerate(space.parameters):
-            if parameter.prior_std is None:
-                std = 1.0 / np.sqrt(12.0)
-            else:
-                # One prior standard deviation in the unit cube, by the whitened prior's slope.
-                bumped = lower.copy()
-                bumped[j] += 1e-4
-                slope = (
-                    space.prior_whitened(space.from_unit(bumped)) - space.prior_whitened(space.from_unit(lower))
-                )[j]
-                std = 1e-4 / abs(float(slope))
-            means.append(nominal[j] - state.u[j])
-            stds.append(std)
+        means = list(np.asarray(space.to_unit(space.nominal)) - state.u)
+        stds = list(space.prior_std_unit)
         for e in state.effects:
             chart = e.chart(self.case)
             for j in e.free:

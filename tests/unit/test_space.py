@@ -115,6 +115,20 @@ def test_whitened_prior_counts_standard_deviations_and_leaves_uniform_parameters
     np.testing.assert_allclose(pushed_box().prior_whitened(theta), [2.0, -1.0, 0.0], atol=1e-12)
 
 
+def test_a_prior_deviation_moves_the_unit_cube_by_its_deviation_there():
+    space = pushed_box()
+    at = space.to_unit(space.nominal)
+    told = [j for j, p in enumerate(space.parameters) if p.prior_std is not None]
+    for j in told:
+        step = np.zeros(3)
+        step[j] = -1e-3 * space.prior_std_unit[j]
+        moved = space.prior_whitened(space.from_unit(at + step)) - space.prior_whitened(space.nominal)
+        np.testing.assert_allclose(moved, -1e-3 * np.eye(3)[j], atol=1e-9)
+    flat = [j for j in range(3) if j not in told]
+    np.testing.assert_array_equal(space.prior_std_unit[flat], 1.0 / np.sqrt(12.0))
+    assert told and flat
+
+
 def test_a_uniform_space_has_log_prior_zero():
     space = pushed_box().subspace(["com_offset"])
     assert space.log_prior([0.01]) == 0.0
