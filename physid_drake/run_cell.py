@@ -16,12 +16,12 @@ from physid_drake.diagnose import case_of
 from physid_drake.diagnose.memory import Memory
 from physid_drake.errors import ConfigError, PhysidError
 from physid_drake.identify import Identification, Identifier, OnlineIdentifier
-from physid_drake.identify.identify import Progress
 from physid_drake.identify.nuisance import nuisance_of
 from physid_drake.identify.rollouts import Task, simulate
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
 from physid_drake.plan import Plan
 from physid_drake.plan.system import Planner, PolicySystem, identified_model, planner_of
+from physid_drake.progress import Progress
 from physid_drake.recording import Recording, digest_of, read_recording
 from physid_drake.report.cells import cells_table
 from physid_drake.report.page import result_page

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
-from physid_drake.errors import OutputError
+from physid_drake.errors import ConfigError, OutputError
 
 PACKAGES = ("physid_drake", "drake", "mujoco", "numpy", "scipy", "scikit-learn")
 
@@ -69,6 +69,32 @@ class RunFolder:
             raise OutputError(f"output folder '{path}': cannot be written: {error}.") from error
         folder.write(name, configuration)
         return folder
+
+    @classmethod
+    def claim(cls, path: Path, configuration: str, *, name: str, what: str) -> RunFolder:
+        """Make the folder, or go on in one that was made for the same; any other is refused.
+
+        Args:
+            path: of the folder.
+            configuration: text that says what the run is; kept in the folder.
+            name: of the file that keeps it.
+            what: is in such a folder, for the message.
+
+        Raises:
+            ConfigError: if it holds another run.
+            OutputError: if it cannot be read or written.
+        """
+        file = path / name
+        try:
+            earlier = file.read_text(encoding="utf-8") if file.exists() else configuration
+        except (OSError, UnicodeDecodeError) as error:
+            raise OutputError(f"'{file}': cannot be read: {error}.") from error
+        if earlier != configuration:
+            raise ConfigError(
+                f"'{path}' holds another {what} ({' '.join(earlier.split())}); choose another --out, or the same"
+                " settings."
+            )
+        return cls.open(path, configuration, name=name)
 
     def write(self, name: str, text: str) -> None:
         """Write a text file whole or not at all.

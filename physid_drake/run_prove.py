@@ -98,17 +98,7 @@ def check_running(arguments: argparse.Namespace) -> None:
 
 def claim(out: Path, settings: dict[str, object]) -> RunFolder:
     """The folder of a proof, refused where it holds another."""
-    text = json.dumps(settings, indent=2) + "\n"
-    file = out / SETTINGS
-    try:
-        earlier = file.read_text(encoding="utf-8") if file.exists() else text
-    except (OSError, UnicodeDecodeError) as error:
-        raise OutputError(f"'{file}': cannot be read: {error}.") from error
-    if earlier != text:
-        raise ConfigError(
-            f"'{out}' holds another proof ({' '.join(earlier.split())}); choose another --out, or the same settings."
-        )
-    return RunFolder.open(out, text, name=SETTINGS)
+    return RunFolder.claim(out, json.dumps(settings, indent=2) + "\n", name=SETTINGS, what="proof")
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,9 @@ from physid_drake.diagnose.linear import left_out_scores
 from physid_drake.diagnose.model import EffectPoint, Fitted
 from physid_drake.diagnose.screen import Score
 from physid_drake.diagnose.starts import elsewhere, scanned_start, start_of
+from physid_drake.progress import Progress
 
 Array = NDArray[np.float64]
-Tick = Callable[[str, int, int], None]
 
 WORTH_A_FIT = 0.35  # of the best score test's gain
 RIVAL = 0.5  # where one explains the pushes already
@@ -118,7 +118,7 @@ def push_scores(fitted: Fitted, folds: Sequence[Sequence[int]] | None = None) ->
 
 
 def confirm(
-    fitter: Fitter, before: Fitted, scores: Sequence[Score], tick: Tick, *, most: int
+    fitter: Fitter, before: Fitted, scores: Sequence[Score], tick: Progress, *, most: int
 ) -> tuple[Candidate, ...]:
     """Fit the best few effects of a screening, each added to the model ``before``; best held-out gain first.
 
@@ -165,7 +165,7 @@ def _some_leads_near(before: Fitted, found: Sequence[Candidate]) -> bool:
 
 
 def _tried_elsewhere(
-    fitter: Fitter, before: Fitted, found: Sequence[Candidate], plain: Array, tick: Tick
+    fitter: Fitter, before: Fitted, found: Sequence[Candidate], plain: Array, tick: Progress
 ) -> list[Candidate]:
     """The candidates, the best of them fitted from other places as long as none explains the pushes.
 

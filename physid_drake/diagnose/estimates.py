@@ -24,6 +24,7 @@ from physid_drake.diagnose.values import (
 )
 from physid_drake.effects import Effect
 from physid_drake.effects.effect import Coordinate
+from physid_drake.identify.cells import TOLD
 from physid_drake.identify.theta import CELL_ERROR, cell_error
 
 Array = NDArray[np.float64]
@@ -31,7 +32,6 @@ Array = NDArray[np.float64]
 Z90 = float(stats.norm.ppf(0.95))
 SAMPLES = 400  # of an effect's chart, for the intervals of its parameters
 JOINT_SAMPLES = 2000  # of theta and all charts, for how the estimates vary together
-IDENTIFIABLE = 0.5  # posterior over prior standard deviation
 # Of its standard deviation: below, an amplitude may be nothing. What is known over an unweighed mass only is above.
 DOUBTFUL = 0.5
 
@@ -131,7 +131,7 @@ def theta_of(evidence: Evidence, fitted: Fitted) -> dict[str, ThetaEstimate]:
     intervals = theta_intervals(evidence, fitted)
     result = {}
     for j, parameter in enumerate(space.parameters):
-        told = math.sqrt(covariance[j, j]) < IDENTIFIABLE * prior[j]
+        told = math.sqrt(covariance[j, j]) < TOLD * prior[j]
         result[parameter.name] = ThetaEstimate(
             value=float(here[j]) if told else None,
             unit=parameter.unit,

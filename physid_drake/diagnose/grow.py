@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses as dc
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -30,8 +30,7 @@ from physid_drake.diagnose.pairs import confirmed_pairs, steps_of
 from physid_drake.diagnose.screen import Screening, Signature, screen, signatures, with_frictions
 from physid_drake.diagnose.starts import corners, of_other_shape, of_other_strength
 from physid_drake.effects import Effect
-
-Tick = Callable[[str, int, int], None]
+from physid_drake.progress import Progress
 
 MOST_EFFECTS = 3
 LONGEST = 450  # rollouts per push, after the first score tests, after which no further effect is looked for
@@ -104,7 +103,7 @@ class Growth:
     kinds: Sequence[type[Effect]]
     alpha: float
     rng: np.random.Generator
-    tick: Tick
+    tick: Progress
 
     def grow(self, plain: Looked) -> Grown:
         """Add effects to the plain model, take out what became superfluous, and judge rivals again."""

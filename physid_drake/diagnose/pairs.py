@@ -7,7 +7,7 @@ explains little. So pairs are ranked by score tests in which both may move, and 
 from __future__ import annotations
 
 import dataclasses as dc
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -20,9 +20,9 @@ from physid_drake.diagnose.linear import Whitened, best_scatter, solve
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.screen import Score, extended
 from physid_drake.diagnose.starts import scanned_start, start_of
+from physid_drake.progress import Progress
 
 Array = NDArray[np.float64]
-Tick = Callable[[str, int, int], None]
 Pair = tuple[Score, Score]
 
 AMONG = 6  # effects, by their own score tests
@@ -60,7 +60,7 @@ class FittedPair:
 
 
 def confirmed_pairs(
-    fitter: Fitter, plain: Fitted, scores: Sequence[Score], tick: Tick, *, most: int
+    fitter: Fitter, plain: Fitted, scores: Sequence[Score], tick: Progress, *, most: int
 ) -> list[FittedPair]:
     """Pairs that explain the pushes, each effect confirmed beside the other one; the one to take is first.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +16,10 @@ from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.steps import difference
 from physid_drake.identify.problem import spec_of
 from physid_drake.identify.rollouts import RolloutPool
+from physid_drake.progress import Progress
 from physid_drake.search import GreedyEntropySearch, search_minimum
 
 Array = NDArray[np.float64]
-Tick = Callable[[str, int, int], None]
 
 CANDIDATES = 300
 BUDGET = 24
@@ -28,7 +27,7 @@ CAREFUL = 3  # rounds
 SOME_PUSHES = 6  # the search needs a start, not an answer
 
 
-def search_theta(case: Case, rng: np.random.Generator, tick: Tick) -> Array:
+def search_theta(case: Case, rng: np.random.Generator, tick: Progress) -> Array:
     """A start (d,) in the unit cube, by greedy entropy search over a part of the pushes."""
     fitter, space = Fitter(case), case.thetas.space
     some = np.unique(np.linspace(0, len(case.problems) - 1, min(SOME_PUSHES, len(case.problems))).round().astype(int))
@@ -135,7 +134,7 @@ def _squares_at_rest(fitted: Fitted) -> float:
     return float(np.mean(at_zero**2))
 
 
-def fit_plain(case: Case, rng: np.random.Generator, tick: Tick) -> Fitted:
+def fit_plain(case: Case, rng: np.random.Generator, tick: Progress) -> Fitted:
     """The plain cell fitted, without guard and tolerances.
 
     Where something large is missing, the pushes' own unknowns stay at zero: moved, they would imitate it, and effects

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses as dc
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,9 @@ from physid_drake.diagnose.screen import (
 )
 from physid_drake.diagnose.values import Diagnosis
 from physid_drake.effects import Effect, applicable, tolerated
+from physid_drake.progress import Progress
 
 Array = NDArray[np.float64]
-Tick = Callable[[str, int, int], None]
 
 
 def diagnose(
@@ -39,7 +39,7 @@ def diagnose(
     seed: int = 0,
     alpha: float = 0.01,
     effects: Sequence[str] | None = None,
-    tick: Tick | None = None,
+    tick: Progress | None = None,
     memory: Memory | None = None,
 ) -> tuple[Diagnosis, Evidence]:
     """Diagnose a recording; arguments as in ``gather``."""
@@ -50,7 +50,7 @@ def diagnose(
 
 
 def gather(
-    case: Case, *, seed: int, alpha: float, effects: Sequence[str] | None, tick: Tick, memory: Memory
+    case: Case, *, seed: int, alpha: float, effects: Sequence[str] | None, tick: Progress, memory: Memory
 ) -> Evidence:
     """Fit, screen, confirm: all that needs rollouts.
 
@@ -72,7 +72,7 @@ def gather(
     return _on_short_ticks(answer, tick)
 
 
-def _on_short_ticks(answer: _Answer, tick: Tick) -> Evidence:
+def _on_short_ticks(answer: _Answer, tick: Progress) -> Evidence:
     """The evidence of an answer, both models taken to the case's own ticks."""
     case, grown, fitter = answer.case, answer.grown, answer.fitter
     plain, model = grown.base.fitted, grown.last.fitted
@@ -123,7 +123,7 @@ class _Search:
     kinds: Sequence[type[Effect]]
     alpha: float
     rng: np.random.Generator
-    tick: Tick
+    tick: Progress
 
     def answer(self, case: Case, rough: Case, first: Fitted, memory: Memory) -> _Answer:
         """Look at the whole catalogue, add effects, and take out what became superfluous."""
@@ -153,7 +153,7 @@ class _Search:
         return dc.replace(again, noise_share=share, detected=detected)
 
 
-def _first(case: Case, rng: np.random.Generator, tick: Tick, memory: Memory) -> Fitted:
+def _first(case: Case, rng: np.random.Generator, tick: Progress, memory: Memory) -> Fitted:
     """The plain fit, or that of an interrupted run."""
     kept = memory.recall("plain")
     if kept is not None:
@@ -166,7 +166,7 @@ def _first(case: Case, rng: np.random.Generator, tick: Tick, memory: Memory) -> 
 
 
 def _looks(
-    case: Case, first: Fitted, kinds: Sequence[type[Effect]], tick: Tick, memory: Memory
+    case: Case, first: Fitted, kinds: Sequence[type[Effect]], tick: Progress, memory: Memory
 ) -> tuple[tuple[Array, ...], list[Signature]]:
     """The guard's directions and the catalogue's signatures, or those of an interrupted run."""
     guard_kept, kept = memory.recall("guard"), memory.recall("signatures")
@@ -184,7 +184,7 @@ def _looks(
     return tuple(guard_kept), found
 
 
-def _located(evidence: Evidence, tick: Tick) -> Evidence:
+def _located(evidence: Evidence, tick: Progress) -> Evidence:
     """With the missing wrench, and the push that would tell rivals apart."""
     rough = Fitter(coarse(evidence.case))
     tick("the missing wrench", 0, 0)

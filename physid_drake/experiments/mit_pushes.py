@@ -36,10 +36,11 @@ from physid_drake.experiments.learning import (
     plain_task,
     search_trials,
 )
-from physid_drake.experiments.values import Entry, Panel, Record, Result, Table, Tick, mean_and_deviation, series_of
+from physid_drake.experiments.values import Entry, Panel, Record, Result, Table, mean_and_deviation, series_of
 from physid_drake.identify import ThetaConfig
 from physid_drake.identify.problem import PushProblem
 from physid_drake.identify.rollouts import predict
+from physid_drake.progress import Progress
 from physid_drake.recording import Recording
 from physid_drake.recording.adapters import convert_mit
 from physid_drake.space import Parameter, ParameterSpace
@@ -125,7 +126,7 @@ class MitPushes:
         """The folds of the main table, then the other tables."""
         return self.folds + len(self.others)
 
-    def repeat(self, index: int, tick: Tick) -> Record:
+    def repeat(self, index: int, tick: Progress) -> Record:
         """One fold of the main table, or all folds of another."""
         if index < self.folds:
             return self._fold(MAIN, index, self.pushes, self.folds, self.budget, TRIED, tick)
@@ -137,7 +138,14 @@ class MitPushes:
         return {"folds": folds}
 
     def _fold(
-        self, name: str, fold: int, pushes: int, folds: int, budget: int, tried: Sequence[tuple[str, str]], tick: Tick
+        self,
+        name: str,
+        fold: int,
+        pushes: int,
+        folds: int,
+        budget: int,
+        tried: Sequence[tuple[str, str]],
+        tick: Progress,
     ) -> Record:
         """Learn from pushes outside a fold, and predict those inside."""
         table = PublishedPushes(self.folder, name, pushes, self.seed)

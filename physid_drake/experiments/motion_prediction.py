@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from physid_drake.experiments.learning import GREEDY, METHODS, EndErrors, Learner, Trials
-from physid_drake.experiments.values import Panel, Record, Result, Series, Table, Tick, mean_and_deviation, series_of
+from physid_drake.experiments.values import Panel, Record, Result, Series, Table, mean_and_deviation, series_of
 from physid_drake.experiments.worlds import ERASER, HiddenRobot, draw_world, record_pushes
 from physid_drake.identify.problem import PushProblem
+from physid_drake.progress import Progress
 
 SPEEDS = (0.05, 0.4)  # m/s
 FRICTIONS = (0.12, 0.4)
@@ -45,7 +46,7 @@ class MotionPrediction:
     budget: int = 40
     tick_s: float = 2e-3
 
-    def repeat(self, index: int, tick: Tick) -> Record:
+    def repeat(self, index: int, tick: Progress) -> Record:
         """One world: every method on the same pushes."""
         draws, *streams = [np.random.default_rng(s) for s in np.random.SeedSequence([self.seed, index]).spawn(8)]
         world = draw_world(draws, ERASER, FRICTIONS)
@@ -89,7 +90,7 @@ class MotionPrediction:
             "deg": [row["deg"] for row in rows],
         }
 
-    def _against_pushes(self, learner: Learner, rng: np.random.Generator, tick: Tick) -> Record:
+    def _against_pushes(self, learner: Learner, rng: np.random.Generator, tick: Progress) -> Record:
         """Errors on all pushes that are never trained on, by the number of training pushes."""
         others, result = learner.problems[self.training :], {}
         for count, stream in zip(self.subsets, rng.spawn(len(self.subsets)), strict=True):

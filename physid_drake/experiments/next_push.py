@@ -20,7 +20,6 @@ from physid_drake.experiments.values import (
     Record,
     Result,
     Table,
-    Tick,
     mean_and_deviation,
     series_of,
 )
@@ -37,6 +36,7 @@ from physid_drake.identify import ThetaConfig
 from physid_drake.identify.linearise import prior_slope
 from physid_drake.plan import most_informative_push
 from physid_drake.policies import PlannedPush
+from physid_drake.progress import Progress
 from physid_drake.recording import Push, Recording
 
 SPEEDS: Final = (0.05, 0.4)  # m/s
@@ -73,7 +73,7 @@ class NextPush:
     budget: int = 10
     tick_s: float = 2e-3
 
-    def repeat(self, index: int, tick: Tick) -> Record:
+    def repeat(self, index: int, tick: Progress) -> Record:
         """One world: both ways of choosing meet the same candidates."""
         draws = np.random.default_rng([self.seed, index])
         world = draw_world(draws, ERASER, FRICTIONS)
@@ -94,7 +94,7 @@ class NextPush:
         offers: Sequence[Offer],
         tests: Recording,
         name: str,
-        tick: Tick,
+        tick: Progress,
     ) -> Record:
         """Push, learn, choose, push."""
         config = ThetaConfig(parameters=list(UNKNOWN), nominal={"mass": robot.world.mass})

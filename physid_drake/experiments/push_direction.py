@@ -15,12 +15,13 @@ from scipy import stats
 
 from physid_drake.cell import Body
 from physid_drake.experiments.learning import GREEDY, RANDOM, Learner
-from physid_drake.experiments.values import Array, Panel, Record, Result, Series, Table, Tick, mean_and_deviation
+from physid_drake.experiments.values import Array, Panel, Record, Result, Series, Table, mean_and_deviation
 from physid_drake.experiments.worlds import ERASER, HiddenRobot, Pose, draw_start, draw_world, record_pushes
 from physid_drake.model import Model
 from physid_drake.plan import Ending, Situation
 from physid_drake.plan.trajectory import trajectory_of
 from physid_drake.policies import PlannedPush
+from physid_drake.progress import Progress
 
 SLOW: Final = (0.05, 0.15)  # m/s, of the training pushes
 FRICTIONS: Final = (0.12, 0.4)
@@ -58,7 +59,7 @@ class PushDirections:
     speed: float = 0.3
     tick_s: float = 2e-3
 
-    def repeat(self, index: int, tick: Tick) -> Record:
+    def repeat(self, index: int, tick: Progress) -> Record:
         """One world: learn, then push twice with each model."""
         draws, scatter, *streams = [
             np.random.default_rng(s) for s in np.random.SeedSequence([self.seed, index]).spawn(6)

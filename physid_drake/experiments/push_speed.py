@@ -22,7 +22,6 @@ from physid_drake.experiments.values import (
     Result,
     Series,
     Table,
-    Tick,
     mean_and_deviation,
     series_of,
 )
@@ -38,6 +37,7 @@ from physid_drake.experiments.worlds import (
 from physid_drake.model import Model
 from physid_drake.plan import DistanceToGoal, Situation, plan
 from physid_drake.policies.policy import PushSpeed, Reach
+from physid_drake.progress import Progress
 from physid_drake.prove.world_plan import Plan
 from physid_drake.recording import Push
 from physid_drake.search import search_by_power
@@ -85,7 +85,7 @@ class PushSpeeds:
     updates: int = 10
     tick_s: float = 2e-3
 
-    def repeat(self, index: int, tick: Tick) -> Record:
+    def repeat(self, index: int, tick: Progress) -> Record:
         """One bottle: plan with a model from slow pushes; learn by fast pushes alone."""
         draws, *streams = [np.random.default_rng(s) for s in np.random.SeedSequence([self.seed, index]).spawn(5)]
         world = draw_world(draws, BOTTLE, FRICTIONS)
@@ -102,7 +102,7 @@ class PushSpeeds:
         return record
 
     def _model_based(
-        self, world: Plan, bottle: FastPushes, draws: np.random.Generator, rng: np.random.Generator, tick: Tick
+        self, world: Plan, bottle: FastPushes, draws: np.random.Generator, rng: np.random.Generator, tick: Progress
     ) -> Record:
         robot = HiddenRobot(world, rng=draws, start=START, table=TABLE)
         slow = _slow_pushes(robot, draws, max(self.slow_pushes))

@@ -10,8 +10,9 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from physid_drake.errors import ConfigError, OutputError
-from physid_drake.experiments.values import Experiment, Record, Tick
+from physid_drake.errors import OutputError
+from physid_drake.experiments.values import Experiment, Record
+from physid_drake.progress import Progress
 from physid_drake.run_folder import RunFolder
 
 SETTINGS = "settings.json"
@@ -26,15 +27,12 @@ def claim(name: str, experiment: Experiment, out: Path) -> RunFolder:
         OutputError: if it cannot be written.
     """
     text = json.dumps({"experiment": name, **settings_of(experiment)}, indent=2) + "\n"
-    file = out / SETTINGS
+    folder = RunFolder.claim(out, text, name=SETTINGS, what="experiment")
     try:
-        earlier = file.read_text(encoding="utf-8") if file.exists() else text
-        (out / KEPT).mkdir(parents=True, exist_ok=True)
-    except (OSError, UnicodeDecodeError) as error:
-        raise OutputError(f"'{out}': cannot be used: {error}.") from error
-    if earlier != text:
-        raise ConfigError(f"'{out}' holds another experiment, or this one with other settings; choose another --out.")
-    return RunFolder.open(out, text, name=SETTINGS)
+        (out / KEPT).mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"'{out}': cannot be written: {error}.") from error
+    return folder
 
 
 def settings_of(experiment: Experiment) -> dict[str, Any]:
@@ -44,7 +42,7 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
     return {k: list(v) if isinstance(v, tuple) else v for k, v in values.items() if not isinstance(v, Path)}
 
 
-def run_all(experiment: Experiment, folder: RunFolder, *, jobs: int, tick: Tick) -> list[Record]:
+def run_all(experiment: Experiment, folder: RunFolder, *, jobs: int, tick: Progress) -> list[Record]:
     """All records in their order; those that are kept are not made again.
 
     Args:
@@ -81,7 +79,7 @@ def _kept(folder: RunFolder, index: int) -> Record | None:
     return record
 
 
-def _made(experiment: Experiment, indices: Sequence[int], jobs: int, tick: Tick) -> Iterator[tuple[int, Record]]:
+def _made(experiment: Experiment, indices: Sequence[int], jobs: int, tick: Progress) -> Iterator[tuple[int, Record]]:
     if jobs <= 1 or len(indices) <= 1:
         for index in indices:
             yield index, _through_json(experiment.repeat(index, _told(tick, index, experiment.repetitions)))
@@ -107,5 +105,5 @@ def _through_json(record: Record) -> Record:
     return result
 
 
-def _told(tick: Tick, index: int, count: int) -> Tick:
+def _told(tick: Progress, index: int, count: int) -> Progress:
     return lambda stage, done, total: tick(f"repetition {index + 1} of {count}: {stage}", done, total)

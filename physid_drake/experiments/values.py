@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.errors import ConfigError
+from physid_drake.progress import Progress
 
 Array = NDArray[np.float64]
 Record = dict[str, Any]
 """What one repetition found: names to numbers, texts, lists and further records, as JSON has them."""
 
-Tick = Callable[[str, int, int], None]
 """Told a stage, steps done and steps in all."""
 
 Entry = str | float | int | None
@@ -94,7 +94,7 @@ class Experiment(Protocol):
         """How many independent parts there are."""
         ...
 
-    def repeat(self, index: int, tick: Tick) -> Record:
+    def repeat(self, index: int, tick: Progress) -> Record:
         """Make one repetition."""
         ...
 

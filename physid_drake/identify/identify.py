@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from physid_drake.belief import Belief
 from physid_drake.cell import CellConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
-from physid_drake.identify.cells import CellsTold, cells_told, tied_cells
+from physid_drake.identify.cells import TOLD, CellsTold, cells_told, tied_cells
 from physid_drake.identify.config import SearchConfig, ThetaConfig
 from physid_drake.identify.misfit import whitened_residual
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
@@ -23,13 +23,13 @@ from physid_drake.identify.polish import Polished, Polisher
 from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, cell_error, theta_map
+from physid_drake.progress import Progress
 from physid_drake.recording import Recording, thinned
 from physid_drake.search import SearchResult, search_minimum, search_named
 from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
 
-IDENTIFIABLE = 0.5  # a parameter counts as told if the pushes halve its prior's standard deviation
 EXPLAINED = 1.5  # reduced chi-square below which the plain cell leaves no more than noise and its own error
 
 
@@ -113,9 +113,6 @@ class Identification:
     def explains(self) -> bool:
         """Whether the plain cell explains the pushes to their noise."""
         return self.reduced_chi2 < EXPLAINED
-
-
-Progress = Callable[[str, int, int], None]
 
 
 def split_pushes(count: int, share: float, rng: np.random.Generator) -> tuple[list[int], list[int]]:
@@ -297,7 +294,7 @@ def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
     u = np.asarray(space.to_unit(polished.theta))
     result = []
     for j, parameter in enumerate(space.parameters):
-        told = bool(spread[j] < IDENTIFIABLE * prior_spread[j])
+        told = bool(spread[j] < TOLD * prior_spread[j])
         if told or parameter.prior_std is not None:
             std = math.hypot(spread[j], cell_error(space, np.asarray(polished.theta), j))
             reach = z * min(std, prior_spread[j])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import HandPath, Start
-from physid_drake.identify.problem import PushProblem
+from physid_drake.identify.problem import PushProblem, triple
 
 Array = NDArray[np.float64]
 
@@ -79,14 +79,10 @@ def apply_nuisance(problem: PushProblem, nuisance: Nuisance, values: Array) -> P
     path = problem.path
     if path is not None:
         path = path.faster(given.get("speed", 0.0)).braking(given.get("brake", 0.0))
-    start = replace(problem.start, pose=_triple(pose), velocity=_triple(velocity))
+    start = replace(problem.start, pose=triple(pose), velocity=triple(velocity))
     return PushSetting(
         start=start,
         path=path,
         friction_scale=1.0 + given["friction"],
         restitution=given.get("restitution", 0.0),
     )
-
-
-def _triple(values: Array) -> tuple[float, float, float]:
-    return float(values[0]), float(values[1]), float(values[2])

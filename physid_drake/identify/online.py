@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses as dc
-from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -22,12 +21,12 @@ from physid_drake.identify.polish import SCATTER_PUSHES, Polished, new_scatter, 
 from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, theta_map
+from physid_drake.progress import Progress
 from physid_drake.recording import Push, Recording, thinned
 from physid_drake.search import SearchResult, search_minimum, search_named
 from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, int, int], None]
 
 BUDGET = 12  # rollouts of the search on a new push
 CANDIDATES = 256

@@ -230,8 +230,8 @@ def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[S
         still = planar[rests[0]]
         independent = max(1.0, len(still) * (1.0 - noise.correlation) / (1.0 + noise.correlation))
         pose = still.mean(axis=0)
-        return Start(pose=_triple(pose)), sigmas / np.sqrt(independent)
-    return Start(pose=_triple(planar[0])), sigmas.copy()
+        return Start(pose=triple(pose)), sigmas / np.sqrt(independent)
+    return Start(pose=triple(planar[0])), sigmas.copy()
 
 
 def _moving_start(push: Push, planar: Array, sigmas: Array) -> tuple[Start, Array]:
@@ -246,10 +246,11 @@ def _moving_start(push: Push, planar: Array, sigmas: Array) -> tuple[Start, Arra
     coefficients, *_ = np.linalg.lstsq(design, planar[:n], rcond=None)
     spread = np.sqrt(np.diag(np.linalg.pinv(design.T @ design)))
     std = np.concatenate([spread[0] * sigmas, spread[1] * sigmas])
-    return Start(pose=_triple(coefficients[0]), velocity=_triple(coefficients[1])), std
+    return Start(pose=triple(coefficients[0]), velocity=triple(coefficients[1])), std
 
 
-def _triple(values: Array) -> tuple[float, float, float]:
+def triple(values: Array) -> tuple[float, float, float]:
+    """Three numbers of an array (3,), such as a pose."""
     return float(values[0]), float(values[1]), float(values[2])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,10 @@ from physid_drake.plan.costs import Cost, cost_of, loss_of
 from physid_drake.plan.draws import Draw, draws_of, uncertain_names
 from physid_drake.plan.trajectory import Ending, Situation, Trajectory, hand_radius_of, path_of, trajectory_of
 from physid_drake.policies import PlannedPush, Policy
+from physid_drake.progress import Progress
 from physid_drake.search import SearchResult, search_minimum, search_named
 
 Array = NDArray[np.float64]
-Tick = Callable[[str, int, int], None]
 
 CANDIDATES = 256
 REFINE_EVERY = 6  # trials: candidates gather where the best setting may be
@@ -139,7 +139,7 @@ def plan(
     tolerance: float = TOLERANCE,
     friction_scatter: float = 0.0,
     scatter_freedom: float = math.inf,
-    tick: Tick | None = None,
+    tick: Progress | None = None,
 ) -> Plan:
     """Search a policy's settings for the least cost.
 
@@ -248,7 +248,7 @@ class _Story:
     """The rollouts of one plan."""
 
     def __init__(
-        self, model: Model, draws: Sequence[Draw], policy: Policy, cost: Cost, situation: Situation, tick: Tick
+        self, model: Model, draws: Sequence[Draw], policy: Policy, cost: Cost, situation: Situation, tick: Progress
     ) -> None:
         self._model, self._draws, self._policy = model, draws, policy
         self._cost, self._situation, self._tick = cost, situation, tick

@@ -19,11 +19,12 @@ from physid_drake.model import Correlation, Model
 from physid_drake.plan.config import PlanConfig
 from physid_drake.plan.costs import DistanceToGoal
 from physid_drake.plan.robot import Robot
-from physid_drake.plan.story import Plan, Tick, plan
+from physid_drake.plan.story import Plan, plan
 from physid_drake.plan.task import check_task, default_goal, policy_for
 from physid_drake.plan.trajectory import Situation
 from physid_drake.policies import PlannedPush, policy_named
 from physid_drake.policies.policy import Reach
+from physid_drake.progress import Progress
 from physid_drake.recording import Push
 
 Array = NDArray[np.float64]
@@ -154,7 +155,7 @@ class Planner:
         """Number of the policy's settings."""
         return policy_named(self.config.policy, Reach(heading=0.0, travel=1.0, inner_radius=1.0)).space.dimension
 
-    def run(self, result: Identification, tick: Tick | None = None) -> Plan:
+    def run(self, result: Identification, tick: Progress | None = None) -> Plan:
         """Plan with the identified theta and its intervals.
 
         Args:
