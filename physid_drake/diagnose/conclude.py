@@ -35,6 +35,7 @@ from physid_drake.diagnose.looks import locate
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import regime_gains
 from physid_drake.diagnose.screen import cosine
+from physid_drake.diagnose.steps import diverged
 from physid_drake.diagnose.values import (
     Detectable,
     Diagnosis,
@@ -94,9 +95,19 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
             "jitter_s": case.noise.jitter,
             **_noise_of_sensors(case),
         },
-        warnings=case.warnings,
+        warnings=(*case.warnings, *_diverged(case, shown)),
         rollouts=case.pool.count,
         pushes=case.pushes,
+    )
+
+
+def _diverged(case: Case, shown: Fitted) -> tuple[str, ...]:
+    """That the model cannot simulate some pushes at all, which then tell nothing."""
+    names = [p.name for p, vector in zip(case.problems, shown.predicted, strict=True) if diverged(vector)]
+    if not names:
+        return ()
+    return (
+        f"the model cannot simulate some pushes (the solver diverges, or no object stands so): {', '.join(names)}",
     )
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from physid_drake.diagnose import conclude
 from physid_drake.diagnose.confirm import Candidate
+from physid_drake.diagnose.steps import FAILED
 
 PUSHES, WINDOWS = 6, 5
 SIGMAS = np.array([1e-3, 1e-3, 1e-2])
@@ -168,3 +169,11 @@ def test_what_a_simulation_without_noise_differs_by_is_no_physics(monkeypatch, n
     clean.case.noise = SimpleNamespace(position=noise)
     clean.errors_before, clean.detected = errors(times), None  # times 1 mm and 10 mrad
     assert conclude._p_value(clean) == want
+
+
+def test_pushes_that_the_model_cannot_simulate_are_said():
+    case = SimpleNamespace(problems=[SimpleNamespace(name=name) for name in ("001", "002", "003")])
+    simulated, fallen = np.zeros(4), np.full(4, FAILED)
+    assert conclude._diverged(case, SimpleNamespace(predicted=(simulated,) * 3)) == ()
+    (said,) = conclude._diverged(case, SimpleNamespace(predicted=(fallen, simulated, fallen)))
+    assert said.endswith(": 001, 003")
