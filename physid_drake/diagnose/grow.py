@@ -11,6 +11,7 @@ from physid_drake.diagnose.conclude import class_of
 from physid_drake.diagnose.confirm import (
     A_LAW,
     ANOTHER_BASIN,
+    ENOUGH,
     EXPLAINED,
     FAR_OFF,
     HOP,
@@ -260,9 +261,11 @@ class Growth:
         """
         if not takes_most(plain, model):
             return model
-        best, ways = model, corners(self.fitter, model)
+        pool, best = self.fitter.case.pool, model
+        enough = pool.count + ENOUGH * len(self.fitter.case.problems)
+        ways = corners(self.fitter, model)
         for k, corner in enumerate(ways):
-            if best.reduced_chi2 <= EXPLAINED:
+            if best.reduced_chi2 <= EXPLAINED or pool.count > enough:
                 break
             self.tick(f"{best.state.effects[-1].kind.name} elsewhere", k, len(ways))
             start = of_other_shape(self.fitter, best, corner)

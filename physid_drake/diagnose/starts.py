@@ -116,9 +116,13 @@ def of_other_shape(fitter: Fitter, model: Fitted, corner: tuple[int, ...]) -> St
 
 
 def corners(fitter: Fitter, model: Fitted) -> list[tuple[int, ...]]:
-    """Of the cube around the shape of a model's last effect; none for an effect that has strengths only."""
+    """Of the cube around the shape of a model's last effect, those where it costs least first.
+
+    None for an effect that has strengths only.
+    """
     count = len(_shape(model.state.effects[-1], fitter))
-    return list(product((-1, 1), repeat=count)) if count else []
+    ways = list(product((-1, 1), repeat=count)) if count else []
+    return sorted(ways, key=lambda way: fitter.seen_from(model, of_other_shape(fitter, model, way)).cost_here)
 
 
 def _shape(one: EffectPoint, fitter: Fitter) -> list[int]:

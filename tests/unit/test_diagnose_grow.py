@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from physid_drake.diagnose import grow
-from physid_drake.diagnose.confirm import Candidate
+from physid_drake.diagnose.confirm import ENOUGH, Candidate
 from physid_drake.diagnose.evidence import unexplained
 from physid_drake.diagnose.model import State
 
@@ -203,13 +203,15 @@ def test_a_large_effect_may_leave_what_two_honest_laws_of_it_differ_by(before, a
 class Basins:
     """Fits that end in one of four places, by the corner from which they start; a renewed fit stays there."""
 
-    def __init__(self, scores, explains):
-        self.scores, self.explains, self.tried = scores, explains, 0
+    def __init__(self, scores, explains, rollouts=0):
+        self.scores, self.explains, self.tried, self.rollouts = scores, explains, 0, rollouts
+        self.case = SimpleNamespace(problems=[None], pool=SimpleNamespace(count=0))
 
     def fit(self, state, **how):
         if how.get("renew"):
             return self.at(state.own)
         self.tried += 1
+        self.case.pool.count += self.rollouts
         return self.at(state)
 
     def at(self, where):
@@ -243,6 +245,12 @@ def test_a_shape_that_does_not_explain_is_looked_for_elsewhere(four_corners, sco
     assert model.state.own == end
     assert basins.tried == tried
     assert (model is here) == (end == "here")
+
+
+def test_other_shapes_are_tried_as_long_as_rollouts_last(four_corners):
+    basins = Basins(dict.fromkeys(range(4), -500.0) | {"here": -500.0}, explains=-100.0, rollouts=0.6 * ENOUGH)
+    growth(basins)._of_other_shape(basins.at("here"), FAR_OFF)
+    assert basins.tried == 2
 
 
 def test_a_shape_that_explains_stays(four_corners):

@@ -75,7 +75,7 @@ def test_another_shape_is_a_corner_of_the_prior_around_it(name, shape):
     point = EffectPoint(kind=kind, point=middle, free=tuple(range(len(chart))), origin=np.zeros(len(chart)))
     fitter, model = Fitter(0.0), model_with(point_of(DRAG, 0.3), point)
     corners = starts.corners(fitter, model)
-    assert len(set(corners)) == (2 ** len(shape) if shape else 0)
+    assert len(corners) == len(set(corners)) == (2 ** len(shape) if shape else 0)
     for corner in corners:
         state = starts.of_other_shape(fitter, model, corner)
         assert not state.own[0].any()
@@ -111,3 +111,20 @@ def test_an_effect_without_a_place_is_tried_nowhere_else():
     best, *others = (scored(kind, family, 1.0, 9.0) for family in kind.families(AROUND))
     best.others = tuple(others)
     assert len(others) > 1 and starts.elsewhere(SimpleNamespace(around=AROUND), best) == []
+
+
+def test_the_corner_where_the_pushes_cost_least_comes_first(monkeypatch):
+    kind = effect_named("friction_patch")
+    names = [c.name for c in kind.chart(AROUND)]
+    middle = np.array(kind.families(AROUND)[0].point)
+    point = EffectPoint(kind=kind, point=middle, free=tuple(range(len(names))), origin=middle)
+    fitter = Fitter(0.0)
+    place = [names.index(name) for name in ("x", "y", "radius")]
+    best = middle[place] + [0.2, -0.2, 0.3]
+
+    def distance(model, state):
+        return SimpleNamespace(cost_here=float(np.abs(state.effects[-1].point[place] - best).sum()))
+
+    monkeypatch.setattr(fitter, "seen_from", distance)
+    corners = starts.corners(fitter, model_with(point))
+    assert (corners[0], corners[-1]) == ((1, -1, 1), (-1, 1, -1))
