@@ -145,7 +145,7 @@ class Growth:
                 steps += steps_of(pairs)
                 state = pairs[0].fitted.state
             tick(f"model with {' and '.join(step[0].name for step in steps)}", 0, 0)
-            model = self._model_with(state, base.fitted)
+            model = self._model_with(state, last.fitted)
             hopeless = len(steps) > 1 and model.reduced_chi2 > HOPELESS
             more = not hopeless and len(steps) < MOST_EFFECTS and pool.count < longest
             last = self._what_is_left(model, last.signatures, self.alpha if more else 0.0)
@@ -207,7 +207,8 @@ class Growth:
             self.tick(f"{other.name} in place of {step[0].name}", 0, 0)
             point = next(e for e in other.fitted.state.effects if e.kind.name == other.name)
             models[other.name] = self.fitter.fit(with_kth(point), rounds=4, like=model)
-        without = push_scores(grown.without.get(step[0].name) or self._without(step[0].name, model))
+        bare = grown.without.get(step[0].name) or self._without(step[0].name, model)
+        without = push_scores(bare)
         scores = {name: push_scores(one) for name, one in models.items()}
         best = ranked([dc.replace(c, gains=scores[c.name] - without) for c in (step[0], *rivals)])[0].name
         before = push_scores(plain)
@@ -217,7 +218,7 @@ class Growth:
         if best == step[0].name:
             return dc.replace(grown, steps=steps)
         self.tick(f"model with {best}", 0, 0)
-        swapped = self._model_with(models[best].state, plain)
+        swapped = self._model_with(models[best].state, bare)
         missed = [s for s in grown.base.signatures if s.kind.name == step[0].name]
         left = [s for s in grown.last.signatures if s.kind.name != best]
         return dc.replace(grown, steps=steps, last=Looked.at(swapped, (*left, *missed), self.rng), without={})
@@ -235,12 +236,12 @@ class Growth:
         again = self.fitter.fit(near.state, rounds=2, like=near, renew=True)
         return again if again.score - plain.score > ANOTHER_BASIN else None
 
-    def _model_with(self, state: State, plain: Fitted) -> Fitted:
+    def _model_with(self, state: State, before: Fitted) -> Fitted:
         """A fitted model with all coordinates of its effects free, all derivatives taken where it is.
 
         Args:
             state: where to start.
-            plain: the model without effects.
+            before: the model without its last effect, or without any.
         """
         fitter = self.fitter
         effects = tuple(e.freed(fitter.case) for e in state.effects)
@@ -251,15 +252,15 @@ class Growth:
             # The pushes' unknowns may have been imitating what is missing: once more, without them at first.
             far = fitter.fit(of_other_strength(fitter, best), rounds=4, careful=1, renew=True)
             best = max((best, far), key=lambda model: model.score)
-        return self._of_other_shape(best, plain)
+        return self._of_other_shape(best, before)
 
-    def _of_other_shape(self, model: Fitted, plain: Fitted) -> Fitted:
+    def _of_other_shape(self, model: Fitted, before: Fitted) -> Fitted:
         """A model fitted again from other shapes of its last effect, as long as none explains the pushes.
 
         A patch that is found half as large and beside where it is takes most of a mismatch away, and no step leads on
         from there. One that takes less away is not near.
         """
-        if not takes_most(plain, model):
+        if not takes_most(before, model):
             return model
         pool, best = self.fitter.case.pool, model
         enough = pool.count + ENOUGH * len(self.fitter.case.problems)
