@@ -260,7 +260,7 @@ class Growth:
         A patch that is found half as large and beside where it is takes most of a mismatch away, and no step leads on
         from there. One that takes less away is not near.
         """
-        if not takes_most(before, model):
+        if model.reduced_chi2 <= EXPLAINED or not takes_most(before, model):
             return model
         pool, best = self.fitter.case.pool, model
         enough = pool.count + ENOUGH * len(self.fitter.case.problems)

@@ -22,7 +22,7 @@ FORCE_SCATTER = 0.03
 UNKNOWN = "neither stated nor seen at rest"
 UNUSUAL = 3.0  # times the median scatter of rests: one of more is none
 SMALLEST = 1e-18  # m^2
-CHANCE = 0.05  # of pushes that agree on a jitter there is not; three of them cannot agree more than one in eight
+CHANCE = 0.05  # of pushes that agree on a jitter there is not; fewer than five cannot agree as surely
 CONTRADICTS = 1.5  # seen over stated: beyond it the stated figure is not believed
 
 
@@ -223,7 +223,7 @@ def _jitter(pushes: Sequence[Push]) -> float:
         squares.append((in_motion - at_rest) / float(stats.chi2.median(1)) / float(np.median(speed[fast])) ** 2)
         rougher.append(math.log(max(in_motion, SMALLEST) / max(at_rest, SMALLEST)))
     # A median of few samples is unsure; jitter is what the pushes agree on.
-    seen = len(squares) >= 3 and float(stats.wilcoxon(rougher, alternative="greater").pvalue) < CHANCE
+    seen = len(squares) >= 5 and float(stats.wilcoxon(rougher, alternative="greater").pvalue) < CHANCE
     return math.sqrt(max(0.0, float(np.median(squares)))) if seen else 0.0
 
 
