@@ -211,11 +211,8 @@ class Counted:
         begin = time.process_time()
         one = self.identifier
         predictions = one.pool.run([one._task(p, theta) for p in one.training])
-        parts = [
-            np.full(3 * len(p.times), 1e3) if r is None else whitened_residual(p, one.noise, r)
-            for p, r in zip(one.training, predictions, strict=True)
-        ]
-        residual = np.concatenate(parts)
+        pairs = zip(one.training, predictions, strict=True)
+        residual = np.concatenate([whitened_residual(p, one.noise, r) for p, r in pairs])
         self.told.append(float(0.5 * np.log(np.mean(residual**2))))
         self.busy += time.process_time() - begin
         return residual

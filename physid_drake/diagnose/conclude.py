@@ -22,6 +22,7 @@ from physid_drake.diagnose.confirm import (
 from physid_drake.diagnose.estimates import parameters_of, smallest, theta_of
 from physid_drake.diagnose.evidence import (
     MOST_OF_UNKNOWN,
+    MOST_SCATTER,
     TOO_SCATTERED,
     Evidence,
     confirmed,
@@ -35,7 +36,6 @@ from physid_drake.diagnose.looks import locate
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import regime_gains
 from physid_drake.diagnose.screen import cosine
-from physid_drake.diagnose.steps import diverged
 from physid_drake.diagnose.values import (
     Detectable,
     Diagnosis,
@@ -45,6 +45,7 @@ from physid_drake.diagnose.values import (
     Partly,
     Ranked,
 )
+from physid_drake.identify.misfit import diverged
 
 Array = NDArray[np.float64]
 
@@ -334,18 +335,28 @@ def _left(evidence: Evidence, verdict: str, after: Fitted, partly: Partly | None
     named = verdict in ("explained", "ambiguous")
     hidden = verdict == "unexplained" or (named and scatter_p_value(after) < TOO_SCATTERED)
     if after.reduced_chi2 <= EXPLAINED and hidden:
-        scatter = 100.0 * UNIT_SCATTER * after.state.scatter
-        trend = friction_trend(evidence.case, after)
-        follows = "" if trend is None else f", {trend}"
-        return f"what a friction would hide that scatters by {scatter:.0f} % from push to push{follows}"
+        return f"what a friction would hide that {_scatters(evidence.case, after)}"
     if after.reduced_chi2 <= EXPLAINED:
-        return "nothing beyond noise, scatter and the simulator's own error"
+        nothing = "nothing beyond noise, scatter and the simulator's own error"
+        unusual = verdict == "consistent" and UNIT_SCATTER * after.state.scatter > MOST_SCATTER
+        return (
+            f"{nothing}; but friction {_scatters(evidence.case, after)}, which may hide an effect"
+            if unusual
+            else nothing
+        )
     much = f"{math.sqrt(after.reduced_chi2):.1f} times what noise and the simulator's own error would leave"
     if partly is not None:
         return f"{much}; with {' and '.join(partly.effects)} {math.sqrt(partly.reduced_chi2):.1f} times"
     scores = (evidence.screening if after is evidence.plain else evidence.remaining).scores
     nearest = scores[0].kind.name if scores else "none"
     return f"{much}; the nearest of the catalogue is {nearest}, which does not account for it"
+
+
+def _scatters(case: Case, fitted: Fitted) -> str:
+    """By how much friction differs from push to push, and with what."""
+    scatter = 100.0 * UNIT_SCATTER * fitted.state.scatter
+    trend = friction_trend(case, fitted)
+    return f"scatters by {scatter:.0f} % from push to push" + ("" if trend is None else f", {trend}")
 
 
 def _percent(share: float) -> str:

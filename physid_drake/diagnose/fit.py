@@ -18,8 +18,9 @@ from physid_drake.diagnose.linear import (
     solve,
 )
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
-from physid_drake.diagnose.steps import FAILED, Step, diverged, effect_steps, own_steps, theta_steps, with_theta
+from physid_drake.diagnose.steps import Step, effect_steps, own_steps, theta_steps, with_theta
 from physid_drake.effects import Effect
+from physid_drake.identify.misfit import FAILED, diverged
 from physid_drake.identify.rollouts import Prediction, Task
 
 Array = NDArray[np.float64]

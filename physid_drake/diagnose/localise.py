@@ -21,8 +21,8 @@ from physid_drake.cell.solid import solid_of
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import Fitted
-from physid_drake.diagnose.steps import difference
 from physid_drake.effects import Effect, PushFacts
+from physid_drake.identify.misfit import difference
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.confirm import FAR_OFF
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import Fitted, State
-from physid_drake.diagnose.steps import difference
+from physid_drake.identify.misfit import difference
 from physid_drake.identify.problem import spec_of
 from physid_drake.identify.rollouts import RolloutPool
 from physid_drake.progress import Progress

@@ -19,8 +19,8 @@ from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve, told_frictions
 from physid_drake.diagnose.model import Fitted
-from physid_drake.diagnose.steps import difference
 from physid_drake.effects import Effect, Family
+from physid_drake.identify.misfit import difference
 from physid_drake.identify.rollouts import Task
 
 Array = NDArray[np.float64]

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.model import State
+from physid_drake.identify.misfit import difference
 
 Array = NDArray[np.float64]
 
 THETA_STEP = 0.006  # of the unit cube
 OWN_STEP = 0.5  # of the prior standard deviation
 SLOPE = 1e-6  # of the unit cube: a step for the slope of a parameter's scale
-FAILED = 1e4  # standard deviations: features of a rollout that diverged
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -29,16 +29,6 @@ class Step:
     def derivative(self, before: Array, after: Array) -> Array:
         """From features (m,) before and after the step."""
         return difference(before, after) / self.size
-
-
-def difference(before: Array, after: Array) -> Array:
-    """Between features (m,) of two rollouts; none where one of them diverged, which no slope describes."""
-    return np.zeros_like(before) if diverged(before) or diverged(after) else after - before
-
-
-def diverged(vector: Array) -> bool:
-    """Whether features (m,) are those of a rollout that diverged."""
-    return bool(np.all(vector == FAILED))
 
 
 def theta_steps(case: Case, state: State) -> list[Step]:

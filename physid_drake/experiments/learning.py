@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 from physid_drake.cell import CellConfig, SolverConfig
 from physid_drake.identify import Identifier
 from physid_drake.identify.config import SearchConfig, ThetaConfig
-from physid_drake.identify.misfit import whitened_residual
+from physid_drake.identify.misfit import FAILED, whitened_residual
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
 from physid_drake.identify.problem import PushProblem
 from physid_drake.identify.rollouts import Prediction, Task
@@ -35,7 +35,6 @@ METHODS: Final = (GREEDY, RANDOM, LEAST_SQUARES, ENTROPY)
 CANDIDATES: Final = 1000
 AS_IN_THE_PAPER: Final = ThetaConfig(bounds={"mass": [0.1, 0.9]})  # kg
 _STEP = 0.01  # of the unit cube, for differences
-_FAILED = 1e3  # standard deviations
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,15 +104,12 @@ class Learner:
 
     def residuals(self, problems: Sequence[PushProblem], theta: Array) -> Array:
         """Residuals (m,) of some pushes in standard deviations; large ones where a rollout diverged."""
-        parts = [
-            np.full(3 * len(p.times), _FAILED) if r is None else whitened_residual(p, self.noise, r)
-            for p, r in zip(problems, self.predictions(problems, theta), strict=True)
-        ]
-        return np.concatenate(parts)
+        pairs = zip(problems, self.predictions(problems, theta), strict=True)
+        return np.concatenate([whitened_residual(problem, self.noise, seen) for problem, seen in pairs])
 
     def misfit(self, residuals: Array) -> float:
         """Log of the rms of residuals (m,); inf where a rollout diverged."""
-        if residuals.max() >= _FAILED:
+        if residuals.max() >= FAILED:
             return float("inf")
         return float(0.5 * np.log(np.mean(residuals**2)))
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.identify.misfit import Whitener, model_error_columns, whitened_residual
+from physid_drake.identify.misfit import Whitener, difference, diverged, model_error_columns, whitened_residual
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
-from physid_drake.identify.polish import FAILED, NUISANCE_STEP, THETA_STEP, first_motion, prior_rows, rescaled
+from physid_drake.identify.polish import NUISANCE_STEP, THETA_STEP, first_motion, prior_rows, rescaled
 from physid_drake.identify.problem import Noise, PushProblem
-from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
+from physid_drake.identify.rollouts import RolloutPool, Task
 from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ class PushTerm:
     @property
     def diverged(self) -> bool:
         """Whether the rollout at ``u`` diverged: the term then says nothing."""
-        return bool(np.all(self.residual == FAILED))
+        return diverged(self.residual)
 
     def whitener(self, scatter: float) -> Whitener:
         """What marginalises the push's own unknowns, friction's with another scatter."""
@@ -89,7 +89,7 @@ def linearised(
                 point[j] = side[j]
                 theta = np.asarray(space.from_unit(point))
                 tasks.append(Task(problem=problem, theta=theta, nuisance=nuisance, values=rest))
-    rows = [_residual(task.problem, noise, p) for task, p in zip(tasks, pool.run(tasks), strict=True)]
+    rows = [whitened_residual(task.problem, noise, p) for task, p in zip(tasks, pool.run(tasks), strict=True)]
     terms, first = [], 0
     for problem in problems:
         nuisance = nuisance_of(problem, scatter)
@@ -98,16 +98,14 @@ def linearised(
         first += len(stack)
         here = stack[0]
         slopes = [
-            _difference(stack[1 + own + 2 * j], stack[2 + own + 2 * j]) / (high[j] - low[j]) for j in range(len(u))
+            difference(stack[1 + own + 2 * j], stack[2 + own + 2 * j]) / (high[j] - low[j]) for j in range(len(u))
         ]
-        columns = [_difference(here, row) / NUISANCE_STEP for row in stack[1 : 1 + own]]
+        columns = [difference(here, row) / NUISANCE_STEP for row in stack[1 : 1 + own]]
         errors = model_error_columns(problem, noise, first_motion(problem))
         terms.append(
             PushTerm(
                 problem=problem, nuisance=nuisance, u=u.copy(), scatter=scatter,
-                residual=np.full(len(errors), FAILED) if here is None else here,
-                slope=np.column_stack(_filled(slopes, errors)),
-                own=np.column_stack([*_filled(columns, errors), errors]),
+                residual=here, slope=np.column_stack(slopes), own=np.column_stack([*columns, errors]),
             )
         )  # fmt: skip
     return terms
@@ -118,16 +116,3 @@ def prior_slope(space: ParameterSpace) -> Array:
     middle = np.full(space.dimension, 0.5)
     rows = [prior_rows(space, space.from_unit(middle + 0.25 * step)) for step in np.eye(space.dimension)]
     return np.asarray(4.0 * (np.array(rows) - prior_rows(space, space.from_unit(middle))).T)
-
-
-def _residual(problem: PushProblem, noise: Noise, prediction: Prediction | None) -> Array | None:
-    return None if prediction is None else whitened_residual(problem, noise, prediction)
-
-
-def _difference(low: Array | None, high: Array | None) -> Array:
-    """Their difference; of nothing where one of the two diverged."""
-    return np.zeros(0) if low is None or high is None else np.asarray(high - low)
-
-
-def _filled(columns: Sequence[Array], like: Array) -> list[Array]:
-    return [column if len(column) else np.zeros(len(like)) for column in columns]

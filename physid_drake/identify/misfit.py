@@ -13,21 +13,35 @@ from physid_drake.identify.rollouts import Prediction
 
 Array = NDArray[np.float64]
 
+FAILED = 1e4  # standard deviations: of a rollout that diverged, in all that is compared
 
-def whitened_residual(problem: PushProblem, noise: Noise, prediction: Prediction) -> Array:
+
+def whitened_residual(problem: PushProblem, noise: Noise, prediction: Prediction | None) -> Array:
     """Prediction minus recording, in standard deviations, with the noise's correlation taken out.
 
     Args:
         problem: the push.
         noise: of one sample.
-        prediction: of the same samples.
+        prediction: of the same samples; None of a rollout that diverged.
 
     Returns:
-        (3 n + 2 k,) x, y, yaw of all samples, then the force components.
+        (3 n + 2 k,) x, y, yaw of all samples, then the force components; all ``FAILED`` where the rollout diverged.
     """
+    if prediction is None:
+        return np.full(3 * len(problem.times) + 2 * len(problem.force_times), FAILED)
     poses = (prediction.poses - problem.poses) / noise.sigmas
     forces = (prediction.forces - problem.forces) / problem.force_std[:, None]
     return np.concatenate([_decorrelate(problem.times, poses, noise.correlation).T.ravel(), forces.T.ravel()])
+
+
+def diverged(vector: Array) -> bool:
+    """Whether what is compared of a rollout (m,) says that it diverged."""
+    return bool(np.all(vector == FAILED))
+
+
+def difference(before: Array, after: Array) -> Array:
+    """Between two rollouts, each (m,); none where one of them diverged, which no slope describes."""
+    return np.zeros_like(before) if diverged(before) or diverged(after) else after - before
 
 
 def _decorrelate(times: Array, residual: Array, correlation: float) -> Array:

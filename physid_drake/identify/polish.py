@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from physid_drake.identify.misfit import Whitener, model_error_columns, whitened_residual
+from physid_drake.identify.misfit import Whitener, difference, model_error_columns, whitened_residual
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
 from physid_drake.identify.problem import Noise, PushProblem
-from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
+from physid_drake.identify.rollouts import RolloutPool, Task
 from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
@@ -22,7 +22,6 @@ NUISANCE_STEP = 0.5  # of the prior standard deviation
 ROUNDS = 2  # of linearising the pushes' own unknowns
 LARGEST_SCATTER = 0.2
 SMALLEST_SCATTER = 2e-3
-FAILED = 1e3  # standard deviations: residual of a rollout that diverged
 SCATTER_STEPS = 2
 SCATTER_WEIGHT = 4.0
 SCATTER_PUSHES = 4  # fewer pushes than this do not tell their scatter
@@ -107,17 +106,17 @@ class Polisher:
     def _nuisances(self) -> list[Nuisance]:
         return [nuisance_of(problem, self._scatter) for problem in self._problems]
 
-    def _residual_of(self, problem: PushProblem, prediction: Prediction | None) -> Array:
-        if prediction is None:
-            return np.full(3 * len(problem.times) + 2 * len(problem.force_times), FAILED)
-        return whitened_residual(problem, self._noise, prediction)
-
-    def _residuals(self, theta: Array) -> list[Array]:
-        tasks = [
+    def _tasks(self, theta: Array) -> list[Task]:
+        """One rollout per push, nothing known of the pushes' own unknowns."""
+        return [
             Task(problem=p, theta=theta, nuisance=n, values=np.zeros(len(n.names)))
             for p, n in zip(self._problems, self._nuisances(), strict=True)
         ]
-        return [self._residual_of(t.problem, r) for t, r in zip(tasks, self._pool.run(tasks), strict=True)]
+
+    def _residuals(self, tasks: Sequence[Task]) -> list[Array]:
+        """Whitened residuals (m_i,) of rollouts."""
+        pairs = zip(tasks, self._pool.run(tasks), strict=True)
+        return [whitened_residual(task.problem, self._noise, prediction) for task, prediction in pairs]
 
     def _linearise(self, theta: Array) -> list[Whitener]:
         """Jacobians of each push with respect to its own unknowns, by one extra rollout per unknown."""
@@ -128,21 +127,21 @@ class Polisher:
             tasks += [Task(problem=problem, theta=theta, nuisance=nuisance, values=step) for step in steps]
             owners += [i] * len(steps)
         rows: list[list[Array]] = [[] for _ in self._problems]
-        for i, task, prediction in zip(owners, tasks, self._pool.run(tasks), strict=True):
-            rows[i].append(self._residual_of(task.problem, prediction))
+        for i, row in zip(owners, self._residuals(tasks), strict=True):
+            rows[i].append(row)
         return [self._whitener(problem, stack) for problem, stack in zip(self._problems, rows, strict=True)]
 
     def _whitener(self, problem: PushProblem, stack: list[Array]) -> Whitener:
-        columns = (np.array(stack[1:]) - stack[0]).T / NUISANCE_STEP
+        columns = [difference(stack[0], row) / NUISANCE_STEP for row in stack[1:]]
         touched = first_motion(problem)
-        return Whitener.of(np.column_stack([columns, model_error_columns(problem, self._noise, touched)]))
+        return Whitener.of(np.column_stack([*columns, model_error_columns(problem, self._noise, touched)]))
 
     def _fit(self, theta: Array, whiteners: list[Whitener]) -> Array:
         space = self._space
 
         def cost(u: Array) -> Array:
             point = space.from_unit(u)
-            return self._stacked(whiteners, self._residuals(point), point)
+            return self._stacked(whiteners, self._residuals(self._tasks(point)), point)
 
         def slope(u: Array) -> Array:
             return self._jacobian(u, whiteners)
@@ -156,26 +155,25 @@ class Polisher:
         return theta_hat
 
     def _jacobian(self, u: Array, whiteners: list[Whitener]) -> Array:
-        """Central differences of all marginal residuals with respect to the unit cube."""
-        nuisances = self._nuisances()
-        points = []
+        """Slope (m, d) of ``_stacked`` with respect to the unit cube, by central differences.
+
+        A step whose rollout diverges counts as one that changes nothing.
+        """
+        sides = []
         for j in range(len(u)):
             low, high = u.copy(), u.copy()
             low[j], high[j] = max(0.0, u[j] - THETA_STEP), min(1.0, u[j] + THETA_STEP)
-            points += [low, high]
-        tasks = [
-            Task(problem=p, theta=self._space.from_unit(point), nuisance=n, values=np.zeros(len(n.names)))
-            for point in points
-            for p, n in zip(self._problems, nuisances, strict=True)
-        ]
-        predictions = self._pool.run(tasks)
-        count = len(self._problems)
-        rows = []
-        for k, point in enumerate(points):
-            part = predictions[k * count : (k + 1) * count]
-            residuals = [self._residual_of(p, r) for p, r in zip(self._problems, part, strict=True)]
-            rows.append(self._stacked(whiteners, residuals, self._space.from_unit(point)))
-        columns = [(rows[2 * j + 1] - rows[2 * j]) / (points[2 * j + 1][j] - points[2 * j][j]) for j in range(len(u))]
+            sides.append((low, high))
+        tasks = [task for pair in sides for u_side in pair for task in self._tasks(self._space.from_unit(u_side))]
+        residuals, count = self._residuals(tasks), len(self._problems)
+        columns = []
+        for j, (low, high) in enumerate(sides):
+            before, after = (residuals[k * count : (k + 1) * count] for k in (2 * j, 2 * j + 1))
+            # Marginal residuals are linear in the residuals, and priors in the unit cube.
+            changes = self._marginal(whiteners, [difference(a, b) for a, b in zip(before, after, strict=True)])
+            prior = prior_rows(self._space, self._space.from_unit(high))
+            prior = prior - prior_rows(self._space, self._space.from_unit(low))
+            columns.append(np.concatenate([*changes, prior]) / (high[j] - low[j]))
         return np.column_stack(columns)
 
     def _stacked(self, whiteners: list[Whitener], residuals: list[Array], theta: Array) -> Array:
@@ -183,13 +181,16 @@ class Polisher:
 
         Otherwise a misfit that no theta explains would overrule what a scale said of the mass.
         """
+        return np.concatenate([*self._marginal(whiteners, residuals), prior_rows(self._space, theta)])
+
+    def _marginal(self, whiteners: list[Whitener], residuals: list[Array]) -> list[Array]:
+        """Marginal residuals (m_i + k_i,) with the widened noise."""
         scale = 1.0 / np.sqrt(self._inflation)
-        marginal = [scale * w.apply(r) for w, r in zip(whiteners, residuals, strict=True)]
-        return np.concatenate([*marginal, prior_rows(self._space, theta)])
+        return [scale * w.apply(r) for w, r in zip(whiteners, residuals, strict=True)]
 
     def _learn_scales(self, theta: Array, whiteners: list[Whitener]) -> list[Whitener]:
         """Learn the noise's inflation and the scatter of friction from what is left; the whiteners that follow."""
-        residuals = self._residuals(theta)
+        residuals = self._residuals(self._tasks(theta))
         chi2 = sum(float((w.apply(r) ** 2).sum()) for w, r in zip(whiteners, residuals, strict=True))
         degrees = max(1, sum(len(r) for r in residuals) - len(theta))
         self._inflation = max(1.0, chi2 / degrees)
@@ -202,7 +203,7 @@ class Polisher:
         return [rescaled(w, k, self._scatter / old) for w, k in zip(whiteners, places, strict=True)]
 
     def _result(self, theta: Array, whiteners: list[Whitener], rollouts: int) -> Polished:
-        residuals = self._residuals(theta)
+        residuals = self._residuals(self._tasks(theta))
         marginal = [w.apply(r) for w, r in zip(whiteners, residuals, strict=True)]
         unknowns = []
         for nuisance, whitener, residual in zip(self._nuisances(), whiteners, residuals, strict=True):

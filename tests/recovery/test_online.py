@@ -128,7 +128,9 @@ def test_a_term_is_the_polishers_own_linearisation(recording, learned):
     term = linearised(one.pool, [problem], belief.noise, belief.mean, belief.scatter)[0]
     residual, slope = term.marginal(belief.mean, belief.scatter)
     np.testing.assert_allclose(np.concatenate([slope, prior_slope(one.thetas.space)]), wanted, atol=1e-6)
-    np.testing.assert_allclose(residual, whiteners[0].apply(polisher._residuals(theta)[0]), atol=1e-9)
+    np.testing.assert_allclose(
+        residual, whiteners[0].apply(polisher._residuals(polisher._tasks(theta))[0]), atol=1e-9
+    )
 
 
 def test_a_push_whose_rollouts_diverge_changes_nothing_but_is_counted(recording, learned, monkeypatch):

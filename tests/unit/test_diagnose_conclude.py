@@ -7,7 +7,7 @@ import pytest
 
 from physid_drake.diagnose import conclude
 from physid_drake.diagnose.confirm import Candidate
-from physid_drake.diagnose.steps import FAILED
+from physid_drake.identify.misfit import FAILED
 
 PUSHES, WINDOWS = 6, 5
 SIGMAS = np.array([1e-3, 1e-3, 1e-2])
@@ -106,7 +106,10 @@ def test_a_model_that_predicts_left_out_pushes_worse_explains_nothing(monkeypatc
     for trend, said in ((None, hides), ("less the faster it is pushed", f"{hides}, less the faster it is pushed")):
         monkeypatch.setattr(conclude, "friction_trend", lambda case, after, trend=trend: trend)
         assert conclude._left(worse, "unexplained", hidden, None) == said
-    assert conclude._left(worse, "consistent", hidden, None).startswith("nothing beyond noise")
+    said = conclude._left(worse, "consistent", hidden, None)
+    assert said.startswith("nothing beyond noise") and said.endswith("faster it is pushed, which may hide an effect")
+    usual = SimpleNamespace(reduced_chi2=1.2, state=SimpleNamespace(scatter=2.0))
+    assert conclude._left(worse, "consistent", usual, None).endswith("the simulator's own error")
     # Beside a name, too, where nobody states how much friction scatters.
     for p_value, said in ((0.001, hides), (0.1, "nothing beyond noise")):
         monkeypatch.setattr(conclude, "friction_trend", lambda case, after: None)

@@ -13,11 +13,11 @@ from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint
 from physid_drake.diagnose.plain import coarse, search_theta
 from physid_drake.diagnose.screen import signatures
-from physid_drake.diagnose.steps import FAILED, difference
 from physid_drake.effects.body import ComOffset
 from physid_drake.effects.drag import QuadraticDrag
 from physid_drake.effects.fields import Tether
 from physid_drake.identify.config import ThetaConfig
+from physid_drake.identify.misfit import FAILED, difference
 
 
 @pytest.fixture(scope="module")
