@@ -60,10 +60,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m physid_drake.run_cell", description=__doc__)
     parser.add_argument(
-        "config", nargs="?", metavar="CONFIG", help="FILE or FILE:SCENARIO (default: the shipped eraser)"
-    )
+        "config", nargs="?", metavar="CONFIG",
+        help="FILE or FILE:SCENARIO (default: the shipped eraser; with --recording, the defaults)",
+    )  # fmt: skip
     parser.add_argument("--recording", metavar="FOLDER", help="the pushes, instead of the scenario's")
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where results go (default: runs/<scenario>)")
+    parser.add_argument(
+        "--out", type=Path, metavar="FOLDER",
+        help="where results go (default: runs/<scenario>; with --recording and no CONFIG, runs/<recording>)",
+    )  # fmt: skip
     parser.add_argument("--seed", type=int, metavar="N", help="of everything random, instead of the scenario's")
     parser.add_argument("--set", dest="override", metavar="YAML", help="such as '{search: {budget: 20}}'")
     parser.add_argument("--no-diagnosis", action="store_true", help="identify only")

@@ -16,6 +16,7 @@ from physid_drake.errors import ConfigError
 from physid_drake.identify.theta import HEAVIEST, LIGHTEST
 from physid_drake.policies import POLICIES
 from physid_drake.resources import shipped
+from physid_drake.run_folder import named_after
 from physid_drake.scenario_schema import Scenario
 from physid_drake.search import SEARCHES
 
@@ -29,7 +30,8 @@ def load_scenario(
     """Read a scenario.
 
     Args:
-        config: ``FILE`` or ``FILE:NAME``; a bare name is looked up among the shipped ones. None is the default.
+        config: ``FILE`` or ``FILE:NAME``; a bare name is looked up among the shipped ones. None is the first shipped
+            one; of a recording that is named, the defaults, since a shipped scenario's plan suits its own recording.
         override: one line of YAML laid over it, such as ``{search: {budget: 20}}``.
         recording: instead of the scenario's.
         seed: instead of the scenario's.
@@ -40,13 +42,10 @@ def load_scenario(
     Raises:
         ConfigError: naming the file and the key.
     """
-    path, name = _locate(config or DEFAULT)
-    scenarios = _read_yaml(path)
-    if name is None:
-        name = next(iter(scenarios))
-    if name not in scenarios:
-        raise ConfigError(f"config '{path}': there is no scenario '{name}'; it holds {', '.join(scenarios)}.")
-    scenario = _typed(scenarios[name], Scenario(), f"config '{path}', scenario '{name}'")
+    if config is None and recording is not None:
+        name, scenario, where = named_after(Path(recording).resolve().name), Scenario(), "the defaults"
+    else:
+        name, scenario, where = _named_scenario(config or DEFAULT)
     if override is not None:
         try:
             extra = yaml.safe_load(override)
@@ -57,7 +56,19 @@ def load_scenario(
         scenario.recording = recording
     if seed is not None:
         scenario.seed = seed
-    return name, _checked(scenario, f"config '{path}', scenario '{name}'")
+    return name, _checked(scenario, where)
+
+
+def _named_scenario(config: str) -> tuple[str, Scenario, str]:
+    """A scenario's name, its values, and where they are from, in words."""
+    path, name = _locate(config)
+    scenarios = _read_yaml(path)
+    if name is None:
+        name = next(iter(scenarios))
+    if name not in scenarios:
+        raise ConfigError(f"config '{path}': there is no scenario '{name}'; it holds {', '.join(scenarios)}.")
+    where = f"config '{path}', scenario '{name}'"
+    return name, _typed(scenarios[name], Scenario(), where), where
 
 
 def dump_scenario(name: str, scenario: Scenario) -> str:

@@ -21,7 +21,7 @@ def grid_of_places(around: Surroundings) -> tuple[Array, float]:
 
 
 def close_grid_of_places(around: Surroundings) -> tuple[Array, float]:
-    """A grid of places (n, 2) [m] not much further apart than the object is wide, as far as few do; their spacing."""
+    """A grid of places (n, 2) [m] no further apart than 1.2 radii of the object, as far as few do; their spacing."""
     low, high = around.region
     wanted = (math.ceil(side / (CLOSE * around.radius)) for side in (high - low).tolist())
     columns, rows = (min(max(count, FEWEST), MOST) for count in wanted)

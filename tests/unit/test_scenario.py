@@ -37,6 +37,15 @@ def test_without_a_config_the_shipped_eraser_is_read():
     assert load_scenario("eraser", None) == load_scenario("eraser.yaml", None)
 
 
+def test_a_recording_without_a_config_has_the_defaults_under_its_own_name():
+    """The shipped eraser's plan starts and ends on the eraser's table."""
+    name, scenario = load_scenario(None, "{search: {budget: 7}}", recording="somewhere/my pushes/", seed=3)
+    want = Scenario(recording="somewhere/my pushes/", seed=3)
+    want.search.budget = 7
+    assert (name, scenario) == ("my_pushes", want)
+    assert load_scenario("eraser", None, recording="elsewhere")[1].plan == load_scenario("eraser", None)[1].plan
+
+
 def test_the_first_scenario_is_taken_where_none_is_named(tmp_path):
     file = config(tmp_path, "second: {seed: 2}\nfirst: {seed: 1}\n")
     assert load_scenario(file, None)[0] == "second"
