@@ -46,7 +46,8 @@ from physid_drake.identify.misfit import Whitener
 from physid_drake.identify.nuisance import FIRST_SCATTER
 from physid_drake.identify.polish import ROUNDS, SCATTER_PUSHES, Polished, new_scatter, scatter_freedom
 from physid_drake.identify.theta import theta_map
-from physid_drake.model import Model, load_model
+from physid_drake.model import Model
+from physid_drake.model_reading import load_model
 from physid_drake.plan import DistanceToGoal, Situation, plan
 from physid_drake.plan.draws import draws_of
 from physid_drake.plan.story import Spread, spread_of

@@ -3,7 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from physid_drake.model import Model, load_model
+    from physid_drake.model import Model
+    from physid_drake.model_reading import load_model
 
 __all__ = ["Model", "load_model"]
 
@@ -11,7 +12,7 @@ __all__ = ["Model", "load_model"]
 def __getattr__(name: str) -> Any:
     # Drake takes a second to import, which those who only read recordings need not wait for.
     if name in __all__:
-        from physid_drake import model  # noqa: PLC0415
+        from physid_drake import model_reading  # noqa: PLC0415
 
-        return getattr(model, name)
+        return getattr(model_reading, name)
     raise AttributeError(f"module 'physid_drake' has no attribute '{name}'")

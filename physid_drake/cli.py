@@ -70,6 +70,8 @@ def _run_inspect(arguments: argparse.Namespace) -> int:
     from physid_drake.report.inspection import draw_pushes, inspection_table, warning_lines  # noqa: PLC0415
     from physid_drake.report.terminal import terminal  # noqa: PLC0415
 
+    if arguments.out is not None and not arguments.out.suffix:
+        raise ConfigError(f"--out must name a picture, such as pushes.png, but is '{arguments.out}'.")
     recording = read_recording(arguments.folder)
     terminal().print(inspection_table(recording))
     for line in warning_lines(recording):
@@ -154,8 +156,10 @@ def _register_prove(subparsers: Subparsers) -> None:
 def _run_prove(arguments: argparse.Namespace) -> int:
     # Matplotlib takes half a second to import and Drake a second, which the other commands need not wait for.
     if arguments.real is not None:
-        if arguments.open:
-            raise ConfigError("--open is of sealed worlds: leave it out with --real.")
+        given = {"--open": arguments.open, "--quick": arguments.quick, "--worlds": arguments.worlds is not None,
+                 "--kind": arguments.kind is not None}  # fmt: skip
+        for flag in (flag for flag, is_given in given.items() if is_given):
+            raise ConfigError(f"{flag} is of sealed worlds: leave it out with --real.")
         from physid_drake.run_prove_real import run_real  # noqa: PLC0415
 
         return run_real(arguments)

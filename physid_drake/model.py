@@ -15,10 +15,9 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from physid_drake.cell import Body, Cell, CellConfig, HandPath, Motion, Start
 from physid_drake.cell.cell import holding_body
-from physid_drake.cell.config import ContactConfig, SolverConfig
 from physid_drake.cell.diagram import Scene
 from physid_drake.cell.plant_state import PlantState
-from physid_drake.effects import Effect, effect_named
+from physid_drake.effects import Effect
 from physid_drake.effects.rollout import (
     Geometry,
     Rollout,
@@ -37,7 +36,7 @@ Array = NDArray[np.float64]
 
 FORMAT = "physid-model/1"
 ROUND_OFF = 1e-9  # of a correlation's roots
-_SHAPES: dict[str, type[Box] | type[Cylinder] | type[Prism] | type[MeshShape]] = {
+SHAPES: dict[str, type[Box] | type[Cylinder] | type[Prism] | type[MeshShape]] = {
     "box": Box, "cylinder": Cylinder, "prism": Prism, "mesh": MeshShape,
 }  # fmt: skip
 
@@ -81,7 +80,8 @@ class Correlation:
             raise ConfigError(f"correlation: {count} names need a matrix of {count} rows of {count} numbers.")
         matrix = np.array(self.matrix, dtype=np.float64).reshape(count, count)
         even = np.array_equal(matrix, matrix.T) and np.array_equal(np.diag(matrix), np.ones(count))
-        if not even or (count and float(np.linalg.eigvalsh(matrix)[0]) < -ROUND_OFF):
+        known = even and bool(np.isfinite(matrix).all())
+        if not known or (count and float(np.linalg.eigvalsh(matrix)[0]) < -ROUND_OFF):
             raise ConfigError("correlation: the matrix must be symmetric, 1 on its diagonal, without negative roots.")
 
     def among(self, names: Sequence[str]) -> Array:
@@ -110,6 +110,7 @@ class Model:
         correlation: of what has an interval of two numbers; None where it is not known.
         hand_axes: (2, 2) the axes of P, as columns, along x and y of W, if all pushes had about the same.
         hand_turns: whether the hand turns with its pushes: then ``hand_axes`` are along and across a push's heading.
+        tip_height: of P above the table in what it was learnt from [m]; None where nobody knows.
     """
 
     recording: str
@@ -123,6 +124,7 @@ class Model:
     correlation: Correlation | None = None
     hand_axes: Axes = AS_W
     hand_turns: bool = False
+    tip_height: float | None = None
 
     def axes_on(self, path: HandPath | None) -> Array:
         """The axes (2, 2) of P, as columns, along x and y of W, in a push along a path."""
@@ -158,6 +160,8 @@ class Model:
             content["hand_axes"] = _plain(self.hand_axes)
         if self.hand_turns:
             content["hand_turns"] = True
+        if self.tip_height is not None:
+            content["tip_height_m"] = self.tip_height
         return str(yaml.safe_dump(content, sort_keys=False))
 
 
@@ -246,91 +250,12 @@ def turned(angle: float) -> Array:
     return np.array([[c, -s], [s, c]])
 
 
-def load_model(path: Path | str) -> Model:
-    """Read ``model.yaml``.
-
-    Args:
-        path: the file, or the folder of a diagnosis that holds it.
-
-    Raises:
-        ConfigError: if it cannot be read, is of another version, or holds what no model has.
-    """
-    file = Path(path)
-    file = file / "model.yaml" if file.is_dir() else file
-    try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise ConfigError(f"model '{file}': there is no such file.") from error
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f"model '{file}': cannot be read: {' '.join(str(error).split())}.") from error
-    found = content.get("format") if isinstance(content, dict) else None
-    if found != FORMAT:
-        raise ConfigError(f"model '{file}': the format must be '{FORMAT}', but is {found!r}; diagnose again.")
-    try:
-        return _model(content, file)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ConfigError(f"model '{file}': {type(error).__name__}: {' '.join(str(error).split())}.") from error
-
-
-def _model(content: dict[str, Any], file: Path) -> Model:
-    cell = content["cell"]
-    config = CellConfig(
-        **{**cell, "contact": ContactConfig(**cell["contact"]), "solver": SolverConfig(**cell["solver"])}
-    )  # fmt: skip
-    theta: dict[str, Any] = {name: np.array(v) if isinstance(v, list) else v for name, v in content["theta"].items()}
-    (x0, y0), (x1, y1) = content["table_m"]
-    return Model(
-        recording=str(content["recording"]),
-        shape=_load_shape(content["object"], file.parent),
-        hand_radius=content["hand_radius_m"],
-        table=((float(x0), float(y0)), (float(x1), float(y1))),
-        config=config,
-        body=Body(**theta),
-        effects=tuple(_load_effect(e) for e in content["effects"]),
-        intervals=content.get("intervals", {}),
-        correlation=_load_correlation(content),
-        hand_axes=_tuples(content.get("hand_axes", _plain(AS_W))),
-        hand_turns=bool(content.get("hand_turns", False)),
-    )
-
-
-def _load_correlation(content: dict[str, Any]) -> Correlation | None:
-    found = content.get("correlation")
-    if found is None:
-        return None
-    unknown = [name for name in found["names"] if name not in content.get("intervals", {})]
-    if unknown:
-        raise ConfigError(f"correlation: '{unknown[0]}' has no interval.")
-    rows = tuple(tuple(float(v) for v in row) for row in found["matrix"])
-    return Correlation(names=tuple(str(name) for name in found["names"]), matrix=rows)
-
-
-def _load_effect(content: dict[str, Any]) -> Effect:
-    kind = effect_named(str(content["name"]))
-    parameters = {
-        name: tuple(tuple(row) for row in v) if isinstance(v, list) else float(v)
-        for name, v in content["parameters"].items()
-    }
-    return kind(**parameters)
-
-
 def _dump_shape(shape: Shape) -> dict[str, Any]:
-    kind = next(name for name, cls in _SHAPES.items() if isinstance(shape, cls))
+    kind = next(name for name, cls in SHAPES.items() if isinstance(shape, cls))
     fields = {f.name: getattr(shape, f.name) for f in dc.fields(shape)}
     if isinstance(shape, MeshShape):
         fields["file"] = str(Path(shape.file).resolve())
     return {"shape": kind, **_plain(fields)}
-
-
-def _load_shape(content: dict[str, Any], folder: Path) -> Shape:
-    fields = {k: _tuples(v) for k, v in content.items() if k != "shape"}
-    if content["shape"] == "mesh":
-        fields["file"] = folder / str(fields["file"])
-    return _SHAPES[content["shape"]](**fields)
-
-
-def _tuples(value: Any) -> Any:
-    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
 
 
 def _plain(value: Any) -> Any:

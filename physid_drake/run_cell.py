@@ -17,6 +17,7 @@ from physid_drake.diagnose.memory import Memory
 from physid_drake.errors import ConfigError, PhysidError
 from physid_drake.identify import Identification, Identifier, OnlineIdentifier
 from physid_drake.identify.nuisance import nuisance_of
+from physid_drake.identify.problem import usual_tip_height
 from physid_drake.identify.rollouts import Task, simulate
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
 from physid_drake.plan import Plan
@@ -33,12 +34,15 @@ from physid_drake.report.tables import accuracy_table, estimates_table, verdict
 from physid_drake.report.terminal import terminal
 from physid_drake.run_diagnose import ALPHA, STATE, recording_folder, run_case, show, write
 from physid_drake.run_folder import RunFolder, made_with, versions
+from physid_drake.run_plan import FILES as PLAN
 from physid_drake.run_plan import forget as forget_plan
 from physid_drake.run_plan import write as write_plan
 from physid_drake.scenario import dump_scenario, load_scenario
 from physid_drake.scenario_schema import Scenario
 
 BELIEF = "belief.npz"  # of an interrupted identification
+DIAGNOSIS = ("diagnosis.json", "diagnosis.html", "scene.html")
+RESULTS = ("result.json", "page.html", "model.yaml", *DIAGNOSIS, *PLAN)
 SHOWN = 12  # pushes in the animation, held-out ones first
 
 
@@ -92,26 +96,21 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     planner = None if arguments.no_plan else _planner(scenario, recording, identifier, console)
     # A comment, so that the file is still a configuration that can be given to this command.
     made_by = f"{dump_scenario(name, scenario)}# of recording {digest_of(recording)}\n# by {made_with()}\n"
-    folder = RunFolder.open(out, made_by, states=(BELIEF, STATE))
+    folder = RunFolder.open(out, made_by, files=(BELIEF, STATE, *RESULTS))
     stage = None if arguments.no_view else _live(recording, console)
     result, plan = _identify(identifier, planner, scenario, recording, console)
-    console.print()
-    console.print(estimates_table(result, recording.name))
-    if result.cells is not None:
-        console.print(cells_table(result.cells))
-    console.print(accuracy_table(result))
-    console.print(verdict(result))
-    if identifier.pool.diverged:
-        console.print(f"{identifier.pool.diverged} of {identifier.pool.count} rollouts diverged and count as failed.")
+    tip_height = usual_tip_height(identifier.problems)
+    model = identified_model(result, identifier.pool.spec, recording.name, tip_height=tip_height)
     stage = stage or Stage(recording)
     marks = stage.play(_scenes(result, identifier, recording))
     note = f"{recording.description} Seed {scenario.seed}; {identifier.pool.count} rollouts."
     page = result_page(stage.meshcat.StaticHtml(), result, name=recording.name, marks=marks, note=note, plan=plan)
     folder.write("page.html", page)
     folder.write("result.json", result_json(result, recording, scenario.seed, versions()))
-    for stale in ("diagnosis.json", "diagnosis.html", "scene.html"):  # an earlier run's, of another model
+    for stale in DIAGNOSIS:  # an earlier run's, of another model
         folder.forget(stale)
-    folder.write("model.yaml", identified_model(result, identifier.pool.spec, recording.name).dump())
+    folder.write("model.yaml", model.dump())
+    _show(result, identifier, recording, console)  # what is printed may go to a pipe that closes
     console.print(f"written: result.json, page.html and model.yaml in {folder.path}")
     _keep_plan(plan, scenario, folder, console)
     if not arguments.no_diagnosis:
@@ -120,13 +119,24 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     _keep_serving(arguments.no_view, stage, console)
 
 
+def _show(result: Identification, identifier: Identifier, recording: Recording, console: Console) -> None:
+    console.print()
+    console.print(estimates_table(result, recording.name))
+    if result.cells is not None:
+        console.print(cells_table(result.cells))
+    console.print(accuracy_table(result))
+    console.print(verdict(result))
+    if identifier.pool.diverged:
+        console.print(f"{identifier.pool.diverged} of {identifier.pool.count} rollouts diverged and count as failed.")
+
+
 def _keep_plan(plan: Plan | None, scenario: Scenario, folder: RunFolder, console: Console) -> None:
     """Show and write the plan; an earlier run's is dropped."""
     forget_plan(folder)
     if plan is None:
         return
-    console.print(plan_table(plan))
     write_plan(folder, plan, seed=scenario.seed, page=None)
+    console.print(plan_table(plan))
     console.print(f"written: plan.json and {', '.join(push_files(plan))} in {folder.path}")
 
 
@@ -178,6 +188,7 @@ def _identify(
     identifier: Identifier, planner: Planner | None, scenario: Scenario, recording: Recording, console: Console
 ) -> tuple[Identification, Plan | None]:
     """Wire and run the diagram: the recording's player, the system that learns from its pushes, and the policy's."""
+    last = len(recording.pushes) * PUSH_PERIOD  # what the last push teaches is seen at the next update
     with progress_bar(console) as bar:
         builder = DiagramBuilder()
         player = builder.AddSystem(RecordingPlayer(recording.pushes))
@@ -192,13 +203,12 @@ def _identify(
         policy = None
         if planner is not None:
             policy = builder.AddSystem(
-                PolicySystem(lambda known: planner.run(known, bar), dimension=planner.dimension)
+                PolicySystem(lambda known: planner.run(known, bar), dimension=planner.dimension, begin=last)
             )
             identified = system.GetOutputPort("identification.estimated")
             builder.Connect(identified, policy.GetInputPort("identification.estimated"))
         simulator = Simulator(builder.Build())
-        # One period more: what is identified at an update is seen by the policy at the next.
-        simulator.AdvanceTo((len(recording.pushes) + 1) * PUSH_PERIOD)
+        simulator.AdvanceTo(last + PUSH_PERIOD)
         root = simulator.get_context()
         result: Identification | None = system.identification(system.GetMyContextFromRoot(root))
         plan = None if policy is None else policy.plan(policy.GetMyContextFromRoot(root))

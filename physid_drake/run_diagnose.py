@@ -29,6 +29,7 @@ from physid_drake.resources import shipped
 from physid_drake.run_folder import RunFolder, named_after, versions
 
 STATE = "stages.npz"
+FILES = ("diagnosis.json", "page.html", "scene.html", "model.yaml")
 SHOWN = 12  # pushes in the animation
 ALPHA = 0.01  # false-alarm rate
 LONGEST_STEP = 0.05  # s
@@ -59,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
                 "cell": dc.asdict(config), "pushes": arguments.pushes, "recording": digest_of(recording),
                 "versions": versions()}  # fmt: skip
     out = arguments.out or Path("diagnoses") / named_after(recording.name)
-    folder = RunFolder.open(out, json.dumps(settings, indent=2) + "\n", name="settings.json", states=(STATE,))
+    folder = RunFolder.open(out, json.dumps(settings, indent=2) + "\n", name="settings.json", files=(STATE, *FILES))
     diagnosis, evidence = run_case(
         case, console, seed=arguments.seed, alpha=arguments.alpha, effects=arguments.effects,
         memory=Memory(folder.path / STATE),
@@ -113,7 +114,7 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
     if push is not None:
         console.print(
             f"Next push: towards {push.direction_deg:.0f} degrees at {push.speed_mps:.2g} m/s,"
-            f" {1e3 * push.contact_offset_m:.0f} mm off the middle, would settle it with probability"
+            f" {push.aim}, would settle it with probability"
             f" {push.settles_with_probability:.2f}."
         )
 
@@ -127,6 +128,7 @@ def write(
         OutputError: if one cannot be written.
     """
     pushes = shown_pushes(diagnosis, evidence)
+    folder.forget("diagnosis.json")  # an earlier one's belongs to another model
     folder.write(page, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches, scene=scene))
     folder.write("model.yaml", model_of(diagnosis, evidence).dump())
     folder.write(scene, staged(diagnosis, evidence).StaticHtml())

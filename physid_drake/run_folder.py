@@ -45,15 +45,15 @@ class RunFolder:
 
     @classmethod
     def open(
-        cls, path: Path, configuration: str, *, name: str = "config.yaml", states: Sequence[str] = ()
+        cls, path: Path, configuration: str, *, name: str = "config.yaml", files: Sequence[str] = ()
     ) -> RunFolder:
-        """Make the folder, or go on in one; the states of a run with another configuration are dropped.
+        """Make the folder, or go on in one; the files of a run with another configuration are dropped.
 
         Args:
             path: of the folder.
             configuration: text that says what the run is; kept in the folder.
             name: of the file that keeps it.
-            states: names of the files that an interrupted run goes on from.
+            files: names of those that an interrupted run goes on from, and of its results.
 
         Raises:
             OutputError: if it cannot be written.
@@ -63,12 +63,23 @@ class RunFolder:
             path.mkdir(parents=True, exist_ok=True)
             config = path / name
             if config.exists() and config.read_text(encoding="utf-8") != configuration:
-                for state in states:
-                    folder.forget(state)
+                for file in files:
+                    folder.forget(file)
         except (OSError, UnicodeDecodeError) as error:
             raise OutputError(f"output folder '{path}': cannot be written: {error}.") from error
         folder.write(name, configuration)
         return folder
+
+    @staticmethod
+    def check(path: Path) -> None:
+        """Refuse a folder that cannot be written to, before anything is computed for it.
+
+        Raises:
+            OutputError: if it is no folder, or may not be written to.
+        """
+        existing = next(one for one in (path, *path.absolute().parents) if one.exists())
+        if not existing.is_dir() or not os.access(existing, os.W_OK):
+            raise OutputError(f"output folder '{path}': cannot be written: '{existing}' is no folder to write to.")
 
     @classmethod
     def claim(cls, path: Path, configuration: str, *, name: str, what: str) -> RunFolder:
@@ -122,5 +133,12 @@ class RunFolder:
             raise OutputError(f"'{self.path / name}': cannot be written: {error}.") from error
 
     def forget(self, name: str) -> None:
-        """Drop a file: the run is done, or it was another run's."""
-        (self.path / name).unlink(missing_ok=True)
+        """Drop a file: the run is done, or it was another run's.
+
+        Raises:
+            OutputError: if it cannot be dropped.
+        """
+        try:
+            (self.path / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise OutputError(f"'{self.path / name}': cannot be removed: {error}.") from error

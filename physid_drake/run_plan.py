@@ -13,12 +13,13 @@ import numpy as np
 
 from physid_drake.errors import ConfigError
 from physid_drake.identify.polish import scatter_freedom
-from physid_drake.model import Model, load_model
+from physid_drake.model import Model
+from physid_drake.model_reading import load_model
 from physid_drake.plan import DistanceToGoal, Plan, Situation, plan
 from physid_drake.plan.draws import uncertain_names
 from physid_drake.plan.story import outcome_under
 from physid_drake.plan.task import Choices, policy_for
-from physid_drake.plan.trajectory import Trajectory, hand_height_of
+from physid_drake.plan.trajectory import Trajectory, tip_height_of
 from physid_drake.policies import push_csv
 from physid_drake.report.plan import plan_json, plan_table, push_files
 from physid_drake.report.plan_page import plan_page, plan_png
@@ -26,6 +27,7 @@ from physid_drake.report.progress import progress_bar
 from physid_drake.report.terminal import terminal
 from physid_drake.run_folder import RunFolder, named_after
 
+FILES = ("plan.json", "push.csv", "push_1.csv", "push_2.csv")
 FEWEST_TRIALS, TRIALS_PER_SETTING = 24, 16  # of a search
 
 
@@ -61,6 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
         direction=None if arguments.direction is None else _radians("--direction", arguments.direction),
     )  # fmt: skip
     policy = policy_for(arguments.policy, model, start, goal, choices)
+    out = arguments.out or Path("plans") / named_after(model.recording)
+    RunFolder.check(out)
     console = terminal()
     with progress_bar(console) as tick:
         made = plan(
@@ -70,8 +74,9 @@ def run(arguments: argparse.Namespace) -> int:
             search=arguments.search, draws=arguments.draws, risk=arguments.risk, tolerance=arguments.tolerance,
             friction_scatter=learnt.friction_scatter, scatter_freedom=learnt.scatter_freedom, tick=tick,
         )  # fmt: skip
+    if not math.isfinite(made.cost):
+        raise ConfigError(f"model '{model.recording}': every rollout diverged, so that there is no push to make.")
     with_effects = outcome_under(made, full) if arguments.plain and full.effects else None
-    out = arguments.out or Path("plans") / named_after(model.recording)
     folder = RunFolder.open(out, json.dumps(_settings(arguments), indent=2) + "\n", name="settings.json")
     write(folder, made, seed=arguments.seed, with_effects=with_effects)
     console.print(plan_table(made, with_effects=with_effects))
@@ -97,18 +102,18 @@ def write(
         OutputError: if one cannot be written.
     """
     forget(folder)
-    folder.write("plan.json", plan_json(made, seed=seed, with_effects=with_effects))
-    height = hand_height_of(made.model, made.situation)
+    height = tip_height_of(made.model, made.situation)
     for name, path in zip(push_files(made), made.predicted.paths, strict=True):
         folder.write(name, push_csv(path, height))
     if page is not None:
         folder.write_bytes("plan.png", plan_png(made))
         folder.write(page, plan_page(made, seed=seed, with_effects=with_effects))
+    folder.write("plan.json", plan_json(made, seed=seed, with_effects=with_effects))  # last: where it is, all is
 
 
 def forget(folder: RunFolder) -> None:
     """Drop an earlier plan: its push files may be more than a new one's."""
-    for name in ("plan.json", "push.csv", "push_1.csv", "push_2.csv"):
+    for name in FILES:
         folder.forget(name)
 
 

@@ -49,11 +49,12 @@ def run(arguments: argparse.Namespace, command: Commander = diagnose_command) ->
     """
     worlds = _checked(arguments)
     out: Path = arguments.out or Path("proofs") / "_".join(filter(None, (f"seed_{arguments.seed}", arguments.kind)))
+    opening = read_seal(out) if arguments.open else None  # before the folder is claimed: there may be none
     folder = claim(out, {"seed": arguments.seed, "kind": arguments.kind})
     console = terminal()
     names = [world_id(index, arguments.seed) for index in range(worlds)]
-    if arguments.open:
-        seal = read_seal(out)
+    if opening is not None:
+        seal = opening
     else:
         with ended_softly():
             seal = _make(arguments, worlds, out, console)

@@ -13,7 +13,8 @@ import numpy as np
 from physid_drake.cell import Outcome
 from physid_drake.errors import ConfigError, OutputError, ParameterError, PhysidError
 from physid_drake.identify.problem import PushProblem, noise_of, problems_of
-from physid_drake.model import ModelCell, load_model
+from physid_drake.model import ModelCell
+from physid_drake.model_reading import load_model
 from physid_drake.prove.diagnosing import RESULT, Task, diagnose_command
 from physid_drake.prove.real import RealCase, chosen_cases, prepare
 from physid_drake.prove.real_score import FRESH_ERRORS, RealOutcome, real_outcome

@@ -12,16 +12,16 @@ from typing import Any, get_args, get_origin
 import yaml
 from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
+from physid_drake.cell.checks import check_config
 from physid_drake.errors import ConfigError
-from physid_drake.identify.theta import HEAVIEST, LIGHTEST
 from physid_drake.policies import POLICIES
 from physid_drake.resources import shipped
 from physid_drake.run_folder import named_after
 from physid_drake.scenario_schema import Scenario
 from physid_drake.search import SEARCHES
+from physid_drake.yaml_text import parsed
 
 DEFAULT = "eraser.yaml"
-SCHEMES = ("cenic", "lagged", "similar", "sap", "tamsi")
 
 
 def load_scenario(
@@ -47,11 +47,7 @@ def load_scenario(
     else:
         name, scenario, where = _named_scenario(config or DEFAULT)
     if override is not None:
-        try:
-            extra = yaml.safe_load(override)
-        except yaml.YAMLError as error:
-            raise ConfigError(f"--set: is no YAML: {_one_line(error)}.") from error
-        scenario = _typed(extra, scenario, "--set")
+        scenario = _typed(parsed(override, "--set"), scenario, "--set")
     if recording is not None:
         scenario.recording = recording
     if seed is not None:
@@ -89,13 +85,12 @@ def _locate(config: str) -> tuple[Path, str | None]:
 
 def _read_yaml(path: Path) -> dict[str, Any]:
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
         raise ConfigError(f"config '{path}': there is no such file.") from error
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"config '{path}': cannot be read: {error}.") from error
-    except yaml.YAMLError as error:
-        raise ConfigError(f"config '{path}': is no YAML: {_one_line(error)}.") from error
+    content = parsed(text, f"config '{path}'")
     if not isinstance(content, dict) or not content:
         raise ConfigError(f"config '{path}': needs named scenarios at the top level, 'name: {{...}}'.")
     # Keys that start with an underscore are for anchors and templates.
@@ -175,29 +170,12 @@ _KINDS: dict[Any, tuple[str, Callable[[Any], bool]]] = {
 
 def _checked(scenario: Scenario, where: str) -> Scenario:
     """Refuse values that no run can use."""
-    cell, search, contact, plan = scenario.cell, scenario.search, scenario.cell.contact, scenario.plan
+    try:
+        check_config(scenario.cell)
+    except ConfigError as error:
+        raise ConfigError(f"{where}, {error}") from error
+    search, plan = scenario.search, scenario.plan
     rules: list[tuple[str, object, bool, str]] = [
-        ("cell.contact.model", cell.contact.model, cell.contact.model in ("hydroelastic", "point"),
-         "'hydroelastic' or 'point'"),
-        ("cell.solver.scheme", cell.solver.scheme,
-         cell.solver.scheme in SCHEMES, f"one of {', '.join(SCHEMES)}"),
-        ("cell.solver.time_step_s", cell.solver.time_step_s, 0.0 < cell.solver.time_step_s <= 0.05, "in (0, 0.05] s"),
-        ("cell.solver.slide_time_step_s", cell.solver.slide_time_step_s,
-         cell.solver.time_step_s <= cell.solver.slide_time_step_s <= 0.05, "between time_step_s and 0.05 s"),
-        ("cell.contact.support_points", cell.contact.support_points, 4 <= cell.contact.support_points <= 1000,
-         "from 4 to 1000"),
-        ("cell.contact.rest_depth_m", cell.contact.rest_depth_m, 1e-8 <= cell.contact.rest_depth_m <= 1e-2,
-         "from 1e-8 to 1e-2 m"),
-        ("cell.contact.dissipation_s_per_m", contact.dissipation_s_per_m, contact.dissipation_s_per_m >= 0.0,
-         "at least 0 s/m"),
-        ("cell.contact.stiction_tolerance_mps", contact.stiction_tolerance_mps, contact.stiction_tolerance_mps > 0.0,
-         "above 0 m/s"),
-        ("cell.contact.hand_frequency_rad_s", contact.hand_frequency_rad_s, contact.hand_frequency_rad_s > 0.0,
-         "above 0 rad/s"),
-        ("cell.friction_cells", cell.friction_cells,
-         len(cell.friction_cells) == 2 and all(1 <= n <= 10 for n in cell.friction_cells), "[nx, ny] from 1 to 10"),
-        ("cell.default_density_kgpm3", cell.default_density_kgpm3,
-         LIGHTEST <= cell.default_density_kgpm3 <= HEAVIEST, f"from {LIGHTEST:g} to {HEAVIEST:g} kg/m^3"),
         ("search.method", search.method, search.method in SEARCHES, f"one of {', '.join(SEARCHES)}"),
         ("search.refine_every", search.refine_every, search.refine_every >= 0, "at least 0"),
         ("search.candidates", search.candidates, search.candidates >= 2, "at least 2"),

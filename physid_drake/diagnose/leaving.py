@@ -11,7 +11,7 @@ from physid_drake.diagnose.estimates import correlation_of, theta_intervals
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import Diagnosis
-from physid_drake.identify.problem import PushProblem
+from physid_drake.identify.problem import PushProblem, usual_tip_height
 from physid_drake.model import AS_W, Axes, Correlation, Model, turned
 
 Array = NDArray[np.float64]
@@ -53,6 +53,7 @@ def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
         correlation=Correlation.of([names[k] for k in kept], matrix[np.ix_(kept, kept)]),
         hand_axes=hand_axes,
         hand_turns=hand_turns,
+        tip_height=usual_tip_height(case.problems),
     )
 
 

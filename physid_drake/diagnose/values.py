@@ -192,6 +192,14 @@ class NextPush:
     contact_offset_m: float
     settles_with_probability: float
 
+    @property
+    def aim(self) -> str:
+        """Where the hand's line passes the object, in words."""
+        offset = round(1e3 * self.contact_offset_m)
+        if offset == 0:
+            return "through the middle"
+        return f"{abs(offset)} mm {'left' if offset > 0 else 'right'} of the middle"
+
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Diagnosis:

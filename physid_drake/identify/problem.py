@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -131,6 +132,8 @@ class PushProblem:
         forces: (k, 2) recorded mean forces on the object, x and y of W [N].
         force_std: (k,) of each [N].
         pace: ticks longer than the cell's by this factor will do: the hand is slow.
+        tip_height: of P above the table, as recorded [m]; None without a hand. Of an upright tip, which may be longer
+            than the object is high, it is not the contact's.
     """
 
     name: str
@@ -148,6 +151,7 @@ class PushProblem:
     force_std: Array
     hand_axes: Array = field(default_factory=lambda: np.eye(2))
     pace: float = 1.0
+    tip_height: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,7 +221,14 @@ def _problem(
         force_times=forces.middles,
         forces=forces.means,
         force_std=forces.stds,
+        tip_height=None if hand is None else float(np.median(hand.positions[:, 2])),
     )
+
+
+def usual_tip_height(problems: Sequence[PushProblem]) -> float | None:
+    """Median height of P above the table over pushes [m]; None where there is no hand."""
+    heights = [problem.tip_height for problem in problems if problem.tip_height is not None]
+    return float(np.median(heights)) if heights else None
 
 
 def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[Start, Array]:

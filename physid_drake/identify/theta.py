@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import Body
+from physid_drake.cell.checks import HEAVIEST, LIGHTEST
 from physid_drake.cell.solid import Solid
 from physid_drake.errors import ConfigError
 from physid_drake.identify.config import ThetaConfig
@@ -23,7 +24,6 @@ Array = NDArray[np.float64]
 CELL_ERROR = 0.01
 EXACT = 1e-4  # of a mass: a scale is not believed to be better
 UNWEIGHED = 0.8  # standard deviation of the logarithm of a mass that nobody weighed
-LIGHTEST, HEAVIEST = 20.0, 8000.0  # kg/m^3 of the box around an object: foam, steel
 
 
 @dc.dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from physid_drake.errors import RobotError
 from physid_drake.model import Model
-from physid_drake.plan.trajectory import Ending, Situation, hand_height_of, path_of, trajectory_of
+from physid_drake.plan.trajectory import Ending, Situation, contact_height_of, path_of, tip_height_of, trajectory_of
 from physid_drake.policies import PlannedPush, hand_samples
 from physid_drake.recording import PoseStream, Push, Sensors, planar_poses
 
@@ -68,7 +68,7 @@ class SimulatedRobot:
             raise RobotError(f"robot: the object {self.ending.value} in the last push; put it back first.")
         situation = Situation(start=self._pose, order=self._pushes)
         path = path_of(self._hidden.plain(), push, self.see())
-        trajectory = trajectory_of(self._hidden, (push,), situation, path=path)
+        trajectory = trajectory_of(self._hidden, (push,), situation, path=path, rate=RATE)
         if trajectory.ending is Ending.DIVERGED:
             raise RobotError("robot: the hidden world's rollout diverged.")
         self._pushes += 1
@@ -78,9 +78,9 @@ class SimulatedRobot:
         moving = np.flatnonzero(np.abs(np.diff(trajectory.poses, axis=0)).max(axis=1) > 1e-6)
         stopped = float(trajectory.times[moving[-1] + 1]) if len(moving) else 0.0
         end = min(max(stopped, float(path.times[-1])) + REST, float(trajectory.times[-1]))
-        times = np.arange(math.ceil(end * RATE)) / RATE
-        poses = np.column_stack([np.interp(times, trajectory.times, column) for column in trajectory.poses.T])
-        hand = hand_samples(path, hand_height_of(self._hidden, situation), rate=RATE).positions
+        count = math.ceil(end * RATE)
+        times, poses = trajectory.times[:count], trajectory.poses[:count]
+        hand = hand_samples(path, tip_height_of(self._hidden, situation), rate=RATE).positions
         hand = np.vstack([hand, np.repeat(hand[-1:], max(0, len(times) - len(hand)), axis=0)])[: len(times)]
         hand[:, :2] += (self._sensors.hand_position_std or 0.0) * self._rng.standard_normal((len(times), 2))
         return Push(
@@ -90,4 +90,4 @@ class SimulatedRobot:
 
     def _object(self, times: Array, poses: Array) -> PoseStream:
         seen = poses + self._rng.standard_normal(poses.shape) * self._sensors.object_std
-        return planar_poses(times, seen, hand_height_of(self._hidden, Situation(start=self._pose)))
+        return planar_poses(times, seen, contact_height_of(self._hidden, Situation(start=self._pose)))

@@ -208,7 +208,7 @@ def spread_of(
         situation: where the object is seen.
     """
     path = path_of(model, pushes[0], situation.start)
-    trajectories = [trajectory_of(d.model, pushes, d.situation, path=path) for d in draws]
+    trajectories = [trajectory_of(d.model, pushes, d.situation, path=path, believed=model) for d in draws]
     costs, loss = [cost_of(cost, t, model.table) for t in trajectories], loss_of(cost, model.table)
     return Spread(
         costs=np.array([c if math.isfinite(c) else loss for c in costs]),
@@ -220,7 +220,7 @@ def spread_of(
 def outcome_under(made: Plan, model: Model) -> tuple[Trajectory, float]:
     """What another model says of a plan's push: its trajectory and cost [m]."""
     pushes, path = made.policy.pushes(made.settings), made.predicted.paths[0]
-    trajectory = trajectory_of(model, pushes, made.situation, path=path)
+    trajectory = trajectory_of(model, pushes, made.situation, path=path, believed=made.model)
     return trajectory, cost_of(made.cost_function, trajectory, model.table)
 
 

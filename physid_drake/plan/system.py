@@ -13,7 +13,7 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 
 from physid_drake.identify import Identification
 from physid_drake.identify.polish import scatter_freedom
-from physid_drake.identify.problem import CellSpec, PushProblem
+from physid_drake.identify.problem import CellSpec, PushProblem, usual_tip_height
 from physid_drake.identify.system import PUSH_PERIOD
 from physid_drake.model import Correlation, Model
 from physid_drake.plan.config import PlanConfig
@@ -44,12 +44,13 @@ class PolicySystem(LeafSystem):
         - settings.desired
     """
 
-    def __init__(self, make_plan: MakePlan, *, dimension: int) -> None:
+    def __init__(self, make_plan: MakePlan, *, dimension: int, begin: float = 0.0) -> None:
         """Prepare.
 
         Args:
             make_plan: what to run on an identification.
             dimension: of the policy's settings; they are nan before the first plan.
+            begin: when it first looks at what was identified [s], so as not to plan with what is soon replaced.
         """
         LeafSystem.__init__(self)
         self.set_name("policy")
@@ -60,7 +61,7 @@ class PolicySystem(LeafSystem):
         own = {self.all_state_ticket()}  # so that a loop through a robot has no algebraic loop in it
         self.DeclareAbstractOutputPort("push.desired", Value[object], self._copy, own)
         self.DeclareVectorOutputPort("settings.desired", dimension, self._settings, own)
-        self.DeclarePeriodicUnrestrictedUpdateEvent(PUSH_PERIOD, 0.0, self._receive)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(PUSH_PERIOD, begin, self._receive)
 
     def plan(self, context: Context) -> Plan | None:
         """The latest plan held in the state; None before the first."""
@@ -141,6 +142,7 @@ class Planner:
         goal: x, y [m].
         name: of the recording.
         seed: of the run.
+        tip_height: of the recorded tip's centre above the table [m].
     """
 
     config: PlanConfig
@@ -149,6 +151,7 @@ class Planner:
     goal: tuple[float, float]
     name: str
     seed: int
+    tip_height: float | None = None
 
     @property
     def dimension(self) -> int:
@@ -162,7 +165,7 @@ class Planner:
             result: the identification.
             tick: told stage, steps done and steps in all.
         """
-        model = identified_model(result, self.spec, self.name)
+        model = identified_model(result, self.spec, self.name, tip_height=self.tip_height)
         stream = np.random.SeedSequence(self.seed).spawn(_STREAM + 1)[_STREAM]
         return plan(
             model, policy_for(self.config.policy, model, self.situation.start, self.goal),
@@ -196,20 +199,24 @@ def planner_of(config: PlanConfig, spec: CellSpec, problems: Sequence[PushProble
     situation = Situation(
         start=start, order=len(problems), hand_height=first.hand_height, start_std=(x, y, yaw)
     )  # fmt: skip
-    return Planner(config=config, spec=spec, situation=situation, goal=goal, name=name, seed=seed)
+    return Planner(
+        config=config, spec=spec, situation=situation, goal=goal, name=name, seed=seed,
+        tip_height=usual_tip_height(problems),
+    )  # fmt: skip
 
 
-def identified_model(result: Identification, spec: CellSpec, name: str) -> Model:
+def identified_model(result: Identification, spec: CellSpec, name: str, *, tip_height: float | None = None) -> Model:
     """The plain cell with the identified theta, its intervals and how they vary together.
 
     Args:
         result: the identification.
         spec: of the cell it was made with.
         name: of the recording.
+        tip_height: of the recorded tip's centre above the table [m].
     """
     intervals = {f"theta.{e.name}": list(e.ci90) for e in result.estimates}
     return Model(
         recording=name, shape=spec.shape, hand_radius=spec.hand_radius, table=spec.table, config=spec.config,
         body=result.thetas.body(result.theta), intervals=intervals,
-        correlation=Correlation.of(tuple(intervals), result.polished.correlation),
+        correlation=Correlation.of(tuple(intervals), result.polished.correlation), tip_height=tip_height,
     )  # fmt: skip

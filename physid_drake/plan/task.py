@@ -58,7 +58,7 @@ def policy_for(name: str, model: Model, start: Pose, goal: Point, choices: Choic
     """
     choices = choices or Choices()
     check_task(start, goal, model.table)
-    _check_choices(name, choices)
+    _check_choices(name, choices, model.table)
     way = np.subtract(goal, start[:2])
     distance = float(np.hypot(*way))
     speed = CARRYING_SPEED if choices.speed is None else choices.speed
@@ -109,15 +109,19 @@ def default_goal(start: Pose, table: Corners) -> Point:
     return x + distance * ahead[0], y + distance * ahead[1]
 
 
-def _check_choices(name: str, choices: Choices) -> None:
+def _check_choices(name: str, choices: Choices, table: Corners) -> None:
     if name not in POLICIES:
         raise ConfigError(f"policy '{name}' is unknown; known are {', '.join(POLICIES)}.")
     if choices.speed is not None and name != "push_direction":
         raise ConfigError(f"policy '{name}': plans the speed itself; a fixed speed is for push_direction.")
     if choices.direction is not None and name == "push_direction":
         raise ConfigError("policy 'push_direction': plans the direction itself; a fixed one is for push_speed.")
-    if choices.travel is not None and not (math.isfinite(choices.travel) and choices.travel > 0.0):
-        raise ConfigError(f"policy: the travel must be above 0 m, but is {choices.travel:g} m.")
+    longest = math.dist(*table)
+    if choices.travel is not None and not 0.0 < choices.travel <= longest:
+        raise ConfigError(
+            f"policy: the travel must be above 0 m and no longer than the table, {longest:g} m, but is"
+            f" {choices.travel:g} m."
+        )
     low, high = SPEEDS
     if choices.speed is not None and not low <= choices.speed <= high:
         raise ConfigError(

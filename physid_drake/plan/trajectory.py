@@ -76,7 +76,7 @@ class Situation:
     Attributes:
         start: x, y [m], yaw [rad] of the object, as the tracker reports it.
         order: number of the next push since the recording began, for physics that changes from push to push.
-        hand_height: of the tip's centre above the table [m]; None for half the object's height.
+        hand_height: of the tip's contact above the table [m]; None for half the object's height.
         start_std: standard deviation of where the object stands about ``start`` [m, m, rad].
     """
 
@@ -96,9 +96,17 @@ def _true_solid(model: Model) -> Solid:
     return _solid(geometry_with(model.effects, Geometry(shape=model.shape)).shape)
 
 
-def hand_height_of(model: Model, situation: Situation) -> float:
-    """Height of the tip's centre above the table [m]."""
+def contact_height_of(model: Model, situation: Situation) -> float:
+    """Height of the tip's contact above the table [m]."""
     return 0.5 * _true_solid(model).height if situation.hand_height is None else situation.hand_height
+
+
+def tip_height_of(model: Model, situation: Situation) -> float:
+    """Height of the tip's centre above the table, for a robot [m].
+
+    Where nobody knows, the contact's, which is right for a sphere: half of an upright tip would be in the table.
+    """
+    return contact_height_of(model, situation) if model.tip_height is None else model.tip_height
 
 
 def hand_radius_of(model: Model) -> float:
@@ -127,7 +135,13 @@ def path_of(model: Model, push: PlannedPush, pose: Pose) -> HandPath:
 
 
 def trajectory_of(
-    model: Model, pushes: tuple[PlannedPush, ...], situation: Situation, *, path: HandPath | None = None
+    model: Model,
+    pushes: tuple[PlannedPush, ...],
+    situation: Situation,
+    *,
+    path: HandPath | None = None,
+    believed: Model | None = None,
+    rate: float | None = None,
 ) -> Trajectory:
     """Simulate pushes, one after the other.
 
@@ -136,11 +150,13 @@ def trajectory_of(
         pushes: at least one; a push after a loss is not made.
         situation: where the object starts.
         path: of the first push, where the hand aims at another place than where the object is.
+        believed: the model by which the hand aims at where the tracker sees the object; None for ``model``.
+        rate: samples a second of what is returned [Hz]; None for a few hundred in all.
     """
     pose, clock = situation.start, 0.0
     times, poses, paths, ending = [], [], [], Ending.AT_REST
     for number, push in enumerate(pushes):
-        paths.append(path_of(model, push, pose) if number or path is None else path)
+        paths.append(path_of(believed or model, push, pose) if number or path is None else path)
         try:
             motion = _roll(model, push, paths[-1], dc.replace(situation, start=pose, order=situation.order + number))
         except ParameterError:  # a draw may be of an object that cannot be, or cannot stand
@@ -148,7 +164,7 @@ def trajectory_of(
             poses.append(np.array([pose]))
             ending = Ending.DIVERGED
             break
-        sampled = np.linspace(0.0, float(motion.times[-1]), MOST_SAMPLES)
+        sampled = _sampled(float(motion.times[-1]), rate)
         seen = tracked(motion, sampled, model.effects)
         times.append(clock + sampled)
         poses.append(seen)
@@ -160,6 +176,12 @@ def trajectory_of(
     return Trajectory(
         times=np.concatenate(times), poses=np.concatenate(poses), paths=tuple(paths), ending=ending
     )  # fmt: skip
+
+
+def _sampled(duration: float, rate: float | None) -> Array:
+    if rate is None:
+        return np.linspace(0.0, duration, MOST_SAMPLES)
+    return np.arange(math.floor(duration * rate + 1e-9) + 1) / rate
 
 
 def _roll(model: Model, push: PlannedPush, path: HandPath, situation: Situation) -> Motion:

@@ -10,7 +10,7 @@ import numpy as np
 from rich.table import Table
 
 from physid_drake.plan import DistanceToGoal, Ending, Plan, Spread, SweepRow, Trajectory
-from physid_drake.plan.trajectory import hand_height_of
+from physid_drake.plan.trajectory import tip_height_of
 
 FORMAT = "physid-plan/1"
 
@@ -48,7 +48,7 @@ def plan_json(plan: Plan, *, seed: int, with_effects: tuple[Trajectory, float] |
              "contact_offset_m": p.contact_offset}
             for file, p in zip(push_files(plan), pushes, strict=False)
         ],
-        "hand_height_m": hand_height_of(plan.model, plan.situation),
+        "hand_height_m": tip_height_of(plan.model, plan.situation),
         "predicted": _outcome(plan.predicted, plan.cost),
         "predicted_with_effects": None if with_effects is None else _outcome(*with_effects),
         "belief": None if plan.spread is None else _belief(plan.spread, plan.tolerance),

@@ -166,7 +166,7 @@ def test_a_model_that_is_not_there_or_no_yaml_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="no such file"):
         load_model(tmp_path / "model.yaml")
     (tmp_path / "model.yaml").write_text("{", encoding="utf-8")
-    with pytest.raises(ConfigError, match="cannot be read"):
+    with pytest.raises(ConfigError, match="is no YAML"):
         load_model(tmp_path)
 
 

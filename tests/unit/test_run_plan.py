@@ -12,7 +12,8 @@ from runs import coarse_identifier, quick, shipped_pushes, write_small
 from physid_drake import run_cell, run_plan
 from physid_drake.cli import main
 from physid_drake.errors import ConfigError
-from physid_drake.model import Correlation, load_model
+from physid_drake.model import Correlation
+from physid_drake.model_reading import load_model
 from physid_drake.plan import PlanConfig
 from physid_drake.plan.system import planner_of
 from physid_drake.recording import Table
@@ -137,7 +138,8 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(folder, tmp_path, capsys, monke
 
 def test_the_main_job_plans_with_what_it_identified(tmp_path):
     recording = write_small(tmp_path / "small")
-    override = {"plan": {"start_m": [0.0, 0.0], "goal_m": [0.25, 0.0], "budget": 6, "sweep": 3, "draws": 2}}
+    plan = {"start_m": [0.0, 0.0], "goal_m": [0.25, 0.0], "budget": 6, "sweep": 3, "draws": 2}
+    override = {"plan": {"policy": "push_speed", **plan}}
     out = tmp_path / "out"
     assert quick(out, recording=recording, plan_too=True, **override) == 0
     content = json.loads((out / "plan.json").read_text())
@@ -149,7 +151,7 @@ def test_the_main_job_plans_with_what_it_identified(tmp_path):
     assert (
         content["policy"] == "push_speed" and len(content["sweep"]["rows"]) == 3 and content["belief"]["draws"] == 2
     )
-    assert yaml.safe_load((out / "config.yaml").read_text())["eraser"]["plan"]["budget"] == 6
+    assert yaml.safe_load((out / "config.yaml").read_text())["small"]["plan"]["budget"] == 6
     assert (out / "push.csv").exists() and not (out / "plan.png").exists()
     page = (out / "page.html").read_text()
     assert f"{content['settings']['speed']['value']:.4f} m/s" in page and "Cost against speed" in page

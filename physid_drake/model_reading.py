@@ -1,0 +1,183 @@
+"""``model.yaml``, read and checked: whatever is wrong with it is one line."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from physid_drake.cell import Body, CellConfig
+from physid_drake.cell.checks import check_config
+from physid_drake.cell.config import ContactConfig, SolverConfig
+from physid_drake.effects import Effect, effect_named
+from physid_drake.errors import ConfigError
+from physid_drake.model import AS_W, FORMAT, SHAPES, Correlation, Model
+from physid_drake.recording import Shape
+from physid_drake.yaml_text import parsed
+
+_POSITIVE = ("ratio", "speed", "radius", "frequency")  # of effects: nothing has none of it
+_NOT_NEGATIVE = ("compliance", "damping", "stiffness", "strength", "core", "rest_length")
+
+
+def load_model(path: Path | str) -> Model:
+    """Read ``model.yaml``.
+
+    Args:
+        path: the file, or the folder of a diagnosis that holds it.
+
+    Raises:
+        ConfigError: if it cannot be read, is of another version, or holds what no model has.
+    """
+    file = Path(path)
+    file = file / "model.yaml" if file.is_dir() else file
+    where = f"model '{file}'"
+    try:
+        text = file.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise ConfigError(f"{where}: there is no such file.") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{where}: cannot be read: {' '.join(str(error).split())}.") from error
+    content = parsed(text, where)
+    found = content.get("format") if isinstance(content, dict) else None
+    if found != FORMAT:
+        raise ConfigError(f"{where}: the format must be '{FORMAT}', but is {found!r}; diagnose again.")
+    try:
+        return _model(content, file)
+    except ConfigError as error:
+        raise ConfigError(f"{where}: {error}") from error
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        cause = " ".join(str(error).split()).rstrip(".")
+        raise ConfigError(f"{where}: {type(error).__name__}: {cause}.") from error
+
+
+def _model(content: dict[str, Any], file: Path) -> Model:
+    cell = content["cell"]
+    config = CellConfig(
+        **{**cell, "contact": ContactConfig(**cell["contact"]), "solver": SolverConfig(**cell["solver"])}
+    )  # fmt: skip
+    check_config(config)
+    effects = tuple(_effect(e) for e in content["effects"])
+    intervals = _intervals(content.get("intervals", {}), effects)
+    radius, height = content["hand_radius_m"], content.get("tip_height_m")
+    (x0, y0), (x1, y1) = content["table_m"]
+    return Model(
+        recording=str(content["recording"]),
+        shape=_shape(content["object"], file.parent),
+        hand_radius=None if radius is None else _number("hand_radius_m", radius, above=0.0),
+        table=(
+            (_number("table_m", x0), _number("table_m", y0)),
+            (_number("table_m", x1, above=x0), _number("table_m", y1, above=y0)),
+        ),
+        config=config,
+        body=_body(content["theta"], cells=config.friction_cells[0] * config.friction_cells[1]),
+        effects=effects,
+        intervals=intervals,
+        correlation=_correlation(content, intervals),
+        hand_axes=_axes(content.get("hand_axes")),
+        hand_turns=bool(content.get("hand_turns", False)),
+        tip_height=None if height is None else _number("tip_height_m", height),
+    )
+
+
+def _number(key: str, value: Any, *, above: float = -math.inf, least: float = -math.inf) -> float:
+    """A finite number within its bounds.
+
+    Raises:
+        ConfigError: naming the key and the rule.
+    """
+    good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if not (good and value > above and value >= least):
+        rule = f" above {above:g}" if above > -math.inf else f" of at least {least:g}" if least > -math.inf else ""
+        raise ConfigError(f"key '{key}': must be a finite number{rule}, but is {value!r}.")
+    return float(value)
+
+
+def _body(theta: Mapping[str, Any], *, cells: int) -> Body:
+    numbers = {f.name for f in dc.fields(Body)} - {"p_BBcm", "support_friction"}
+    above = dict.fromkeys(("mass", "inertia_ratio", "static_ratio"), 0.0)
+    given = {
+        name: _number(f"theta.{name}", value, above=above.get(name, -math.inf), least=0.0)
+        for name, value in theta.items() if name in numbers
+    }  # fmt: skip
+    place = _numbers("theta.p_BBcm", theta["p_BBcm"], 2)
+    friction = _numbers("theta.support_friction", theta["support_friction"], cells, above=0.0)
+    rest = {name: value for name, value in theta.items() if name not in {*given, "p_BBcm", "support_friction"}}
+    return Body(p_BBcm=np.array(place), support_friction=np.array(friction), **given, **rest)
+
+
+def _numbers(key: str, values: Any, count: int, *, above: float = -math.inf) -> list[float]:
+    if not isinstance(values, list) or len(values) != count:
+        raise ConfigError(f"key '{key}': must be a list of {count} numbers, but is {values!r}.")
+    return [_number(key, value, above=above) for value in values]
+
+
+def _effect(content: Mapping[str, Any]) -> Effect:
+    kind = effect_named(str(content["name"]))
+    nulls = {f.name: f.default for f in dc.fields(kind)}
+    parameters: dict[str, Any] = {}
+    for name, value in content["parameters"].items():
+        key = f"effects.{kind.name}.{name}"
+        if isinstance(nulls.get(name, 0.0), tuple):
+            parameters[name] = _grid(key, value)
+        elif name in _POSITIVE:
+            parameters[name] = _number(key, value, above=0.0)
+        else:
+            parameters[name] = _number(key, value, least=0.0 if name in _NOT_NEGATIVE else -math.inf)
+    return kind(**parameters)
+
+
+def _grid(key: str, rows: Any) -> tuple[tuple[float, ...], ...]:
+    """Weights, not negative and not all 0, in rows of one length."""
+    even = isinstance(rows, list) and rows and all(isinstance(r, list) and len(r) == len(rows[0]) for r in rows)
+    if not even:
+        raise ConfigError(f"key '{key}': must be rows of equally many numbers, but is {rows!r}.")
+    grid = tuple(tuple(_number(key, value, least=0.0) for value in row) for row in rows)
+    if not sum(map(sum, grid)) > 0.0:
+        raise ConfigError(f"key '{key}': must have a weight above 0, but is {rows!r}.")
+    return grid
+
+
+def _intervals(found: Any, effects: tuple[Effect, ...]) -> dict[str, Any]:
+    if not (isinstance(found, dict) and all(isinstance(name, str) for name in found)):
+        raise ConfigError(f"key 'intervals': must be names with two numbers each, but is {found!r}.")
+    units = {effect.name: effect.units() for effect in effects}
+    for name in found:
+        owner, _, parameter = name.partition(".")
+        if owner in units and parameter not in units[owner]:
+            raise ConfigError(f"key 'intervals': '{name}' belongs to no parameter.")
+    return found
+
+
+def _correlation(content: Mapping[str, Any], intervals: Mapping[str, Any]) -> Correlation | None:
+    found = content.get("correlation")
+    if found is None:
+        return None
+    unknown = [name for name in found["names"] if name not in intervals]
+    if unknown:
+        raise ConfigError(f"correlation: '{unknown[0]}' has no interval.")
+    rows = tuple(tuple(float(v) for v in row) for row in found["matrix"])
+    return Correlation(names=tuple(str(name) for name in found["names"]), matrix=rows)
+
+
+def _axes(found: Any) -> tuple[tuple[float, float], tuple[float, float]]:
+    if found is None:
+        return AS_W
+    if not (isinstance(found, list) and len(found) == 2):
+        raise ConfigError(f"key 'hand_axes': must be two rows of two numbers, but is {found!r}.")
+    (a, b), (c, d) = (_numbers("hand_axes", row, 2) for row in found)
+    return (a, b), (c, d)
+
+
+def _shape(content: Mapping[str, Any], folder: Path) -> Shape:
+    fields = {k: _tuples(v) for k, v in content.items() if k != "shape"}
+    if content["shape"] == "mesh":
+        fields["file"] = (folder / str(fields["file"])).resolve()
+    return SHAPES[content["shape"]](**fields)
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value

@@ -1,0 +1,29 @@
+"""YAML as people write it: one line says what is wrong with it, whatever that is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import yaml
+
+from physid_drake.errors import ConfigError
+
+# A date of no calendar, a tag that does not fit its value, and a thousand brackets are no YAMLError.
+NO_YAML = (yaml.YAMLError, ValueError, TypeError, AttributeError, RecursionError)
+
+
+def parsed(text: str, where: str) -> Any:
+    """The content of a YAML text.
+
+    Args:
+        text: YAML.
+        where: it is from, for the message.
+
+    Raises:
+        ConfigError: if it is no YAML.
+    """
+    try:
+        return yaml.safe_load(text)
+    except NO_YAML as error:
+        cause = " ".join(str(error).split()).rstrip(".") or type(error).__name__
+        raise ConfigError(f"{where}: is no YAML: {cause}.") from error
