@@ -61,6 +61,9 @@ def _model(content: dict[str, Any], file: Path) -> Model:
     )  # fmt: skip
     check_config(config)
     effects = tuple(_effect(e) for e in content["effects"])
+    names = [effect.name for effect in effects]
+    if len(set(names)) < len(names):
+        raise ConfigError(f"key 'effects': none may be there twice, but they are {', '.join(names)}.")
     intervals = _intervals(content.get("intervals", {}), effects)
     radius, height = content["hand_radius_m"], content.get("tip_height_m")
     (x0, y0), (x1, y1) = content["table_m"]

@@ -67,6 +67,12 @@ def test_a_plot_that_cannot_be_written_is_an_error(tmp_path, capsys, out):
     assert "cannot be written" in capsys.readouterr().err
 
 
+def test_a_picture_without_a_suffix_is_refused_before_it_has_another_name(tmp_path, capsys):
+    write_recording(some_recording(), tmp_path / "r")
+    assert cli.main(["inspect", str(tmp_path / "r"), "--out", str(tmp_path / "top")]) == 1
+    assert "must name a picture" in capsys.readouterr().err and not (tmp_path / "top.png").exists()
+
+
 def test_convert_writes_a_recording_that_inspect_reads(tmp_path, capsys):
     table = tmp_path / "abs_tri2_v10.csv"
     table.write_text(COLUMNS + "\n" + "0.3,0,3.1,0.33,0,-3.1,0.2,0,0.25,0\n" * 5)

@@ -77,6 +77,19 @@ def test_two_pushes_start_where_the_first_one_ended():
     assert not np.allclose(first.start, second.start)
 
 
+def test_the_hand_of_a_second_push_knows_no_more_than_that_of_the_first():
+    """In a world whose tip is off, the hand aims by what is believed, at where the tracker sees the object."""
+    world = replace(MODEL, effects=(HandOffset(y=0.005),))
+    pushes = tuple(PlannedPush(direction=0.0, speed=0.1, travel=0.03) for _ in range(2))
+    believing = trajectory_of(
+        world, pushes, Situation(start=START), path=path_of(MODEL, pushes[0], START), believed=MODEL
+    )
+    knowing = trajectory_of(world, pushes, Situation(start=START))
+    for k, pose in enumerate((START, tuple(believing.poses[len(believing.poses) // 2 - 1]))):
+        np.testing.assert_allclose(believing.paths[k].start, path_of(MODEL, pushes[k], pose).start, atol=1e-9)
+    np.testing.assert_allclose(knowing.paths[0].start[1] - believing.paths[0].start[1], -0.005, atol=1e-6)
+
+
 @pytest.mark.parametrize("direction", [0.0, 0.7, -2.0])
 def test_a_hand_that_turns_with_its_pushes_aims_beside_its_own_axes(direction):
     push = PlannedPush(direction=direction, speed=0.3, travel=0.1)
@@ -193,6 +206,29 @@ def test_a_robot_pushes_learns_plans_and_pushes_again():
     assert robot.ending is Ending.AT_REST
     assert math.dist(recorded.object.planar[-1, :2], goal) < 0.01
     assert recorded.name == "pushes/003.csv" and len(recorded.hand) == len(recorded.object)
+
+
+def test_a_robot_records_the_motion_and_not_a_polygon_through_it():
+    push = PlannedPush(direction=0.0, speed=0.6, travel=0.05)
+    robot = SimulatedRobot(MODEL, start=START, sensors=Sensors(), rng=np.random.default_rng(0))
+    seen = robot.execute(push).object
+    fine = trajectory_of(MODEL, (push,), Situation(start=START), rate=1000.0)
+    for column in range(2):
+        exact = np.interp(seen.times, fine.times, fine.poses[:, column])
+        np.testing.assert_allclose(seen.planar[:, column], exact, atol=1e-5)
+
+
+def test_a_policy_that_begins_late_plans_with_the_last_identification_only():
+    calls = []
+    plan_of = made(draws=0, sweep=0, budget=2)
+    system = PolicySystem(lambda known: calls.append(float(known.theta[0])) or plan_of, dimension=1, begin=3.0)
+    context = system.CreateDefaultContext()
+    fixed = system.GetInputPort("identification.estimated").FixValue(context, AbstractValue.Make(None))
+    simulator = Simulator(system, context)
+    for k in range(4):
+        fixed.GetMutableData().set_value(SimpleNamespace(theta=np.array([0.1 * (k + 1)])))
+        simulator.AdvanceTo(k + 0.5)
+    assert calls == [0.4]
 
 
 def test_a_robot_whose_object_fell_asks_for_it_back():

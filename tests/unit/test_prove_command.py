@@ -165,6 +165,7 @@ def test_a_broken_seal_is_refused(worlds, monkeypatch):
 def test_there_is_nothing_to_open_before_worlds_are_sealed_and_diagnosed(worlds, tmp_path):
     with pytest.raises(ProofError, match="holds no sealed worlds"):
         prove(tmp_path / "empty", "--open")
+    assert not (tmp_path / "empty").exists()
     run_prove._make(build_parser().parse_args(["prove"]), 3, worlds, None)
     with pytest.raises(ProofError, match="none of the 3 sealed worlds"):
         prove(worlds, "--open")
@@ -186,6 +187,9 @@ def test_another_proof_in_the_same_folder_is_refused(worlds):
         (["--timeout", "0"], "--timeout must be positive"),
         (["--only", "cmu"], "give --real too"),
         (["--real", "/nowhere"], "there is no such folder"),
+        (["--real", "/", "--quick"], "--quick is of sealed worlds"),
+        (["--real", "/", "--worlds", "3"], "--worlds is of sealed worlds"),
+        (["--real", "/", "--kind", "none"], "--kind is of sealed worlds"),
         (["--real", "/", "--only", "nothing"], "no real case is named 'nothing'"),
         (["--real", "/", "--pushes", "2"], "--pushes must be at least 3"),
     ],

@@ -238,6 +238,16 @@ def test_the_main_job_learns_push_by_push_on_request(tmp_path):
     assert content["foreseen"]["sigmas_rms"] > content["training"]["after"]["sigmas_rms"]
 
 
+def test_a_pipe_that_closes_loses_no_result(tmp_path, monkeypatch):
+    def closed(*_):
+        raise SystemExit(1)
+
+    monkeypatch.setattr(run_cell, "_show", closed)
+    with pytest.raises(SystemExit):
+        quick(tmp_path / "out", recording=write_small(tmp_path / "recording", 2))
+    assert {"result.json", "page.html", "model.yaml"} <= {file.name for file in (tmp_path / "out").iterdir()}
+
+
 def test_an_unknown_search_is_refused_before_anything_is_written(tmp_path, capsys):
     recording = write_small(tmp_path / "recording", 2)
     assert quick(tmp_path / "out", recording=recording, search={"method": "annealing"}) == 1

@@ -153,6 +153,18 @@ def test_what_a_correlation_does_not_hold_is_independent():
         ({"effects": [{"name": "viscous_drag", "parameters": {"colour": 1.0}}]}, "colour"),
         ({"theta": {"mass": 1.0}}, "model"),
         ({"object": {"shape": "sphere"}}, "sphere"),
+        ({"intervals": None}, "intervals"),
+        ({"intervals": {3: [0.1, 0.2]}}, "intervals"),
+        ({"intervals": {"viscous_drag.name": [0.1, 0.2]}}, "viscous_drag.name"),
+        ({"hand_radius_m": "abc"}, "hand_radius_m"),
+        ({"hand_radius_m": -0.01}, "above 0"),
+        ({"tip_height_m": float("nan")}, "tip_height_m"),
+        ({"hand_axes": [[1.0, 0.0]]}, "hand_axes"),
+        ({"table_m": [[1.0, 1.0], [-1.0, -1.0]]}, "table_m"),
+        ({"effects": [{"name": "size_error", "parameters": {"ratio": 0.0}}]}, "size_error.ratio"),
+        ({"effects": [{"name": "uneven_support", "parameters": {"weights": [[1.0], [1.0, 2.0]]}}]}, "equally many"),
+        ({"effects": [{"name": "table_tilt", "parameters": {"x": float("inf")}}]}, "table_tilt.x"),
+        ({"effects": [{"name": "table_tilt", "parameters": {}}] * 2}, "twice"),
     ],
 )
 def test_a_model_of_another_kind_is_refused_by_name(model, tmp_path, change, named):
@@ -162,12 +174,46 @@ def test_a_model_of_another_kind_is_refused_by_name(model, tmp_path, change, nam
         load_model(file)
 
 
+@pytest.mark.parametrize(
+    ("section", "change", "named"),
+    [
+        ("theta", {"mass": float("nan")}, "theta.mass"),
+        ("theta", {"mass": 0.0}, "above 0"),
+        ("theta", {"support_friction": 0.3}, "theta.support_friction"),
+        ("theta", {"support_friction": [0.3, 0.3]}, "list of 1 numbers"),
+        ("theta", {"support_friction": [0.0]}, "above 0"),
+        ("theta", {"p_BBcm": [0.0, 0.0, 0.0]}, "theta.p_BBcm"),
+        ("theta", {"colour": 1.0}, "colour"),
+        ("cell", {"friction_cells": [1]}, "cell.friction_cells"),
+        ("cell", {"solver": {"scheme": "foo"}}, "cell.solver.scheme"),
+        ("cell", {"solver": {"time_step_s": 0.0}}, "cell.solver.time_step_s"),
+        ("cell", {"contact": {"model": "foo"}}, "cell.contact.model"),
+    ],
+)
+def test_a_model_whose_numbers_cannot_be_is_refused_by_key(model, tmp_path, section, change, named):
+    content = yaml.safe_load(model.dump())
+    content[section] |= change
+    (tmp_path / "model.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    with pytest.raises(ConfigError, match=named):
+        load_model(tmp_path)
+
+
+def test_a_relative_mesh_is_one_beside_the_model(model, tmp_path, monkeypatch):
+    content = yaml.safe_load(model.dump())
+    content["object"] = {"shape": "mesh", "file": "cube.obj", "scale": 1.0}
+    (tmp_path / "model.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    (tmp_path / "cube.obj").write_text("", encoding="utf-8")
+    monkeypatch.chdir(tmp_path.parent)
+    assert load_model(tmp_path.name).shape.file == (tmp_path / "cube.obj").resolve()
+
+
 def test_a_model_that_is_not_there_or_no_yaml_is_refused(tmp_path):
     with pytest.raises(ConfigError, match="no such file"):
         load_model(tmp_path / "model.yaml")
-    (tmp_path / "model.yaml").write_text("{", encoding="utf-8")
-    with pytest.raises(ConfigError, match="is no YAML"):
-        load_model(tmp_path)
+    for text in ("{", "format: 2001-99-99", "{a: !!int x}", "[" * 3000):
+        (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
+        with pytest.raises(ConfigError, match="is no YAML"):
+            load_model(tmp_path)
 
 
 def test_a_memory_that_was_cut_off_begins_again(tmp_path):

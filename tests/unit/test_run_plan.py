@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import yaml
 from plans import MODEL, TILTED
@@ -91,7 +92,8 @@ def test_the_results_beside_a_model_give_scatter_and_order(folder, tmp_path, few
         (["--start", "0", "0", "inf"], "--start"), (["--start", "5", "0", "0"], "start"),
         (["--tolerance", "nan"], "tolerance"),
         (["--budget", "0"], "budget"), (["--draws", "-1"], "draws"), (["--seed", "-1"], "--seed"),
-        (["--search", "luck"], "luck"), (["--travel", "0"], "travel"), (["--model", "nowhere.yaml"], "nowhere.yaml"),
+        (["--search", "luck"], "luck"), (["--travel", "0"], "travel"), (["--travel", "1e9"], "table"),
+        (["--model", "nowhere.yaml"], "nowhere.yaml"),
     ],
 )  # fmt: skip
 def test_bad_input_ends_in_one_line(folder, tmp_path, capsys, argv, named):
@@ -99,6 +101,20 @@ def test_bad_input_ends_in_one_line(folder, tmp_path, capsys, argv, named):
     error = capsys.readouterr().err
     assert error.startswith("error: ") and error.count("\n") == 1 and named in error
     assert not (tmp_path / "out").exists()
+
+
+def test_an_output_folder_that_cannot_be_is_refused_before_the_search(folder, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(run_plan, "plan", None)
+    assert main(["plan", str(folder), *QUICK, "--out", str(folder / "model.yaml" / "deeper")]) == 1
+    assert "cannot be written" in capsys.readouterr().err
+
+
+def test_the_rod_of_a_file_for_a_robot_is_as_high_as_the_recorded_one(folder, tmp_path, few_rows):
+    """Where an upright rod touches is not where its centre is: it would be in the table."""
+    (folder / "model.yaml").write_text(replace(TILTED, tip_height=0.06).dump())
+    files = planned_files(folder, tmp_path / "out")
+    heights = {row.split(",")[3] for row in files["push.csv"].decode().splitlines()[1:]}
+    assert heights == {"0.0600000"} and json.loads(files["plan.json"])["hand_height_m"] == 0.06
 
 
 @pytest.mark.parametrize(
@@ -185,6 +201,8 @@ def test_the_planner_starts_where_the_recording_began():
     assert planner.situation.order == 2 and planner.situation.hand_height == pytest.approx(0.015)
     assert planner.goal == pytest.approx((planner.situation.start[0] + 0.3, planner.situation.start[1]))
     assert planner.dimension == 3
+    z = float(np.median(shipped_pushes(1).pushes[0].hand.positions[:, 2]))
+    assert planner.tip_height == pytest.approx(z)
 
 
 def test_no_goal_that_fits_is_no_reason_to_stop_but_a_wrong_one_is(capsys):
