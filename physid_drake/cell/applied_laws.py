@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses as dc
 import math
 from collections.abc import Sequence
 
-from physid_drake.cell.forces import ForceLaw, FrictionLaw, Swinging, total_wrenches
+import numpy as np
+
+from physid_drake.cell.forces import SLOWEST, ForceLaw, FrictionLaw, ObjectState, Swinging, Wrench, total_wrenches
 from physid_drake.cell.plant_state import PlantState
 
 SURELY_HELD = 0.5  # of the friction: a resting object under less does not slide
+CREEP = 10.0 * SLOWEST  # m/s: slow, and friction does not fade
 
 
 class AppliedLaws:
@@ -36,9 +40,18 @@ class AppliedLaws:
         if not self._laws:
             return True
         seen = state.object_state(time, span)
-        limit = float(seen.holding.sum())
         reach = math.sqrt(seen.inertia / seen.mass)
-        wrenches = total_wrenches(seen, self._laws, self._frictions)
+        wrenches = [law.wrench(seen) for law in self._laws]
         pull = sum(math.hypot(w.fx, w.fy) + abs(w.torque) / reach for w in wrenches)
         pull += sum(law.strongest() for law in self._laws if isinstance(law, Swinging))
-        return pull < SURELY_HELD * limit
+        return pull < SURELY_HELD * self._friction_at_a_creep(seen, wrenches)
+
+    def _friction_at_a_creep(self, seen: ObjectState, wrenches: Sequence[Wrench]) -> float:
+        """What bears an object that begins to slide where the forces pull it [N]: of a slippery patch, little."""
+        most = float(seen.holding.sum())
+        force = complex(sum(w.fx for w in wrenches), sum(w.fy for w in wrenches))
+        if not self._frictions or force == 0.0:
+            return most
+        creeping = dc.replace(seen, v_WBo=CREEP * force / abs(force), yaw_rate=0.0)
+        given = sum(float(np.linalg.norm(law.refund(creeping), axis=1).sum()) for law in self._frictions)
+        return max(0.0, math.prod(law.largest for law in self._frictions) * most - given)

@@ -73,6 +73,7 @@ class Scene:
         joints: the hand's prismatic joints x, y, z; empty without a hand.
         gravity: m/s^2.
         rest_depth: how deep an evenly loaded underside is in the table [m].
+        edge: lower and upper corner of a table that ends, x + iy [m]; None where it does not.
     """
 
     plant: MultibodyPlant
@@ -88,6 +89,7 @@ class Scene:
     joints: tuple[PrismaticJoint, ...]
     gravity: float
     rest_depth: float
+    edge: tuple[complex, complex] | None = None
 
 
 def contact_properties(*, friction: float, static_friction: float | None = None, stiffness: float | None = None,
@@ -158,6 +160,7 @@ def add_scene(
         plant=plant, scene_graph=scene_graph, object=body, table_geometry=table, feet=feet, foot_cells=foot_cells,
         hand_geometry=hand, face_geometries=faces, support=support, solid=solid, joints=joints, gravity=gravity,
         rest_depth=config.contact.rest_depth_m * _stiffer(solid),
+        edge=None if edge is None else (complex(*edge[0]), complex(*edge[1])),
     )  # fmt: skip
 
 

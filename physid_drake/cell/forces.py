@@ -26,7 +26,9 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 TINY = 1e-12  # of a direction
-SLOWEST = 5e-4  # m/s: below this slip a point feels the contact's full friction, which holds it at rest
+# m/s: below this slip friction fades, as Drake's does (the default stiction tolerance of a cell). Where laws fade at
+# other slips than the contact that they give friction back of, slow pushes feel the difference.
+SLOWEST = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +81,8 @@ class ObjectState:
         lean: depth of Bo's foot in the table [m], and how it grows along x and y of B [-].
         stiffness: of the whole support [N/m], from which the contact takes what friction bears; None where the loads
             together carry the weight, however deep the object is.
+        v_rolling: of the underside against Bo, in an object that rolls, x + iy [m/s].
+        edge: lower and upper corner of a table that ends, x + iy [m]; None where it does not.
     """
 
     time: float
@@ -95,6 +99,8 @@ class ObjectState:
     underside: Underside
     lean: tuple[float, float, float]
     stiffness: float | None = None
+    v_rolling: complex = 0j
+    edge: tuple[complex, complex] | None = None
 
     @cached_property
     def p_WBcm(self) -> Array:
@@ -107,6 +113,16 @@ class ObjectState:
         """Its velocity (2,) [m/s]."""
         v = self.v_WBo + 1j * self.yaw_rate * self.p_BoBcm_W
         return np.array([v.real, v.imag])
+
+    @property
+    def p_WBcm_midway(self) -> Array:
+        """Centre of mass (2,) half a tick later, if it goes on as it moves [m].
+
+        A force by where the object is, taken where a tick begins, feeds energy in: a slide's position is that of the
+        mean velocity, and the map of an oscillator over a tick then has the determinant 1 + (w dt)^2 / 2; half a tick
+        later it is 1.
+        """
+        return np.asarray(self.p_WBcm + 0.5 * self.span * self.v_WBcm)
 
     @cached_property
     def arms(self) -> Complex:
@@ -121,7 +137,7 @@ class ObjectState:
     @cached_property
     def slips(self) -> Complex:
         """Velocities (n,) of the support points, x + iy in W [m/s]."""
-        return self.arms * (1j * self.yaw_rate) + self.v_WBo
+        return self.arms * (1j * self.yaw_rate) + (self.v_WBo + self.v_rolling)
 
     @cached_property
     def slip_directions(self) -> Complex:
@@ -155,6 +171,9 @@ class ObjectState:
         foot, along_x, along_y = self.lean
         points = self.underside.points
         shares = self.underside.weights * np.maximum(foot + along_x * points.real + along_y * points.imag, 0.0)
+        if self.edge is not None:
+            low, high = (self.places - corner for corner in self.edge)
+            shares[(low.real < 0.0) | (low.imag < 0.0) | (high.real > 0.0) | (high.imag > 0.0)] = 0.0
         if self.stiffness is not None:
             return np.asarray(self.stiffness * shares)
         total = float(shares.sum())
@@ -164,7 +183,8 @@ class ObjectState:
     def holding_at(self, i: int) -> float:
         """Largest friction of support point i without any law [N]: one of ``holding``, where few are asked for."""
         base, (foot, along_x, along_y) = self.underside, self.lean
-        if "holding" in self.__dict__ or foot <= math.hypot(along_x, along_y) * base.reach:
+        deep = foot > math.hypot(along_x, along_y) * base.reach
+        if "holding" in self.__dict__ or not deep or self.edge is not None:
             return float(self.holding[i])
         # No point is off the table, and the mean depth is that of the load's centre.
         point, centre = complex(base.points[i]), base.load_centre
@@ -223,6 +243,8 @@ class StateReader:
         p_BBcm: x + iy [m].
         half_height: of the object [m].
         stiffness: of the whole support [N/m].
+        rolling_radius: of a lying cylinder [m]; None of what does not roll.
+        edge: lower and upper corner of a table that ends, x + iy [m]; None where it does not.
     """
 
     underside: Underside
@@ -232,6 +254,8 @@ class StateReader:
     p_BBcm: complex
     half_height: float
     stiffness: float
+    rolling_radius: float | None = None
+    edge: tuple[complex, complex] | None = None
 
     def at(
         self, time: float, span: float, X_WB: Sequence[float], V_WB: Sequence[float], *, settled: bool = False
@@ -261,6 +285,8 @@ class StateReader:
             underside=self.underside,
             lean=self.lean(X_WB),
             stiffness=None if settled else self.stiffness,
+            v_rolling=0j if self.rolling_radius is None else self.rolling_radius * complex(-V_WB[1], V_WB[0]),
+            edge=self.edge,
         )
 
     def lean(self, X_WB: Sequence[float]) -> tuple[float, float, float]:
@@ -285,6 +311,8 @@ def reader_of(body: Body, scene: Scene) -> StateReader:
         p_BBcm=complex(float(body.p_BBcm[0]), float(body.p_BBcm[1])),
         half_height=0.5 * solid.height,
         stiffness=body.mass * scene.gravity / scene.rest_depth,
+        rolling_radius=solid.rolling_radius,
+        edge=scene.edge,
     )
 
 
@@ -307,7 +335,7 @@ def _turning_wrench(state: ObjectState, largest: float, refunds: Sequence[Array]
         force += push
         moment += ((turn * complex(state.underside.points[one.point])).conjugate() * push).imag
         # The direction fades where the point hardly slips, and so does what laws gave; the rest of its disc slips on.
-        along = (given * direction.conjugate()).real / max(abs(direction), TINY)
+        along = (given * direction.conjugate()).real / max(abs(direction) ** 2, TINY)
         moment -= one.arm * (held - along) * spin / math.hypot(spin, state.slow_spin)
     return _wrench_at_table(state, force, moment)
 

@@ -122,6 +122,14 @@ class PlantState:
         X_WB, V_WB = self._x[q : q + 7].tolist(), self._x[v : v + 6].tolist()
         return self._reader.at(time, span, X_WB, V_WB, settled=settled)
 
+    def over_table(self) -> bool:
+        """Whether the table is under the centre of mass."""
+        edge = self._scene.edge
+        if edge is None:
+            return True
+        (low, high), (x, y) = edge, self.object_state(0.0, 0.0).p_WBcm.tolist()
+        return bool(low.real <= x <= high.real and low.imag <= y <= high.imag)
+
     def turns(self) -> bool:
         """Whether the object turns about a place under it or close by."""
         vx, vy, wz = self.twist()
@@ -171,6 +179,9 @@ class PlantState:
         ix, iy, _ = self._inertias
         c, s = math.cos(yaw), math.sin(yaw)
         about_x, about_y = (c * hx + s * hy) / ix, (c * hy - s * hx) / iy
+        if self._round:
+            # A rate across the axis, which the contact takes back within the tick, would turn what rolls meanwhile.
+            about_x = 0.0
         wx, wy = c * about_x - s * about_y, s * about_x + c * about_y
         self._x[self._v] += wx
         self._x[self._v + 1] += wy

@@ -150,7 +150,7 @@ class Stepper:
 
     def _resting(self, k: int) -> bool:
         vx, vy, wz = self._state.twist()
-        if math.hypot(vx, vy) + abs(wz) * 0.05 > REST_SPEED or self._rolls:
+        if math.hypot(vx, vy) + abs(wz) * 0.05 > REST_SPEED or self._rolls or not self._state.over_table():
             return False
         if self._hand is not None:
             tip = self._hand[k] if self._soft is None else self._soft.place

@@ -118,6 +118,8 @@ def support_of(
     radii = np.sqrt(weights / weights.sum() * _area(_as_polygon(outline)) / math.pi)
     if pressure is not None:
         weights = weights * pressure.factors(places, outline)
+        bears = weights > 0.0  # nothing stands where nothing presses
+        places, weights, cells, radii = places[bears], weights[bears], cells[bears], radii[bears]
     return Support(points=places, weights=weights / weights.sum(), cells=cells, radii=radii)
 
 

@@ -16,6 +16,7 @@ from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, S
 from physid_drake.effects.places import close_grid_of_places
 
 Array = NDArray[np.float64]
+POINT = 1e-9  # m: of what stands for no disc, as under a lying cylinder
 SLIGHT_SHARE = 0.015  # of the friction
 BASE = 0.6  # of the distance between two places: a patch's radius that covers the gaps
 WIDE = (2.0, 3.5)  # times that radius: larger patches are made of those
@@ -259,7 +260,8 @@ class _PatchLaw:
 
     def refund(self, state: ObjectState) -> Array:
         away = np.abs(state.places - complex(self.x, self.y))
-        ratio = 1.0 + (self.ratio - 1.0) * share_inside((away - self.radius) / state.underside.radii)
+        radii = np.maximum(state.underside.radii, POINT)
+        ratio = 1.0 + (self.ratio - 1.0) * share_inside((away - self.radius) / radii)
         return _along(state, self.largest - ratio)
 
 

@@ -14,6 +14,7 @@ from physid_drake.cell.diagram import GRAVITY
 from physid_drake.cell.forces import FrictionLaw
 from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.support import PressureGrid
+from physid_drake.effects.catalogue import CATALOGUE
 from physid_drake.effects.effect import Effect, Pose, PushFacts
 from physid_drake.effects.friction import Together
 from physid_drake.recording import Shape
@@ -102,10 +103,16 @@ def aimed(effects: Sequence[Effect], path: HandPath, facts: PushFacts) -> HandPa
 
 def true_pose(effects: Sequence[Effect], pose: Pose) -> Pose:
     """Pose of B for a pose that the tracker reports."""
-    for effect in reversed(effects):
+    for effect in reversed(_as_listed(effects)):
         if not effect.is_null:
             pose = effect.true_pose(pose)
     return pose
+
+
+def _as_listed(effects: Sequence[Effect]) -> list[Effect]:
+    """Effects in the order of the catalogue: a frame is beside the centre before its place is measured wrongly."""
+    order = {kind: k for k, kind in enumerate(CATALOGUE)}
+    return sorted(effects, key=lambda effect: order.get(type(effect), len(order)))
 
 
 def _true_start(effects: Sequence[Effect], start: Start) -> Start:
@@ -156,7 +163,7 @@ def tracked(motion: Motion, times: Array, effects: Sequence[Effect]) -> Array:
     present = [effect for effect in effects if not effect.is_null]
     late = sum(effect.lateness() for effect in present)
     poses = motion.planar_at(times - late)
-    for effect in present:
+    for effect in _as_listed(present):
         poses = effect.tracked(poses)
     return poses
 

@@ -2,12 +2,16 @@
 
 import numpy as np
 import pytest
+from motions import make
+from twin import body_of
 
 from physid_drake.cell import Body, Cell, Outcome, Start
+from physid_drake.effects.rollout import Geometry, Rollout, roll
 from physid_drake.recording import Box
 
 TABLE = np.array([[-0.6, -0.4], [0.6, 0.4]])
 MU, G = 0.3, 9.81
+BOX = Box(size=(0.1, 0.08, 0.04))
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +44,36 @@ def test_an_object_that_stops_with_its_centre_on_the_table_stays(cell):
 def test_far_from_the_edge_the_table_is_endless(cell):
     endless = Cell(Box(size=(0.1, 0.08, 0.04)), hand_radius=None)
     assert np.array_equal(slide(cell, 0.0, 0.5).poses, slide(endless, 0.0, 0.5).poses)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [make("friction_patch", ratio=2.0, x=3.0, radius=0.1), make("friction_patch", ratio=0.5, x=3.0, radius=0.1),
+     make("anisotropic_table", ratio=2.0, angle=0.5 * np.pi)],
+    ids=["rough elsewhere", "slippery elsewhere", "grain"],
+)  # fmt: skip
+def test_a_friction_law_gives_nothing_back_of_what_hangs_over_the_edge(cell, law):
+    """A third of the box is beyond the edge where it stops; what it gave back made it fly off."""
+    speed = np.sqrt(2 * MU * G * 0.135)
+    push = Rollout(
+        start=Start(pose=(0.45, 0.0, 0.0), velocity=(speed, 0.0, 0.0)),
+        path=None,
+        begin=0.0,
+        end=1.0,
+        hand_height=None,
+    )
+    motion = roll(lambda _: cell, Geometry(shape=BOX), body_of(0.3, MU), push, [law])
+    assert motion.outcome is Outcome.COMPLETED
+    stop = motion.planar_at(np.array([1.0]))[0, 0]
+    want = 0.45 + 0.135 / (
+        1.0 if law.name == "friction_patch" else np.sqrt(2.0)
+    )  # a grain's axes: 1 / root 2, root 2
+    assert stop == pytest.approx(want, abs=1.5e-3)  # measured: 0.3 mm and less
+
+
+@pytest.mark.parametrize("beyond", [5e-3, 0.06])
+def test_what_begins_beyond_the_edge_does_not_hover(cell, beyond):
+    assert slide(cell, 0.6 + beyond, 0.0).outcome is Outcome.FELL
 
 
 def test_the_table_with_an_edge_slides_like_the_endless_one():
