@@ -1,6 +1,7 @@
 """The belief about an error function over candidates: Gaussian process, P_min and its entropy."""
 
 import json
+import zlib
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -289,11 +290,11 @@ class Belief:
             ParameterError: When the file is not a belief of this format.
             FileNotFoundError: When there is no file.
         """
-        with _opened(path) as arrays:
-            header = _read_header(arrays, path)
-            saved: dict[str, Any] = {name: arrays[name] for name in _SAVED}
-            amplitude, noise = (float(v) for v in arrays["variances"])
-            hyper = Hyperparameters(amplitude=amplitude, lengths=arrays["lengths"], noise=noise)
+        arrays = _read(path)
+        header = _read_header(arrays, path)
+        saved: dict[str, Any] = {name: arrays[name] for name in _SAVED}
+        amplitude, noise = (float(v) for v in arrays["variances"])
+        hyper = Hyperparameters(amplitude=amplitude, lengths=arrays["lengths"], noise=noise)
         space = ParameterSpace(
             parameters=tuple(Parameter(**p) for p in header["parameters"]), correlation=header.get("correlation", ())
         )
@@ -375,12 +376,14 @@ def _nearest(points: Array, u: Array) -> npt.NDArray[np.intp]:
     return np.asarray(cKDTree(points).query(u)[1], dtype=np.intp)
 
 
-def _opened(path: str | Path) -> Any:
+def _read(path: str | Path) -> dict[str, Array]:
+    """All arrays of the file: one that is damaged may open, and fail where it is read."""
     try:
-        return np.load(path, allow_pickle=False)
+        with np.load(path, allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
     except FileNotFoundError:
         raise
-    except (OSError, ValueError, EOFError, BadZipFile) as error:
+    except (OSError, ValueError, TypeError, AttributeError, EOFError, BadZipFile, zlib.error) as error:
         raise ParameterError(f"belief '{path}': cannot be read ({error}); delete it to begin anew.") from error
 
 

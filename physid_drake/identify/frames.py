@@ -16,6 +16,7 @@ TIPPED = 3  # samples: fewer are a tracker's error
 OFF_TABLE = 0.01  # m: a caliper's error
 MOVED = 0.01  # m
 AT_ONCE, SOON = 0.05, 0.1  # s
+LONGEST_LOOK = 0.2  # s, of a slow tracker
 SURE = 6.0  # standard deviations
 FEWEST = 4  # samples
 STILL_FAST = 0.5  # of a hand's speed: faster, it has not come to a stop
@@ -41,11 +42,23 @@ def check_upright(recording: Recording, push: Push) -> None:
             f"push '{push.name}': the object's z axis is {lean[0]:.0f} degrees from the vertical as the push begins;"
             " give its shape in a frame B whose z axis points up."
         )
-    if len(over) >= TIPPED:
+    if len(over) >= min(TIPPED, len(push.object) - 1):
         begin = push.object.times[over[0]]
         raise RecordingError(
             f"push '{push.name}': the object tips by {lean.max():.0f} degrees, from {begin:.2f} s on;"
             " cut the push before that, or leave it out."
+        )
+
+
+def check_clocks(push: Push) -> None:
+    """Refuses a hand whose stream is over before the object's begins, or the other way round."""
+    if push.hand is None:
+        return
+    hand, seen = push.hand.times, push.object.times
+    if hand[0] > seen[-1] or seen[0] > hand[-1]:
+        raise RecordingError(
+            f"push '{push.name}': the hand is recorded from {hand[0]:.3f} to {hand[-1]:.3f} s, and the object from"
+            f" {seen[0]:.3f} to {seen[-1]:.3f} s; are both on the same clock?"
         )
 
 
@@ -108,19 +121,23 @@ def unseen_motion(recording: Recording, sigma: float) -> tuple[str, ...]:
 
 
 def _already_moving(push: Push, sigma: float) -> bool:
-    return push.hand is not None and _way(push, AT_ONCE) > SURE * sigma
+    way = _way(push, AT_ONCE)
+    return push.hand is not None and way is not None and way > SURE * sigma
 
 
 def _moved_by_nothing(push: Push, sigma: float) -> bool:
-    return push.hand is None and _way(push, SOON) < SURE * sigma < _way(push, np.inf) - MOVED
+    soon, ever = _way(push, SOON), _way(push, np.inf)
+    if push.hand is not None or soon is None or ever is None:
+        return False
+    return soon < SURE * sigma < ever - MOVED
 
 
-def _way(push: Push, within: float) -> float:
-    """How far the object comes from its first place within a time [s]; 0 where that is not seen."""
+def _way(push: Push, within: float) -> float | None:
+    """How far the object comes from its first place within a time [s], or four samples; None if that is not seen."""
     times, places = push.object.times, push.object.positions[:, :2]
-    seen = places[times <= times[0] + within]
-    if len(seen) < FEWEST:
-        return 0.0
+    if len(times) < FEWEST or times[FEWEST - 1] > times[0] + max(within, LONGEST_LOOK):
+        return None
+    seen = places[: max(FEWEST, int(np.count_nonzero(times <= times[0] + within)))]
     return float(np.linalg.norm(seen[-2:].mean(axis=0) - seen[:2].mean(axis=0)))
 
 

@@ -30,6 +30,7 @@ from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
 
+DIVERGED = 3.0  # nats of a theta's cost for each push whose rollout diverges
 EXPLAINED = 1.5  # reduced chi-square below which the plain cell leaves no more than noise and its own error
 
 
@@ -209,13 +210,15 @@ class Identifier:
         )  # fmt: skip
 
     def _saved_belief(self, candidates: Array) -> Belief | None:
-        """The belief of an interrupted run of the same search; another one's is not taken."""
+        """The belief of an interrupted run of the same search; one with other candidates is not taken."""
         if self._state is None or not self._state.exists():
             return None
         belief = Belief.from_npz(self._state)
+        if belief.candidates.shape != candidates.shape:
+            return None
         # Candidates follow the belief, but the first trial is one of those that the search began with.
         begun = belief.n_trials == 0 or bool(np.any(np.all(belief.thetas[0] == candidates, axis=1)))
-        return belief if begun and belief.candidates.shape == candidates.shape else None
+        return belief if begun else None
 
     def _objective(self, thetas: Array) -> Array:
         """Log of the rms misfit in standard deviations (k,): its minimum is the misfit's, and it spans decades."""
@@ -229,14 +232,16 @@ class Identifier:
         return np.array(errors)
 
     def _error(self, predictions: Sequence[Prediction | None]) -> float:
-        if any(p is None for p in predictions):
-            return float("inf")
+        """Of what came to an end, if most did: a push that diverges at every theta must not hide the others."""
         squares = [
             whitened_residual(problem, self.noise, p) ** 2
             for problem, p in zip(self.training, predictions, strict=True)
             if p is not None
         ]
-        return float(0.5 * np.log(np.mean(np.concatenate(squares))))
+        lost = len(predictions) - len(squares)
+        if lost >= len(squares):
+            return float("inf")
+        return float(0.5 * np.log(np.mean(np.concatenate(squares))) + DIVERGED * lost)
 
     def _task(self, problem: PushProblem, theta: Array) -> Task:
         nuisance = nuisance_of(problem, FIRST_SCATTER)
@@ -251,7 +256,6 @@ class Identifier:
         theta = polished.theta
         self._progress("held-out pushes", 0, 0)
         held = self.held_out
-        degrees = max(1, polished.samples - self.thetas.space.dimension)
         return Identification(
             thetas=self.thetas,
             theta=theta,
@@ -259,7 +263,7 @@ class Identifier:
             noise=self.noise,
             search=found,
             polished=polished,
-            reduced_chi2=polished.chi2 / degrees,
+            reduced_chi2=polished.chi2 / polished.degrees,
             training=tuple(p.name for p in self.training),
             held_out=tuple(p.name for p in held),
             before=self.accuracy(held, self.thetas.space.nominal) if held else None,
@@ -300,7 +304,7 @@ def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
             reach = z * min(std, prior_spread[j])
             low, high = max(0.0, u[j] - reach), min(1.0, u[j] + reach)
         else:
-            low, high = 0.05, 0.95  # of a uniform prior
+            low, high = min(0.05, u[j]), max(0.95, u[j])  # of a uniform prior, and where the value is
         result.append(
             Estimate(
                 name=parameter.name,

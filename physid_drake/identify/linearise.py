@@ -101,7 +101,7 @@ def linearised(
             difference(stack[1 + own + 2 * j], stack[2 + own + 2 * j]) / (high[j] - low[j]) for j in range(len(u))
         ]
         columns = [difference(here, row) / NUISANCE_STEP for row in stack[1 : 1 + own]]
-        errors = model_error_columns(problem, noise, first_motion(problem))
+        errors = model_error_columns(problem, noise, first_motion(problem, noise))
         terms.append(
             PushTerm(
                 problem=problem, nuisance=nuisance, u=u.copy(), scatter=scatter,

@@ -17,7 +17,7 @@ from physid_drake.identify.identify import Accuracy, Identification, accuracy_of
 from physid_drake.identify.linearise import PushTerm, linearised, prior_slope
 from physid_drake.identify.misfit import whitened_residual
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
-from physid_drake.identify.polish import SCATTER_PUSHES, Polished, new_scatter, prior_rows
+from physid_drake.identify.polish import SCATTER_PUSHES, Polished, degrees_of_freedom, new_scatter, prior_rows
 from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, theta_map
@@ -178,7 +178,7 @@ class OnlineIdentifier:
         return Identification(
             thetas=self.thetas, theta=belief.theta, estimates=estimates_of(self.thetas, polished), noise=belief.noise,
             search=belief.search, polished=polished,
-            reduced_chi2=polished.chi2 / max(1, polished.samples - len(belief.mean)),
+            reduced_chi2=polished.chi2 / polished.degrees if belief.terms else float("inf"),
             training=tuple(term.problem.name for term in belief.terms), held_out=(), before=None, after=None,
             fitted=pooled(belief.fitted), cells=cells_told(self.thetas, polished), foreseen=pooled(belief.foreseen),
         )  # fmt: skip
@@ -276,7 +276,7 @@ def _with_scales(belief: OnlineBelief, samples: int) -> OnlineBelief:
     whiteners = [term.whitener(belief.scatter) for term in belief.terms]
     residuals = [term.residual_at(belief.mean) for term in belief.terms]
     chi2 = sum(float((w.apply(r) ** 2).sum()) for w, r in zip(whiteners, residuals, strict=True))
-    inflation = max(1.0, chi2 / max(1, samples - len(belief.mean)))
+    inflation = max(1.0, chi2 / degrees_of_freedom(samples, belief.rows))
     scatter = belief.scatter
     if len(belief.terms) >= SCATTER_PUSHES:
         places = [term.nuisance.index("friction") for term in belief.terms]

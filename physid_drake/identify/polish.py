@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from physid_drake.identify.misfit import Whitener, difference, model_error_columns, whitened_residual
+from physid_drake.identify.misfit import Whitener, difference, diverged, model_error_columns, whitened_residual
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
 from physid_drake.identify.problem import Noise, PushProblem
 from physid_drake.identify.rollouts import RolloutPool, Task
@@ -22,6 +22,7 @@ NUISANCE_STEP = 0.5  # of the prior standard deviation
 ROUNDS = 2  # of linearising the pushes' own unknowns
 LARGEST_SCATTER = 0.2
 SMALLEST_SCATTER = 2e-3
+FIRST_SIGMAS = 4.0  # of the tracker: motion that is surely none of its noise
 SCATTER_STEPS = 2
 SCATTER_WEIGHT = 4.0
 SCATTER_PUSHES = 4  # fewer pushes than this do not tell their scatter
@@ -37,7 +38,7 @@ class Polished:
             priors, with respect to the unit cube.
         chi2: cost of the residuals and the pushes' unknowns, without theta's prior.
         inflation: reduced chi-square by which the noise was widened in the fit, at least 1.
-        samples: number of residuals.
+        samples: number of residuals, but those of pushes whose rollout diverged.
         friction_scatter: from push to push [-].
         residuals: one per push, marginal (m_i,).
         unknowns: per push, name to value in its unit.
@@ -60,6 +61,11 @@ class Polished:
         return np.asarray(np.linalg.inv(self.jacobian.T @ self.jacobian))
 
     @property
+    def degrees(self) -> float:
+        """Degrees of freedom that the residuals leave (``degrees_of_freedom``)."""
+        return degrees_of_freedom(self.samples, self.jacobian)
+
+    @property
     def correlation(self) -> Array:
         """Of theta (d, d), each entry on its parameter's scale, from the cost's curvature.
 
@@ -67,6 +73,23 @@ class Polished:
         """
         stds = np.sqrt(np.diag(self.covariance))
         return np.asarray(self.covariance / np.outer(stds, stds))
+
+
+def degrees_of_freedom(samples: int, jacobian: Array) -> float:
+    """Of so many residuals, those that fitted parameters leave; at least 1.
+
+    A parameter that its prior holds takes none: of many friction cells few combinations are fitted.
+
+    Args:
+        samples: number of residuals.
+        jacobian: (m + d, d), those of the priors last.
+
+    Source: T. Hastie, R. Tibshirani and J. Friedman, The Elements of Statistical Learning, 2nd ed., 2009, equation
+    3.50 (effective degrees of freedom of ridge regression).
+    """
+    rows = jacobian[: -jacobian.shape[1]]
+    fitted = float(np.trace(np.linalg.solve(jacobian.T @ jacobian, rows.T @ rows)))
+    return max(1.0, samples - fitted)
 
 
 def scatter_freedom(pushes: int) -> float:
@@ -88,6 +111,7 @@ class Polisher:
         self._pool, self._problems, self._noise = pool, problems, noise
         self._scatter = self._first_scatter = scatter
         self._inflation = 1.0
+        self._lost: frozenset[int] = frozenset()  # pushes that diverge where they were linearised last
         self._tick = tick or (lambda _: None)
         self._space = pool.thetas.space
 
@@ -98,9 +122,9 @@ class Polisher:
         whiteners = self._linearise(theta)
         for round_ in range(ROUNDS):
             self._tick(f"least squares, round {round_ + 1} of {ROUNDS}")
-            theta = self._fit(theta, whiteners)
+            theta, jacobian = self._fit(theta, whiteners)
             whiteners = self._linearise(theta)
-            whiteners = self._learn_scales(theta, whiteners)
+            whiteners = self._learn_scales(theta, whiteners, jacobian)
         return self._result(theta, whiteners, self._pool.count - before)
 
     def _nuisances(self) -> list[Nuisance]:
@@ -129,14 +153,16 @@ class Polisher:
         rows: list[list[Array]] = [[] for _ in self._problems]
         for i, row in zip(owners, self._residuals(tasks), strict=True):
             rows[i].append(row)
+        self._lost = frozenset(i for i, stack in enumerate(rows) if diverged(stack[0]))
         return [self._whitener(problem, stack) for problem, stack in zip(self._problems, rows, strict=True)]
 
     def _whitener(self, problem: PushProblem, stack: list[Array]) -> Whitener:
         columns = [difference(stack[0], row) / NUISANCE_STEP for row in stack[1:]]
-        touched = first_motion(problem)
+        touched = first_motion(problem, self._noise)
         return Whitener.of(np.column_stack([*columns, model_error_columns(problem, self._noise, touched)]))
 
-    def _fit(self, theta: Array, whiteners: list[Whitener]) -> Array:
+    def _fit(self, theta: Array, whiteners: list[Whitener]) -> tuple[Array, Array]:
+        """Theta (d,) of least cost, and the slope (m, d) there; pushes that diverge where it starts say nothing."""
         space = self._space
 
         def cost(u: Array) -> Array:
@@ -151,8 +177,7 @@ class Polisher:
             jac=slope, bounds=(0.0, 1.0), x_scale=0.1,
             max_nfev=12, xtol=1e-5, ftol=1e-6,
         )  # fmt: skip
-        theta_hat: Array = space.from_unit(found.x)
-        return theta_hat
+        return np.asarray(space.from_unit(found.x)), np.asarray(found.jac)
 
     def _jacobian(self, u: Array, whiteners: list[Whitener]) -> Array:
         """Slope (m, d) of ``_stacked`` with respect to the unit cube, by central differences.
@@ -184,26 +209,30 @@ class Polisher:
         return np.concatenate([*self._marginal(whiteners, residuals), prior_rows(self._space, theta)])
 
     def _marginal(self, whiteners: list[Whitener], residuals: list[Array]) -> list[Array]:
-        """Marginal residuals (m_i + k_i,) with the widened noise."""
+        """Marginal residuals (m_i + k_i,) with the widened noise; none of a push that is lost."""
         scale = 1.0 / np.sqrt(self._inflation)
-        return [scale * w.apply(r) for w, r in zip(whiteners, residuals, strict=True)]
+        told = [0.0 * r if i in self._lost else r for i, r in enumerate(residuals)]
+        return [scale * w.apply(r) for w, r in zip(whiteners, told, strict=True)]
 
-    def _learn_scales(self, theta: Array, whiteners: list[Whitener]) -> list[Whitener]:
+    def _learn_scales(self, theta: Array, whiteners: list[Whitener], jacobian: Array) -> list[Whitener]:
         """Learn the noise's inflation and the scatter of friction from what is left; the whiteners that follow."""
         residuals = self._residuals(self._tasks(theta))
-        chi2 = sum(float((w.apply(r) ** 2).sum()) for w, r in zip(whiteners, residuals, strict=True))
-        degrees = max(1, sum(len(r) for r in residuals) - len(theta))
-        self._inflation = max(1.0, chi2 / degrees)
-        if len(self._problems) < SCATTER_PUSHES:
+        told = [k for k in range(len(residuals)) if k not in self._lost]
+        chi2 = sum(float((whiteners[k].apply(residuals[k]) ** 2).sum()) for k in told)
+        samples = sum(len(residuals[k]) for k in told)
+        self._inflation = max(1.0, chi2 / degrees_of_freedom(samples, jacobian))
+        if len(told) < SCATTER_PUSHES:
             return whiteners
         old = self._scatter
         places = [nuisance.index("friction") for nuisance in self._nuisances()]
-        scaled = [r / np.sqrt(self._inflation) for r in residuals]
-        self._scatter = new_scatter(whiteners, places, scaled, old=old, first=self._first_scatter)
+        scaled = [residuals[k] / np.sqrt(self._inflation) for k in told]
+        self._scatter = new_scatter(
+            [whiteners[k] for k in told], [places[k] for k in told], scaled, old=old, first=self._first_scatter
+        )
         return [rescaled(w, k, self._scatter / old) for w, k in zip(whiteners, places, strict=True)]
 
     def _result(self, theta: Array, whiteners: list[Whitener], rollouts: int) -> Polished:
-        residuals = self._residuals(self._tasks(theta))
+        residuals = [0.0 * r if diverged(r) else r for r in self._residuals(self._tasks(theta))]
         marginal = [w.apply(r) for w, r in zip(whiteners, residuals, strict=True)]
         unknowns = []
         for nuisance, whitener, residual in zip(self._nuisances(), whiteners, residuals, strict=True):
@@ -214,7 +243,7 @@ class Polisher:
             jacobian=self._jacobian(np.asarray(self._space.to_unit(theta)), whiteners),
             chi2=float(sum((m**2).sum() for m in marginal)),
             inflation=self._inflation,
-            samples=sum(len(r) for r in residuals),
+            samples=sum(len(r) for i, r in enumerate(residuals) if i not in self._lost),
             friction_scatter=self._scatter,
             residuals=tuple(marginal),
             unknowns=tuple(unknowns),
@@ -267,10 +296,10 @@ def rescaled(whitener: Whitener, k: int, factor: float) -> Whitener:
     return Whitener.of(jacobian)
 
 
-def first_motion(problem: PushProblem) -> float:
-    """Roughly when the object starts to move: the model error begins there [s]."""
+def first_motion(problem: PushProblem, noise: Noise) -> float:
+    """Roughly when the object starts to move: the model error begins there [s]. A tracker's noise is no motion."""
     if len(problem.times) < 3:
         return problem.begin
     moved = np.linalg.norm(problem.poses[:, :2] - problem.poses[0, :2], axis=1)
-    beyond = np.flatnonzero(moved > 0.05 * float(moved.max(initial=0.0)))
+    beyond = np.flatnonzero(moved > max(0.05 * float(moved.max(initial=0.0)), FIRST_SIGMAS * noise.position))
     return float(problem.times[max(0, beyond[0] - 1)]) if len(beyond) else problem.begin

@@ -12,7 +12,7 @@ from physid_drake.cell import CellConfig, HandPath, Start
 from physid_drake.cell.hand_fit import fit_hand_paths, stream_std
 from physid_drake.errors import RecordingError
 from physid_drake.identify.force_windows import force_windows
-from physid_drake.identify.frames import check_hand_near, check_on_table, check_upright
+from physid_drake.identify.frames import check_clocks, check_hand_near, check_on_table, check_upright
 from physid_drake.recording import Cylinder as CylinderShape
 from physid_drake.recording import (
     Hand,
@@ -201,6 +201,7 @@ def _problem(
     push = recording.pushes[order]
     check_upright(recording, push)
     check_on_table(recording, push)
+    check_clocks(push)
     planar = push.object.planar
     start, start_std = _start_of(push, planar, noise, free=path is None)
     compared = np.ones(len(planar), dtype=bool)
@@ -303,7 +304,12 @@ def _longest_run(flags: NDArray[np.bool_], times: Array) -> slice | None:
 
 
 def _rests_outside(push: Push, times: Array) -> bool:
-    """Whether the object moves only while the hand is beside it at times (n,) [s], and slides to rest after that."""
+    """Whether the object moves only while the hand is beside it at times (n,) [s], and slides to rest after that.
+
+    Nothing speaks against it where only the first and the last pose are known.
+    """
+    if push.endpoint_only:
+        return True
     places, seen = push.object.positions[:, :2], push.object.times
 
     def moves(when: NDArray[np.bool_]) -> bool:

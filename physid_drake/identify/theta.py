@@ -164,6 +164,11 @@ def _mass(model: ObjectModel, solid: Solid, density: float, bounds: Sequence[flo
 
 def cell_error(space: ParameterSpace, theta: Array, j: int) -> float:
     """The cell's own error of the j-th parameter of theta (d,), in the unit cube."""
-    moved = theta.copy()
-    moved[j] = max(space.parameters[j].lower, theta[j] * (1.0 - CELL_ERROR))
+    parameter, moved = space.parameters[j], theta.copy()
+    size = abs(float(theta[j]))
+    if parameter.scale == "linear" and parameter.prior_std is not None:  # which may be nothing, and so is 1 % of it
+        size = max(size, parameter.prior_std)
+    moved[j] = theta[j] - CELL_ERROR * size
+    if moved[j] < parameter.lower:
+        moved[j] = theta[j] + CELL_ERROR * size
     return float(abs(np.asarray(space.to_unit(moved))[j] - np.asarray(space.to_unit(theta))[j]))

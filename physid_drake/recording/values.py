@@ -246,6 +246,11 @@ class ObjectModel:
         check_not_negative("mass_std_kg", "kg", self.mass_std)
         if self.mass is None and self.mass_std is not None:
             raise RecordingError("mass_std_kg is given without mass_kg; give the mass too, or neither.")
+        if self.mass is not None and self.mass_std is not None and self.mass_std >= self.mass:
+            raise RecordingError(
+                f"mass_std_kg must be below mass_kg, {self.mass:g} kg, but is {self.mass_std:g} kg;"
+                " leave both out if nobody weighed the object."
+            )
         if self.mass is not None and self.mass_std is None:
             object.__setattr__(self, "mass_std", DEFAULT_MASS_STD_SHARE * self.mass)
 

@@ -258,5 +258,8 @@ def test_npz_round_trip_gives_the_same_belief_and_the_same_future(tmp_path):
 
 def test_a_file_that_is_not_a_belief_is_refused(tmp_path):
     np.savez(tmp_path / "other.npz", x=np.zeros(3))
+    np.save(tmp_path / "array.npz", np.zeros(3))
+    with pytest.raises(ParameterError, match="cannot be read"):
+        Belief.from_npz(tmp_path / "array.npz.npy")
     with pytest.raises(ParameterError, match="physid-belief/1"):
         Belief.from_npz(tmp_path / "other.npz")

@@ -41,6 +41,22 @@ def test_an_object_that_is_seen_too_late_already_moves(recording):
     assert said.startswith("the object already moves") and said.endswith(f": {recording.pushes[0].name}")
 
 
+@pytest.mark.parametrize("every", [1, 2, 4], ids=["100 Hz", "50 Hz", "25 Hz"])
+def test_a_slow_tracker_sees_it_too(recording, every):
+    def thinned(push):
+        return replace(push, object=cut(push.object, slice(None, None, every)))
+
+    whole = replace(recording, pushes=tuple(thinned(push) for push in recording.pushes))
+    assert unseen_motion(whole, SIGMA) == ()
+
+    def late(push):
+        way = np.linalg.norm(push.object.positions[:, :2] - push.object.positions[0, :2], axis=1)
+        return replace(push, object=cut(push.object, way > 0.3 * way.max()))
+
+    (said,) = unseen_motion(with_first(whole, late), SIGMA)
+    assert said.startswith("the object already moves")
+
+
 def test_a_hand_that_is_lost_on_its_way_is_said(recording):
     def lost(push):
         way = np.linalg.norm(push.hand.positions[:, :2] - push.hand.positions[0, :2], axis=1)

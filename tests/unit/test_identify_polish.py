@@ -5,9 +5,15 @@ import pytest
 from runs import shipped_pushes
 
 from physid_drake.cell import CellConfig
+from physid_drake.cell.solid import solid_of
 from physid_drake.identify import Identifier, SearchConfig, ThetaConfig
+from physid_drake.identify.identify import estimates_of
 from physid_drake.identify.misfit import FAILED, diverged, whitened_residual
-from physid_drake.identify.polish import THETA_STEP, Polisher
+from physid_drake.identify.polish import THETA_STEP, Polished, Polisher, degrees_of_freedom
+from physid_drake.identify.theta import theta_map
+from physid_drake.recording import Box, ObjectModel
+
+SHAPE = Box(size=(0.12, 0.05, 0.03))
 
 
 @pytest.fixture(scope="module")
@@ -61,3 +67,40 @@ def test_a_rollout_that_diverged_is_far_from_every_recording(identifier):
     assert diverged(residual) and len(residual) == 3 * len(problem.times) + 2 * len(problem.force_times)
     (prediction,) = identifier.pool.run([identifier._task(problem, identifier.thetas.space.nominal)])
     assert np.abs(whitened_residual(problem, identifier.noise, prediction)).max() < 0.1 * FAILED
+
+
+def test_what_only_its_prior_holds_takes_no_degree_of_freedom():
+    slope = np.zeros((9, 3))
+    slope[:, 0] = 1e3  # the residuals tell the first, say nothing of the second, and half of the third
+    slope[:, 2] = np.sqrt(1.0 / 9.0) * np.array([1.0, -1.0] * 4 + [0.0]) * np.sqrt(9.0 / 8.0)
+    assert degrees_of_freedom(9, np.concatenate([slope, np.eye(3)])) == pytest.approx(9 - 1.5, abs=1e-2)
+    assert degrees_of_freedom(1, np.concatenate([slope, np.eye(3)])) == 1.0
+
+
+def test_a_push_that_diverges_says_nothing_and_takes_nothing_from_the_others(identifier, monkeypatch):
+    lost, simulate = identifier.problems[0].name, identifier.pool.run
+
+    def run(tasks):
+        return [None if t.problem.name == lost else p for t, p in zip(tasks, simulate(tasks), strict=True)]
+
+    start = identifier.thetas.space.nominal
+    others = Polisher(identifier.pool, identifier.problems[1:], identifier.noise, 0.03).run(start)
+    monkeypatch.setattr(identifier.pool, "run", run)
+    found = Polisher(identifier.pool, identifier.problems, identifier.noise, 0.03).run(start)
+    np.testing.assert_allclose(found.theta, others.theta, rtol=1e-6)
+    assert found.samples == others.samples and found.chi2 == pytest.approx(others.chi2)
+    error = identifier._error([None, *simulate([identifier._task(identifier.problems[1], start)])])
+    assert error == float("inf")  # half of them
+
+
+def test_an_interval_of_what_is_not_told_holds_its_value(identifier):
+    """Restitution and static friction begin at their lower bounds."""
+    config = ThetaConfig(parameters=["support_friction", "restitution", "static_ratio"])
+    thetas = theta_map(ObjectModel(shape=SHAPE, mass=0.054), solid_of(SHAPE), (1, 1), config, 500.0)
+    jacobian = np.concatenate([np.zeros((4, 3)), np.sqrt(12.0) * np.eye(3)])
+    polished = Polished(
+        theta=np.array([0.3, 0.0, 1.0]), jacobian=jacobian, chi2=1.0, inflation=1.0, samples=4, friction_scatter=0.03,
+        residuals=(), unknowns=(), rollouts=0,
+    )  # fmt: skip
+    for estimate in estimates_of(thetas, polished):
+        assert estimate.ci90[0] <= estimate.value <= estimate.ci90[1]

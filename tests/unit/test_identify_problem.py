@@ -206,6 +206,41 @@ def test_an_object_that_tips_on_its_way_is_refused(recording):
         first(with_pushes(recording, tip_over))
 
 
+def ends(push):
+    """The push with its first and last pose only."""
+    s, rows = push.object, [0, len(push.object) - 1]
+    stream = PoseStream(times=s.times[rows], positions=s.positions[rows], quaternions=s.quaternions[rows])
+    return replace(push, object=stream)
+
+
+def test_an_object_that_has_tipped_by_its_last_pose_is_refused(recording):
+    def tipped(push):
+        seen = ends(push).object
+        over = np.array([[1.0, 0.0, 0.0, 0.0], [np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0]])
+        return replace(push, object=replace(seen, quaternions=over))
+
+    with pytest.raises(RecordingError, match="the object tips by 90 degrees, from"):
+        first(with_pushes(recording, tipped))
+
+
+def test_a_hand_that_lifts_off_is_cut_where_only_the_ends_are_known_too(recording):
+    def lift(push):
+        return ends(lifted(push, lambda times: times > 0.8 * times[-1]))
+
+    pushed = recording.pushes[0].hand
+    cut, whole = first(with_pushes(recording, lift)), first(with_pushes(recording, ends))
+    assert cut.path.knot_positions()[-1] @ [1.0, 0.0] < pushed.positions[:, 0].max() + 1e-3
+    assert cut.hand_height == whole.hand_height
+
+
+def test_streams_of_different_clocks_are_refused(recording):
+    def later(push):
+        return replace(push, hand=replace(push.hand, times=push.hand.times + 1000.0))
+
+    with pytest.raises(RecordingError, match="same clock"):
+        first(with_pushes(recording, later))
+
+
 def test_an_object_that_stands_beside_the_table_is_refused(recording):
     elsewhere = replace(recording, table=replace(recording.table, centre=(9.0, 0.0)))
     with pytest.raises(RecordingError, match=r"beside the table.*same frame"):
@@ -275,12 +310,6 @@ def test_without_a_rest_the_first_pose_is_the_start(recording):
 
 
 def test_of_two_poses_the_first_is_the_start_and_the_last_is_compared(recording):
-    def ends(push):
-        s = push.object
-        rows = [0, len(s) - 1]
-        stream = PoseStream(times=s.times[rows], positions=s.positions[rows], quaternions=s.quaternions[rows])
-        return replace(push, object=stream)
-
     changed = with_pushes(recording, ends)
     problem = first(changed)
     np.testing.assert_array_equal(problem.start.pose, changed.pushes[0].object.planar[0])

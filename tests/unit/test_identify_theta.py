@@ -6,7 +6,7 @@ import pytest
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError, ParameterError
 from physid_drake.identify import ThetaConfig
-from physid_drake.identify.theta import friction_names, theta_map
+from physid_drake.identify.theta import cell_error, friction_names, theta_map
 from physid_drake.recording import Box, ObjectModel
 
 SHAPE = Box(size=(0.12, 0.05, 0.03))
@@ -109,6 +109,17 @@ def test_the_centre_of_mass_stays_inside_the_outline():
     space = thetas("com_x", "com_y").space
     np.testing.assert_allclose(space.upper, [0.036, 0.015])
     np.testing.assert_allclose(space.lower, [-0.036, -0.015])
+
+
+def test_the_cells_own_error_is_something_at_a_bound_and_at_nothing():
+    """A percent of a friction, of a place as much of what is known of it."""
+    space = thetas("support_friction", "com_x", bounds={"support_friction": [0.02, 1.0]}).space
+    inside, at_bound = (cell_error(space, np.array([mu, 0.0]), 0) for mu in (0.3, 0.02))
+    assert at_bound == pytest.approx(inside, rel=0.02)
+    com = space.parameters[1]
+    assert cell_error(space, np.array([0.3, 0.0]), 1) == pytest.approx(
+        0.01 * com.prior_std / (com.upper - com.lower), rel=1e-6
+    )
 
 
 def test_bounds_move_the_nominal_inside():

@@ -134,6 +134,7 @@ def test_a_mass_without_a_deviation_is_known_to_one_percent():
         lambda: Cylinder(radius=0.0, length=1.0, axis="z"),
         lambda: Cylinder(radius=1.0, length=1.0, axis="x"),
         lambda: ObjectModel(shape=Box(size=(1, 1, 1)), mass=None, mass_std=0.1),
+        lambda: ObjectModel(shape=Box(size=(1, 1, 1)), mass=0.054, mass_std=10.0),
         lambda: Hand(tip="cylinder", radius=0.01, stream="measured"),
         lambda: Hand(tip="sphere", radius=0.01, length=0.1, stream="measured"),
         lambda: Sensors(force_std=-1.0),
