@@ -35,7 +35,8 @@ class Motion:
     Attributes:
         times: (n,) s.
         poses: (n, 7) quaternion wxyz and position of B in W.
-        forces: (n, 3) mean force of the hand on the object over the tick that ends at each time, in W [N].
+        forces: (n, 3) mean force of the hand on the object over the tick that ends at each time, in W [N]; without
+            the impulse of a rigid tip's impact, which takes no time.
         outcome: how it ended.
         impacts: times of the impacts [s].
     """
