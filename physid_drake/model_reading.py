@@ -17,7 +17,7 @@ from physid_drake.effects import Effect, effect_named
 from physid_drake.errors import ConfigError
 from physid_drake.model import AS_W, FORMAT, SHAPES, Correlation, Model
 from physid_drake.recording import Shape
-from physid_drake.yaml_text import parsed
+from physid_drake.yaml_text import read_yaml
 
 _POSITIVE = ("ratio", "speed", "radius", "frequency")  # of effects: nothing has none of it
 _NOT_NEGATIVE = ("compliance", "damping", "stiffness", "strength", "core", "rest_length")
@@ -35,13 +35,7 @@ def load_model(path: Path | str) -> Model:
     file = Path(path)
     file = file / "model.yaml" if file.is_dir() else file
     where = f"model '{file}'"
-    try:
-        text = file.read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise ConfigError(f"{where}: there is no such file.") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{where}: cannot be read: {' '.join(str(error).split())}.") from error
-    content = parsed(text, where)
+    content = read_yaml(file, where)
     found = content.get("format") if isinstance(content, dict) else None
     if found != FORMAT:
         raise ConfigError(f"{where}: the format must be '{FORMAT}', but is {found!r}; diagnose again.")

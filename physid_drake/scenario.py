@@ -19,7 +19,7 @@ from physid_drake.resources import shipped
 from physid_drake.run_folder import named_after
 from physid_drake.scenario_schema import Scenario
 from physid_drake.search import SEARCHES
-from physid_drake.yaml_text import parsed
+from physid_drake.yaml_text import parsed, read_yaml
 
 DEFAULT = "eraser.yaml"
 
@@ -84,13 +84,7 @@ def _locate(config: str) -> tuple[Path, str | None]:
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise ConfigError(f"config '{path}': there is no such file.") from error
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"config '{path}': cannot be read: {error}.") from error
-    content = parsed(text, f"config '{path}'")
+    content = read_yaml(path, f"config '{path}'")
     if not isinstance(content, dict) or not content:
         raise ConfigError(f"config '{path}': needs named scenarios at the top level, 'name: {{...}}'.")
     # Keys that start with an underscore are for anchors and templates.

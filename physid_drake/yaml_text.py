@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import yaml
@@ -27,3 +28,22 @@ def parsed(text: str, where: str) -> Any:
     except NO_YAML as error:
         cause = " ".join(str(error).split()).rstrip(".") or type(error).__name__
         raise ConfigError(f"{where}: is no YAML: {cause}.") from error
+
+
+def read_yaml(path: Path, where: str) -> Any:
+    """The content of a YAML file.
+
+    Args:
+        path: of the file.
+        where: it is from, for the message.
+
+    Raises:
+        ConfigError: if it is not there, cannot be read, or is no YAML.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise ConfigError(f"{where}: there is no such file.") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{where}: cannot be read: {' '.join(str(error).split())}.") from error
+    return parsed(text, where)
