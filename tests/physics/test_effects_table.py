@@ -188,7 +188,8 @@ def test_a_slow_push_needs_the_force_that_friction_bears(speed, law, share):
         for effects in ([], [make(name, **law[1])])
     )
     plain, with_law = (motion.forces_at(times)[:, 0].mean() for motion in motions)
-    assert with_law == pytest.approx(share * plain, rel=3e-3)  # measured 5e-4; 25 % at 0.5 mm/s before
+    # Measured: 5e-4; 30 % at 0.5 mm/s where laws fade earlier than the contact.
+    assert with_law == pytest.approx(share * plain, rel=3e-3)
 
 
 def test_a_slippery_patch_is_slippery_at_rest():
@@ -200,9 +201,11 @@ def test_a_slippery_patch_is_slippery_at_rest():
 
 @pytest.mark.parametrize("ratio", [0.2, 0.5, 2.0])
 def test_a_spin_on_a_patch_is_that_of_its_friction(ratio):
+    """Where no point is at the very centre: one that does not slip knows nothing of the law (36 points: -2.9 %)."""
     spin = {"velocity": (0.0, 0.0, 5.0)}
     on_patch = end(slide(make("friction_patch", ratio=ratio, radius=3.0), **spin))[2]
-    assert on_patch == pytest.approx(end(slide(friction=ratio * MU, **spin))[2], rel=1e-3)  # measured 2e-5
+    # Measured: 2e-5; 1.7e-4 where what the law gives fades twice.
+    assert on_patch == pytest.approx(end(slide(friction=ratio * MU, **spin))[2], rel=1e-4)
 
 
 @pytest.mark.parametrize("velocity", [(0.4, 0.4, 0.0), (0.8, 0.3, 0.0)])
@@ -211,5 +214,5 @@ def test_friction_on_what_rolls_is_against_its_slip_and_not_its_way(velocity):
     lying = Geometry(shape=Cylinder(radius=0.03, length=0.1, axis="y"))
     on_patch = end(slide(make("friction_patch", ratio=0.5, radius=5.0), velocity=velocity, geometry=lying))
     plain = end(slide(velocity=velocity, geometry=lying, friction=0.5 * MU))
-    # Measured: 0.05 mm and 0.1 mrad; 15 mm and 5 mrad where all of its motion counted as slip.
+    # Measured: 0.05 mm and 0.1 mrad; 18 mm and 13 mrad where all of its motion counted as slip.
     np.testing.assert_allclose(on_patch, plain, atol=5e-4)

@@ -24,11 +24,11 @@ def test_a_tether_pulls_with_its_stretch(rest_length):
 
 @pytest.mark.parametrize("stiffness", [20.0, 1000.0, 10000.0])
 def test_a_spring_gives_back_no_more_than_it_took(stiffness):
-    """At 2 ms; a force taken where the tick begins makes 1.1 to 32 % of speed per swing."""
+    """At 2 ms; a force taken where the tick begins makes 1.1 to 29 % of speed in these swings."""
     swings = 4.0 * np.sqrt(MASS / stiffness) * np.pi
     motion = slide(make("tether", stiffness=stiffness), friction=1e-4, seconds=swings)
     speeds = np.hypot(*velocities(motion)[:, :2].T)
-    assert speeds.max() <= 0.5 and speeds[-len(speeds) // 2 :].max() > 0.47  # measured 0.500, 0.498, 0.488
+    assert speeds.max() <= 0.5 and speeds[-len(speeds) // 2 :].max() > 0.49  # measured 0.499, 0.499, 0.496
 
 
 @pytest.mark.parametrize(("rest_length", "most"), [(0.0, 5e-5), (0.02, 3e-4)])
@@ -36,7 +36,7 @@ def test_a_tether_does_not_depend_on_the_tick(rest_length, most):
     stiffness = 30.0 if rest_length == 0.0 else 300.0
     tether = make("tether", stiffness=stiffness, rest_length=rest_length)
     fine, *coarse = (end(slide(tether, friction=0.1, seconds=1.5, tick=tick))[0] for tick in (5e-4, 2e-3, 4e-3, 8e-3))
-    # Measured: 0.002 to 0.014 mm and 0.004 to 0.13 mm; 0.9 to 5 mm and more if taken where the tick begins.
+    # Measured: 0.002 to 0.014 mm and 0.004 to 0.13 mm; 0.5 to 14 mm where the tick begins.
     np.testing.assert_allclose(coarse, fine, atol=most)
 
 
