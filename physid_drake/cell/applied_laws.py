@@ -6,9 +6,8 @@ import dataclasses as dc
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
-from physid_drake.cell.forces import SLOWEST, ForceLaw, FrictionLaw, ObjectState, Swinging, Wrench, total_wrenches
+from physid_drake.cell.forces import ForceLaw, FrictionLaw, Frictions, Swinging, Wrench, total_wrenches
+from physid_drake.cell.object_state import SLOWEST, ObjectState
 from physid_drake.cell.plant_state import PlantState
 
 SURELY_HELD = 0.5  # of the friction: a resting object under less does not slide
@@ -48,10 +47,8 @@ class AppliedLaws:
 
     def _friction_at_a_creep(self, seen: ObjectState, wrenches: Sequence[Wrench]) -> float:
         """What bears an object that begins to slide where the forces pull it [N]: of a slippery patch, little."""
-        most = float(seen.holding.sum())
         force = complex(sum(w.fx for w in wrenches), sum(w.fy for w in wrenches))
         if not self._frictions or force == 0.0:
-            return most
+            return float(seen.holding.sum())
         creeping = dc.replace(seen, v_WBo=CREEP * force / abs(force), yaw_rate=0.0)
-        given = sum(float(np.linalg.norm(law.refund(creeping), axis=1).sum()) for law in self._frictions)
-        return max(0.0, math.prod(law.largest for law in self._frictions) * most - given)
+        return float(seen.holding @ Frictions(tuple(self._frictions)).ratio(creeping).real)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 
 from physid_drake.cell.diagram import Scene
-from physid_drake.cell.forces import ObjectState, reader_of
 from physid_drake.cell.motion import Start, planar_pose
+from physid_drake.cell.object_state import ObjectState, reader_of
 from physid_drake.cell.setters import Body
 from physid_drake.cell.touch import Planar
 

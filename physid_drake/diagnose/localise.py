@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from physid_drake.cell.forces import ForceLaw, ObjectState, Wrench
+from physid_drake.cell.forces import ForceLaw, Wrench
+from physid_drake.cell.object_state import ObjectState
 from physid_drake.cell.solid import solid_of
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import Fitter

@@ -9,7 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from physid_drake.cell.forces import ForceLaw, ObjectState, Wrench
+from physid_drake.cell.forces import ForceLaw, Wrench
+from physid_drake.cell.object_state import ObjectState
 from physid_drake.effects.effect import Coordinate, Effect, PushFacts, Surroundings, parameter
 
 ROLLING_EDGE = 1e-3  # m/s: below it rolling resistance fades, so that it never drives backwards

@@ -10,7 +10,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.cell.forces import ForceLaw, ObjectState, Wrench
+from physid_drake.cell.forces import ForceLaw, Wrench
+from physid_drake.cell.object_state import ObjectState
 from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
 from physid_drake.effects.places import grid_of_places
 

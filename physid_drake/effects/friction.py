@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import Body
-from physid_drake.cell.forces import FrictionLaw, ObjectState, as_complex, as_plane
+from physid_drake.cell.forces import FrictionLaw
+from physid_drake.cell.object_state import Complex, ObjectState
 from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
 from physid_drake.effects.places import close_grid_of_places
 
@@ -21,35 +22,6 @@ SLIGHT_SHARE = 0.015  # of the friction
 BASE = 0.6  # of the distance between two places: a patch's radius that covers the gaps
 WIDE = (2.0, 3.5)  # times that radius: larger patches are made of those
 WIDER, NEARBY = 1.3, 0.02  # times a patch's radius, and m: a fit may move its edge by so much
-
-
-def _along(state: ObjectState, share: Array) -> Array:
-    """Forces (n, 2) along the slip, ``share`` (n,) times what friction holds [N]."""
-    return as_plane(share * state.holding * state.slip_directions)
-
-
-@dc.dataclass(frozen=True)
-class Together:
-    """Several friction laws at once, as one: their ratios to the plain friction multiply, their turns add."""
-
-    laws: tuple[FrictionLaw, ...]
-
-    @property
-    def largest(self) -> float:
-        """The product."""
-        return math.prod(law.largest for law in self.laws)
-
-    def refund(self, state: ObjectState) -> Array:
-        """What the contact's friction, ``largest`` times the plain one, is too much."""
-        whole = state.holding * state.slip_directions
-        moving = whole != 0.0
-        ratio = np.ones(len(whole), dtype=np.complex128)
-        for law in self.laws:
-            true = law.largest * whole - as_complex(law.refund(state))
-            ratio[moving] *= true[moving] / whole[moving]
-        # Two strong ellipses might turn friction forward.
-        ratio = np.maximum(ratio.real, 0.0) + 1j * ratio.imag
-        return as_plane((self.largest - ratio) * whole)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -98,10 +70,9 @@ class _StribeckLaw:
     def largest(self) -> float:
         return 1.0 + max(0.0, self.excess)
 
-    def refund(self, state: ObjectState) -> Array:
+    def ratio(self, state: ObjectState) -> Array | Complex:
         speeds = np.abs(state.slips)
-        ratio = 1.0 + self.excess * np.exp(-((speeds / self.speed) ** 2))
-        return _along(state, self.largest - ratio)
+        return np.asarray(1.0 + self.excess * np.exp(-((speeds / self.speed) ** 2)))
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -162,24 +133,24 @@ class AnisotropicObject(_Anisotropic):
 
 @dc.dataclass(frozen=True)
 class _EllipseLaw:
-    ratio: float
+    axes: float  # largest over least friction
     angle: float
     fixed_in_object: bool
 
     @property
     def largest(self) -> float:
-        return math.sqrt(self.ratio)
+        return math.sqrt(self.axes)
 
-    def refund(self, state: ObjectState) -> Array:
+    def ratio(self, state: ObjectState) -> Array | Complex:
         angle = self.angle + (state.yaw if self.fixed_in_object else 0.0)
         # M^2 v of a plane vector v = x + iy with the slippery axis at an angle a is mean v + half e^(2ia) conj(v).
-        mean, half = 0.5 * (1.0 / self.ratio + self.ratio), 0.5 * (1.0 / self.ratio - self.ratio)
-        along = state.slip_directions
-        flipped = along.conj()
-        squeezed = mean * along + (half * cmath.exp(2j * angle)) * flipped
-        # |M v|^2 = v . M^2 v; |M v| and |v| fade together, so that their ratio stays what it is.
-        ratio = (flipped * along).real / np.maximum((flipped * squeezed).real, 1e-24)
-        return as_plane(state.holding * (self.largest * along - np.sqrt(ratio) * squeezed))
+        mean, half = 0.5 * (1.0 / self.axes + self.axes), 0.5 * (1.0 / self.axes - self.axes)
+        slips = state.slips
+        moving = slips != 0.0
+        squeezed = np.ones(len(slips), dtype=np.complex128)  # M^2 v / v; rest has no direction
+        squeezed[moving] = mean + (half * cmath.exp(2j * angle)) * (slips[moving].conj() / slips[moving])
+        # |M v|^2 = v . M^2 v
+        return np.asarray(squeezed / np.sqrt(squeezed.real))
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -249,20 +220,19 @@ def _shares(places: Array, place: Array, wide: float, radius: float, spacing: fl
 
 @dc.dataclass(frozen=True)
 class _PatchLaw:
-    ratio: float
+    inside: float
     x: float
     y: float
     radius: float
 
     @property
     def largest(self) -> float:
-        return max(1.0, self.ratio)
+        return max(1.0, self.inside)
 
-    def refund(self, state: ObjectState) -> Array:
+    def ratio(self, state: ObjectState) -> Array | Complex:
         away = np.abs(state.places - complex(self.x, self.y))
         radii = np.maximum(state.underside.radii, POINT)
-        ratio = 1.0 + (self.ratio - 1.0) * share_inside((away - self.radius) / radii)
-        return _along(state, self.largest - ratio)
+        return 1.0 + (self.inside - 1.0) * share_inside((away - self.radius) / radii)
 
 
 def share_inside(beyond: Array) -> Array:
@@ -319,10 +289,9 @@ class _GradientLaw:
     slope_y: float
     largest: float
 
-    def refund(self, state: ObjectState) -> Array:
+    def ratio(self, state: ObjectState) -> Array | Complex:
         places = state.places
-        ratio = np.clip(1.0 + self.slope_x * places.real + self.slope_y * places.imag, 0.0, self.largest)
-        return _along(state, self.largest - ratio)
+        return np.asarray(np.clip(1.0 + self.slope_x * places.real + self.slope_y * places.imag, 0.0, self.largest))
 
 
 @dc.dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,8 @@ from typing import ClassVar
 
 from physid_drake.cell import Body
 from physid_drake.cell.diagram import GRAVITY
-from physid_drake.cell.forces import ForceLaw, ObjectState, Wrench
+from physid_drake.cell.forces import ForceLaw, Wrench
+from physid_drake.cell.object_state import ObjectState
 from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
 
 

@@ -16,7 +16,6 @@ from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.support import PressureGrid
 from physid_drake.effects.catalogue import CATALOGUE
 from physid_drake.effects.effect import Effect, Pose, PushFacts
-from physid_drake.effects.friction import Together
 from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]
@@ -147,9 +146,8 @@ def body_with(effects: Sequence[Effect], body: Body, facts: PushFacts) -> Body:
 
 
 def frictions_of(effects: Sequence[Effect], facts: PushFacts) -> list[FrictionLaw]:
-    """The effects' friction laws; several act as one."""
-    frictions = [law for effect in effects for law in effect.frictions(facts)]
-    return [Together(tuple(frictions))] if len(frictions) > 1 else frictions
+    """The effects' friction laws."""
+    return [law for effect in effects for law in effect.frictions(facts)]
 
 
 def mount_of(effects: Sequence[Effect], facts: PushFacts) -> Mount | None:

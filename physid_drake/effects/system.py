@@ -17,7 +17,8 @@ from pydrake.systems.framework import Context, DiagramBuilder, DiscreteValues, L
 
 from physid_drake.cell import Body
 from physid_drake.cell.diagram import Scene
-from physid_drake.cell.forces import ForceLaw, FrictionLaw, StateReader, reader_of, total_wrenches
+from physid_drake.cell.forces import ForceLaw, FrictionLaw, total_wrenches
+from physid_drake.cell.object_state import StateReader, reader_of
 
 NAME = "effect_forces"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from physid_drake.cell import Body, CellConfig, Start
-from physid_drake.cell.forces import reader_of
+from physid_drake.cell.object_state import reader_of
 from physid_drake.effects import effect_named
 from physid_drake.effects.system import NAME
 from physid_drake.model import Model

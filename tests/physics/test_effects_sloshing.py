@@ -11,7 +11,8 @@ from scipy.optimize import least_squares
 from twin import body_of
 
 from physid_drake.cell import Start
-from physid_drake.cell.forces import Wrench, reader_of
+from physid_drake.cell.forces import Wrench
+from physid_drake.cell.object_state import reader_of
 from physid_drake.effects.rollout import facts_of, geometry_with
 
 

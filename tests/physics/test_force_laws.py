@@ -39,10 +39,9 @@ class Stribeck:
     def largest(self):
         return 1.0 + self.excess
 
-    def refund(self, state):
+    def ratio(self, state):
         slip = np.hypot(*state.v_WQ.T)
-        too_much = state.friction * self.excess * (1.0 - np.exp(-((slip / self.speed) ** 2))) * state.loads
-        return (too_much / np.maximum(slip, 1e-9))[:, None] * state.v_WQ
+        return 1.0 + self.excess * np.exp(-((slip / self.speed) ** 2))
 
 
 @pytest.fixture(scope="module", params=["point", "hydroelastic"])

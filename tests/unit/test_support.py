@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from physid_drake.cell import CellConfig
-from physid_drake.cell.forces import ObjectState, Underside, as_complex, as_plane, refund_wrench, total_wrenches
+from physid_drake.cell.forces import friction_wrench, total_wrenches
+from physid_drake.cell.object_state import ObjectState, Underside, as_complex
 from physid_drake.cell.outline import Disc, Polygon, rectangle
 from physid_drake.cell.support import FrictionGrid, Support, rest_depths, support_of
 from physid_drake.effects.friction import share_inside
@@ -155,7 +156,7 @@ def spinning(name, centre, yaw=0.0, points=POINTS):
 def felt(state):
     """Force and torque (3,) of the contact less what turning slip cancels of it, turned round."""
     given_back = [np.array([w.fx, w.fy, w.torque]) for w in total_wrenches(state, (), ())]
-    contact = refund_wrench(state, as_plane(state.holding * state.slip_directions))
+    contact = friction_wrench(state, 1.0)
     return np.array([contact.fx, contact.fy, contact.torque]) - sum(given_back, np.zeros(3))
 
 
@@ -203,7 +204,7 @@ def test_turning_slip_is_braked_less_but_never_driven_and_alike_both_ways(name):
         state = spinning(name, place)
         back = dataclasses.replace(state, v_WBo=-state.v_WBo, yaw_rate=-state.yaw_rate)
         motion = np.array([state.v_WBo.real, state.v_WBo.imag, state.yaw_rate])
-        contact = refund_wrench(state, as_plane(state.holding * state.slip_directions))
+        contact = friction_wrench(state, 1.0)
         most = motion @ np.array([contact.fx, contact.fy, contact.torque])
         # Some torque is left where the points alone have none, so that a little more than theirs may be lost.
         assert 0.0 < motion @ felt(state) < 1.02 * most
@@ -215,8 +216,8 @@ class Half:
 
     largest = 1.0
 
-    def refund(self, state):
-        return as_plane(0.5 * state.holding * state.slip_directions)
+    def ratio(self, state):
+        return np.full(len(state.underside.points), 0.5)
 
 
 def test_half_the_friction_cancels_half_as_much():
