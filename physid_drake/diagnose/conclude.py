@@ -156,8 +156,9 @@ def _predicts(evidence: Evidence) -> bool:
 
 
 def _by_several(evidence: Evidence) -> bool:
-    """Whether more than one of these pushes shows it."""
-    return shown_by_several(evidence.case, evidence.errors_before, evidence.errors_after)
+    """Whether more than one of these pushes shows it; those of an order do, which their number bears out."""
+    ordered = bool(evidence.steps) and all(step[0].score.in_order for step in evidence.steps)
+    return ordered or shown_by_several(evidence.case, evidence.errors_before, evidence.errors_after)
 
 
 def _explained(evidence: Evidence) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses as dc
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,7 +21,6 @@ Array = NDArray[np.float64]
 WORTH_A_FIT = 0.35  # of the best score test's gain
 RIVAL = 0.5  # where one explains the pushes already
 WORTH_A_TRY = 0.1  # where none takes a good part of the mismatch away
-IN_ORDER = math.log(1e-4)  # of a p-value
 ENOUGH = 120  # rollouts per push in one step after which no further effect is tried, nor another shape of one
 SURE = 2.0  # standard errors
 LEAST = 4.0  # nats of held-out gain
@@ -84,9 +82,15 @@ class Candidate:
         Either most of them do, or, for what only a few pushes feel (a patch, a magnet), more than one does far beyond
         what the simulator's own error explains. Pushes differ in what they feel of an effect, so that the sum of
         their gains is as unsure as the largest of them; gains are bounded before they are compared with their spread.
+
+        Or their frictions follow what the effect does to them beyond chance. Whole pushes' frictions differ anyway:
+        an effect that orders them makes the first and last pushes likelier by far and those between hardly, so that
+        gains spread as widely as they are large.
         """
         if self.degenerate or self.gain < LEAST:
             return False
+        if self.score.in_order:
+            return True
         bounded = np.clip(self.gains, -BOUND, BOUND)
         some = np.sort(self.gains)[:-1]
         local = some.sum() > CERTAIN and (self.gains > CERTAIN / 4.0).sum() >= 2
@@ -134,7 +138,7 @@ def confirm(
     worth = [s for s in ordered if s.gain >= WORTH_A_FIT * ordered[0].gain][:most]
     taken = {s.kind for s in worth}
     # Frictions that follow the pushes' order are seen by their ranks, whatever gains more in linearised pushes.
-    worth += [s for s in ordered if s.signature.friction_changes and s.log_p < IN_ORDER and s.kind not in taken]
+    worth += [s for s in ordered if s.in_order and s.kind not in taken]
     taken = {s.kind for s in worth}
     rest = [s for s in ordered if s.gain >= WORTH_A_TRY * ordered[0].gain and s.kind not in taken]
     more = rest[: 2 * most - len(worth)]
@@ -157,7 +161,7 @@ def confirm(
         again = _fit_from_afar(fitter, before, candidate)
         if again is not None and again.score > candidate.fitted.score:
             found[k] = _candidate(fitter, candidate.score, again, plain)
-    return tuple(ranked(found))
+    return tuple(_tried_from_nearer_theta(fitter, before, ranked(found), plain, tick))
 
 
 def _some_leads_near(before: Fitted, found: Sequence[Candidate]) -> bool:
@@ -182,6 +186,30 @@ def _tried_elsewhere(
         better = _fit_elsewhere(fitter, before, tried[k])
         if better is not None:
             tried[k] = _candidate(fitter, tried[k].score, better, plain)
+    return ranked(tried)
+
+
+def _tried_from_nearer_theta(
+    fitter: Fitter, before: Fitted, found: Sequence[Candidate], plain: Array, tick: Progress
+) -> list[Candidate]:
+    """The candidates; those far from an explanation fitted again from the theta of one that is near but will not do.
+
+    One that ran to the end of its range tells where theta is, too: the weakest of springs, anchored far away, is a
+    table that is tilted.
+    """
+    tried = list(found)
+    nearest = min((c.fitted for c in found), key=lambda fitted: fitted.reduced_chi2, default=before)
+    if _explained([c for c in found if c.accepted]) or nearest.reduced_chi2 > FAR_OFF:
+        return tried
+    promised = max(c.score.gain for c in found)
+    far = [k for k, c in enumerate(found) if c.fitted.reduced_chi2 > FAR_OFF and c.score.gain >= RIVAL * promised]
+    for k in far[:PERSISTENT]:
+        one = found[k].score
+        tick(f"fit with {one.kind.name} from another theta", 0, 0)
+        start = fitter.start(nearest.state.u, (*before.state.effects, start_of(fitter, one)))
+        again = fitter.fit(start, rounds=7, careful=4, renew=True)
+        if again.score > found[k].fitted.score:
+            tried[k] = _candidate(fitter, one, again, plain)
     return ranked(tried)
 
 

@@ -28,6 +28,7 @@ Tick = Callable[[int, int], None]
 
 DRAWS = 1000
 FEWEST_FOR_A_TREND = 6  # pushes
+IN_ORDER = math.log(1e-4)  # of a p-value
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -82,6 +83,11 @@ class Score:
     def kind(self) -> type[Effect]:
         """The effect."""
         return self.signature.kind
+
+    @property
+    def in_order(self) -> bool:
+        """Whether the frictions of whole pushes follow the effect, which is all that it changes, beyond chance."""
+        return bool(self.signature.friction_changes) and self.log_p < IN_ORDER
 
 
 @dc.dataclass(frozen=True, kw_only=True)

@@ -41,8 +41,8 @@ def evidence(*, steps=(), rejected=(), superfluous=(), final=None, after=10.0):
     )  # fmt: skip
 
 
-def tried(name, gain, model):
-    score = SimpleNamespace(kind=SimpleNamespace(name=name))
+def tried(name, gain, model, in_order=False):
+    score = SimpleNamespace(kind=SimpleNamespace(name=name), in_order=in_order)
     return Candidate(score=score, fitted=model, gains=np.full(PUSHES, gain), degenerate=False)
 
 
@@ -146,6 +146,17 @@ def test_a_model_with_which_one_push_alone_comes_nearer_is_no_answer(monkeypatch
     assert conclude._explained(told) is explained
     why = conclude._why("friction_patch", told.steps[0][0], set(), set(), told)
     assert why.startswith("one push that was left out") is not explained
+
+
+@pytest.mark.parametrize(
+    ("in_order", "several"), [((), False), ((False,), False), ((True,), True), ((True, False), False)]
+)
+def test_an_order_of_many_pushes_is_not_the_work_of_one(in_order, several):
+    """Beside an effect that orders frictions, another one has to show by itself."""
+    told = evidence(steps=tuple((tried("friction_drift", 50.0, None, one),) for one in in_order))
+    told.errors_before = errors(40.0)[:1] + errors(10.0)[1:]
+    told.errors_after = errors(4.0)[:1] + errors(10.5)[1:]
+    assert conclude._by_several(told) is several
 
 
 def test_what_the_model_has_beside_an_effect_is_no_rival_of_it(monkeypatch):

@@ -14,9 +14,9 @@ from physid_drake.diagnose.regimes import _by_heading, _by_speed
 from physid_drake.effects import Effect, effect_named
 
 
-def candidate(gains, *, degenerate=False, coordinates=1, left=1.0):
+def candidate(gains, *, degenerate=False, coordinates=1, left=1.0, in_order=False):
     return Candidate(
-        score=None,
+        score=SimpleNamespace(in_order=in_order),
         fitted=SimpleNamespace(reduced_chi2=left),
         gains=np.asarray(gains, dtype=float),
         degenerate=degenerate,
@@ -44,8 +44,25 @@ def test_held_out_gains_confirm_an_effect(gains, confirmed):
     assert candidate(gains).accepted is confirmed
 
 
+@pytest.mark.parametrize(
+    ("gains", "in_order", "confirmed"),
+    [
+        ([3.1, 2.3, 1.4, 1.3, 0.8, 1.0, -0.6, -2.7, 2.4], False, False),  # frictions that grow by 7 % a push
+        ([3.1, 2.3, 1.4, 1.3, 0.8, 1.0, -0.6, -2.7, 2.4], True, True),
+        (
+            [0.5, 0.3, 0.4, 0.3, 0.8, 0.5, -0.6, -0.7, 0.4],
+            True,
+            False,
+        ),  # what was in order may be so by another effect
+    ],
+)
+def test_frictions_in_order_confirm_what_orders_them_if_left_out_pushes_gain(gains, in_order, confirmed):
+    assert candidate(gains, in_order=in_order).accepted is confirmed
+
+
 def test_an_effect_that_ran_to_nothing_is_not_confirmed():
     assert not candidate([5.0] * 8, degenerate=True).accepted
+    assert not candidate([5.0] * 8, degenerate=True, in_order=True).accepted
 
 
 def test_a_rival_is_one_whose_deficit_is_not_sure():
@@ -146,7 +163,7 @@ def test_few_pushes_span_no_regimes():
 @pytest.mark.parametrize(("gains", "tried"), [([-9.0] * 8, 3), ([9.0] * 8, 2)])
 def test_what_left_out_pushes_do_not_confirm_keeps_no_weaker_effect_from_a_try(monkeypatch, gains, tried):
     """Where a noise is taken to be what is left, every fit leaves no more than noise, also those of wrong effects."""
-    kept = {"kept": (0,), "log_p": -5.0, "signature": SimpleNamespace(friction_changes=())}
+    kept = {"kept": (0,), "log_p": -5.0, "in_order": False}
     strong = {"tracker_bias": 100.0, "actuator_lag": 80.0, "uneven_support": 40.0}
     scores = [SimpleNamespace(gain=gain, kind=effect_named(name), **kept) for name, gain in strong.items()]
     fitted = SimpleNamespace(reduced_chi2=1.0, score=1000.0)
@@ -267,3 +284,46 @@ def test_only_what_takes_most_away_and_does_not_explain_all_is_tried_elsewhere(m
     fitter = SimpleNamespace(case=None)
     assert confirm._tried_elsewhere(fitter, before, found, np.zeros(8), lambda *said: None) == found
     assert ended == tried
+
+
+@pytest.mark.parametrize(
+    ("left", "degenerate", "fits"),
+    [
+        ({"tether": 1.6, "table_tilt": 100.0, "viscous_drag": 100.0}, True, ["table_tilt"]),  # a drag promised little
+        ({"tether": 1.4, "table_tilt": 100.0, "viscous_drag": 100.0}, False, []),  # the answer is there
+        ({"tether": 2.5, "table_tilt": 100.0, "viscous_drag": 100.0}, False, ["table_tilt"]),
+        ({"tether": 2.5, "table_tilt": 2.6, "viscous_drag": 100.0}, False, []),
+        ({"tether": 40.0, "table_tilt": 100.0, "viscous_drag": 100.0}, True, []),  # nobody knows where theta is
+        ({}, False, []),
+    ],
+)
+def test_what_ended_far_off_is_tried_from_the_theta_of_what_came_near(monkeypatch, left, degenerate, fits):
+    """A spring that ran to its weakest stands for a tilt, whose own fit was lost from the theta of the plain cell."""
+    made = []
+
+    def fit(state, *, rounds, careful, renew):
+        made.append(state.effects[-1].kind.name)
+        return SimpleNamespace(state=state, reduced_chi2=1.0, score=-1.0)
+
+    def fitted(chi2):
+        return SimpleNamespace(reduced_chi2=chi2, score=-chi2, state=SimpleNamespace(u=np.full(1, chi2)))
+
+    def judged(fitter, one, model, plain):
+        assert model.state.u == min(left.values())
+        return Candidate(score=one, fitted=model, gains=np.full(8, 50.0), degenerate=False)
+
+    monkeypatch.setattr(confirm, "start_of", lambda fitter, one: one)
+    monkeypatch.setattr(confirm, "_candidate", judged)
+    promised = {"tether": 1000.0, "table_tilt": 900.0, "viscous_drag": 400.0}
+    found = [
+        Candidate(
+            score=SimpleNamespace(gain=promised[name], kind=effect_named(name), in_order=False), fitted=fitted(chi2),
+            gains=np.full(8, 20.0), degenerate=degenerate and name == "tether",
+        )
+        for name, chi2 in left.items()
+    ]  # fmt: skip
+    fitter = SimpleNamespace(start=lambda u, effects: SimpleNamespace(u=u, effects=effects), fit=fit)
+    before = SimpleNamespace(reduced_chi2=139.0, state=SimpleNamespace(effects=()))
+    again = confirm._tried_from_nearer_theta(fitter, before, found, np.zeros(8), lambda *said: None)
+    assert made == fits
+    assert len(again) == len(found) and (not fits or again[0].name == fits[0])

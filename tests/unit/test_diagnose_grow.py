@@ -21,7 +21,7 @@ def fitted(names, score_per_push):
 
 
 def step(name):
-    score = SimpleNamespace(kind=SimpleNamespace(name=name))
+    score = SimpleNamespace(kind=SimpleNamespace(name=name), in_order=False)
     return (Candidate(score=score, fitted=None, gains=np.full(PUSHES, 5.0), degenerate=False),)
 
 
@@ -56,7 +56,7 @@ def grown(monkeypatch):
 
 
 def tried(name, gains, *, coordinates=1, chi2=1.0, degenerate=False):
-    score = SimpleNamespace(kind=SimpleNamespace(name=name))
+    score = SimpleNamespace(kind=SimpleNamespace(name=name), in_order=False)
     return Candidate(
         score=score, fitted=SimpleNamespace(reduced_chi2=chi2), gains=np.asarray(gains, dtype=float),
         degenerate=degenerate, coordinates=coordinates,

@@ -31,8 +31,8 @@ def pair_of(first, second, score, *, chi2=1.0, adds=(20.0, 20.0)):
     kinds = (first, second)
     candidates = tuple(
         Candidate(
-            score=SimpleNamespace(kind=kind), fitted=fitted, gains=np.full(PUSHES, gain), degenerate=False,
-            coordinates=COORDINATES[kind.name],
+            score=SimpleNamespace(kind=kind, in_order=False), fitted=fitted,
+            gains=np.full(PUSHES, gain), degenerate=False, coordinates=COORDINATES[kind.name],
         )
         for kind, gain in zip(kinds, adds, strict=True)
     )  # fmt: skip

@@ -92,6 +92,7 @@ def test_frictions_in_order_are_seen_by_their_ranks(columns):
     assert np.exp(trend.log_p) == pytest.approx(expected, rel=0.3)  # what noise swaps is near
     # 0.5 scatters of 2.5 % a push, in steps of 0.1 % a push.
     assert trend.coefficients[0] == pytest.approx(12.5, rel=0.3)
+    assert not trend.in_order and not plain.in_order  # one in ten thousand is asked for
     # Its gain is that of a score test which is as unlikely.
     assert log_probability(trend.gain, 1, PUSHES, 1) == pytest.approx(trend.log_p)
 
