@@ -31,7 +31,7 @@ def whitened_residual(problem: PushProblem, noise: Noise, prediction: Prediction
         return np.full(3 * len(problem.times) + 2 * len(problem.force_times), FAILED)
     poses = (prediction.poses - problem.poses) / noise.sigmas
     forces = (prediction.forces - problem.forces) / problem.force_std[:, None]
-    return np.concatenate([_decorrelate(problem.times, poses, noise.correlation).T.ravel(), forces.T.ravel()])
+    return np.concatenate([_decorrelate(problem.times, poses, noise.correlations).T.ravel(), forces.T.ravel()])
 
 
 def diverged(vector: Array) -> bool:
@@ -44,14 +44,14 @@ def difference(before: Array, after: Array) -> Array:
     return np.zeros_like(before) if diverged(before) or diverged(after) else after - before
 
 
-def _decorrelate(times: Array, residual: Array, correlation: float) -> Array:
-    """Take out first-order autoregressive noise: e_k - rho e_(k-1), rho to the power of the gap in samples."""
-    if correlation == 0.0 or len(residual) < 3:
+def _decorrelate(times: Array, residual: Array, correlations: Array) -> Array:
+    """Take out first-order autoregressive noise: e_k - rho e_(k-1), rho (3,) to the power of the gap in samples."""
+    if not correlations.any() or len(residual) < 3:
         return residual
     interval = float(np.median(np.diff(times)))
-    rho = correlation ** np.maximum(1.0, np.diff(times) / interval)
+    rho = correlations ** np.maximum(1.0, np.diff(times) / interval)[:, None]
     result = residual.copy()
-    result[1:] = (residual[1:] - rho[:, None] * residual[:-1]) / np.sqrt(1.0 - rho[:, None] ** 2)
+    result[1:] = (residual[1:] - rho * residual[:-1]) / np.sqrt(1.0 - rho**2)
     return result
 
 
@@ -108,5 +108,5 @@ def model_error_columns(problem: PushProblem, noise: Noise, moved: float) -> Arr
     for dof in range(3):
         shape = np.zeros((n, 3))
         shape[:, dof] = after * MODEL_ERROR[dof] / noise.sigmas[dof]
-        columns[: 3 * n, dof] = _decorrelate(problem.times, shape, noise.correlation).T.ravel()
+        columns[: 3 * n, dof] = _decorrelate(problem.times, shape, noise.correlations).T.ravel()
     return columns

@@ -55,7 +55,7 @@ class Noise:
         rotation: of its yaw [rad].
         hand: of the hand's x and y [m].
         force: of a force component [N].
-        correlation: of position and rotation noise between neighbouring samples [-].
+        correlation: between neighbouring samples, of the noise of position and of rotation [-].
         source: where each figure comes from: ``stated``, ``seen`` or ``assumed``.
     """
 
@@ -63,13 +63,23 @@ class Noise:
     rotation: float
     hand: float
     force: float
-    correlation: float
+    correlation: tuple[float, float]
     source: dict[str, str]
 
     @property
     def sigmas(self) -> Array:
         """Standard deviations (3,) of x, y, yaw [m, m, rad]."""
         return np.array([self.position, self.position, self.rotation])
+
+    @property
+    def correlations(self) -> Array:
+        """From sample to sample (3,), of x, y, yaw [-]."""
+        return np.array([self.correlation[0], *self.correlation])
+
+    def mean_std(self, samples: float) -> Array:
+        """Standard deviations (3,) of a mean over so many samples of a rest [m, m, rad]."""
+        independent = np.maximum(1.0, samples * (1.0 - self.correlations) / (1.0 + self.correlations))
+        return np.asarray(self.sigmas / np.sqrt(independent))
 
 
 def noise_of(recording: Recording) -> Noise:
@@ -94,15 +104,22 @@ def noise_of(recording: Recording) -> Noise:
 
     place = stated.object_position_std, seen.object_position_std
     turn = stated.object_rotation_std, seen.object_rotation_std
-    correlations = [c for c in (seen.position_autocorrelation, seen.rotation_autocorrelation) if c is not None]
+    # Of rests that tell one stream's only: it is the same tracker's filter.
+    of_place = _known_of(seen.position_autocorrelation, seen.rotation_autocorrelation)
+    of_turn = _known_of(seen.rotation_autocorrelation, seen.position_autocorrelation)
     return Noise(
         position=choose("position", *place, DEFAULT_POSITION_STD, FINEST_POSITION),
         rotation=choose("rotation", *turn, DEFAULT_ROTATION_STD, FINEST_ROTATION),
         hand=choose("hand", stated.hand_position_std, _hand_std(recording), DEFAULT_HAND_STD, FINEST_HAND),
         force=choose("force", stated.force_std, seen.force_std, DEFAULT_FORCE_STD, FINEST_FORCE),
-        correlation=float(np.clip(np.mean(correlations), 0.0, LARGEST_CORRELATION)) if correlations else 0.0,
+        correlation=(of_place, of_turn),
         source=source,
     )
+
+
+def _known_of(own: float | None, other: float | None) -> float:
+    seen = other if own is None else own
+    return 0.0 if seen is None else float(np.clip(seen, 0.0, LARGEST_CORRELATION))
 
 
 def _hand_std(recording: Recording) -> float | None:
@@ -240,9 +257,8 @@ def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[S
     rests = rest_segments(push)
     if rests and rests[0].start == 0:
         still = planar[rests[0]]
-        independent = max(1.0, len(still) * (1.0 - noise.correlation) / (1.0 + noise.correlation))
         pose = still.mean(axis=0)
-        return Start(pose=triple(pose)), sigmas / np.sqrt(independent)
+        return Start(pose=triple(pose)), noise.mean_std(len(still))
     return Start(pose=triple(planar[0])), sigmas.copy()
 
 

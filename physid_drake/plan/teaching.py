@@ -132,10 +132,9 @@ def _problem(
     solid = solid_of(pool.spec.shape)
     path = push.path(start, solid.outline, pool.spec.hand_radius)
     times = np.arange(math.ceil((float(path.times[-1]) + AFTER) * RATE)) / RATE
-    resting = max(1.0, LEAD * RATE * (1.0 - noise.correlation) / (1.0 + noise.correlation))
     return PushProblem(
         name="next", order=order, begin=0.0, end=float(times[-1]), start=Start(pose=start),
-        start_std=noise.sigmas / math.sqrt(resting), path=path,
+        start_std=noise.mean_std(LEAD * RATE), path=path,
         hand_height=0.5 * solid.height if hand_height is None else hand_height, times=times,
         poses=np.zeros((len(times), 3)), force_times=np.zeros(0), forces=np.zeros((0, 2)), force_std=np.zeros(0),
     )  # fmt: skip

@@ -18,7 +18,8 @@ def problem() -> PushProblem:
     return problems_of(recording, noise_of(recording), 0.03)[0]
 
 
-def noise(correlation=0.0) -> Noise:
+def noise(place=0.0, turn=None) -> Noise:
+    correlation = place, place if turn is None else turn
     return Noise(position=3e-4, rotation=3e-3, hand=5e-5, force=0.02, correlation=correlation, source={})
 
 
@@ -39,12 +40,13 @@ def ar1(rng, n, rho, gaps=None):
     return e
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.5, 0.95])
+@pytest.mark.parametrize("rho", [(0.0, 0.0), (0.5, 0.5), (0.95, 0.95), (0.0, 0.9), (0.9, 0.3)])
 def test_the_whitened_residual_of_correlated_noise_is_white(problem, rho):
-    n = 20_000
+    """A filter of place and one of rotation are two."""
+    n, (place, turn) = 20_000, rho
     one = long_problem(problem, 0.01 * np.arange(n))
-    errors = ar1(np.random.default_rng(0), n, rho) * noise().sigmas
-    white = whitened_residual(one, noise(rho), Prediction(poses=errors, forces=np.zeros((0, 2)))).reshape(3, n)
+    errors = ar1(np.random.default_rng(0), n, np.array([place, place, turn])) * noise().sigmas
+    white = whitened_residual(one, noise(*rho), Prediction(poses=errors, forces=np.zeros((0, 2)))).reshape(3, n)
     # Four standard errors of n samples.
     assert np.abs(white.var(axis=1) - 1.0).max() < 4.0 * np.sqrt(2.0 / n)
     for lag in (1, 2, 10):
