@@ -146,6 +146,7 @@ class Figures:
     pairs: dict[str, Share]
     parameter_error: Quantiles
     coverage: Share
+    others_coverage: Share
     theta_error: Quantiles
     theta_coverage: Share
     held_out: dict[str, Errors]
@@ -179,6 +180,7 @@ def figures_of(outcomes: Sequence[Outcome]) -> Figures:
         },
         parameter_error=_quantiles([e for o in clear for e in o.errors]),
         coverage=_count(c for o in single for c in o.covered),
+        others_coverage=_count(c for o in single for c in o.others_covered),
         theta_error=_quantiles([e for o in right for e in o.theta_errors]),
         theta_coverage=_count(c for o in right for c in o.theta_covered),
         held_out={
@@ -225,10 +227,11 @@ def table(figures: Figures) -> list[tuple[str, str, str, str]]:
     return [
         _row("no effect: called a mismatch", figures.false_alarms, "at most 1 %"),
         *_naming_rows(f"effect of {CLEAR:g} sigma or more", figures.clear, ("95 %", "90 %")),
-        ("  error of its parameters, median", _percent(error), "", "10 %"),
-        ("  error of its parameters, 90th percentile", _percent(error, tail=True), "", ""),
-        _row("90 % intervals that hold the truth", figures.coverage, "85 to 95 %"),
+        ("  error of its amplitudes, median", _percent(error), "", "10 %"),
+        ("  error of its amplitudes, 90th percentile", _percent(error, tail=True), "", ""),
         *_naming_rows(f"effect below {CLEAR:g} sigma", figures.faint, ("", "")),
+        _row("amplitudes of both: 90 % intervals that hold the truth", figures.coverage, "85 to 95 %"),
+        _row("  of their places, angles, speeds and the like", figures.others_coverage, "85 to 95 %"),
         ("error of friction and mass, median", _percent(figures.theta_error), "", ""),
         ("  90th percentile", _percent(figures.theta_error, tail=True), "", ""),
         _row("  90 % intervals that hold the truth", figures.theta_coverage, "85 to 95 %"),

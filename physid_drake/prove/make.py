@@ -46,8 +46,13 @@ BLOCK: Final[tuple[Kind, ...]] = ("none",) * 5 + ("effect",) * 10 + ("other",) *
 """Each twenty worlds are these, shuffled."""
 SIZES: Final = (2.0, 30.0)
 """Drawn sizes of effects, in standard deviations of the tracker."""
+GRAINS: Final = {"anisotropic_table", "anisotropic_object"}
+"""Never in one world: MuJoCo's contacts have one grain."""
 SMALLEST_SIZE: Final = 1.0
 """A world whose effect cannot reach this within its bounds is drawn anew, a few times."""
+
+STILL: Final = 1e-4
+"""What moves by more without a hand does not stand [m]: such a world is drawn anew, too."""
 
 _CALIBRATION_PUSHES: Final = 4
 _CALIBRATION_ROUNDS: Final = 3
@@ -88,7 +93,10 @@ def assign(index: int, seed: int, kind: Kind | None = None, effect: str | None =
     if chosen != "pair":
         return Assignment(index=index, kind=chosen, effects=(first,))
     rest = [name for name in pool if name != first]
-    second = rest[int(np.random.default_rng([seed, index, 3]).integers(len(rest)))]
+    drawn = int(np.random.default_rng([seed, index, 3]).integers(len(rest)))
+    second = rest[drawn]
+    if {first, second} == GRAINS:
+        second = rest[(drawn + 1) % len(rest)]
     return Assignment(index=index, kind=chosen, effects=(first, second))
 
 
@@ -113,7 +121,7 @@ def make_world(
         rng = np.random.default_rng([seed, index, 4, attempt])
         scene = draw_scene(rng)
         effects, sizes = _draw_effects(rng, scene, chosen.effects)
-        if all(size >= SMALLEST_SIZE for size in sizes):
+        if all(size >= SMALLEST_SIZE for size in sizes) and (len(effects) < 2 or stands(scene, effects)):
             break
     motions = simulate(scene, effects)
     size = _difference(scene, motions, simulate(scene, ())) if effects else 0.0
@@ -154,6 +162,16 @@ def simulate(scene: Scene, effects: Sequence[Effect], which: Sequence[int] | Non
         )
         for k in chosen
     ]
+
+
+def stands(scene: Scene, effects: Sequence[Effect], seconds: float = 0.2) -> bool:
+    """Whether the object rests where each push begins; each effect leaves it at rest by itself, two may not."""
+    world = PushWorld(scene.plan, effects, pushes=len(scene.pushes))
+    for k, push in enumerate(scene.pushes):
+        motion = world.run(push.pose, None, push=k, friction_factor=push.friction_factor, duration=seconds)
+        if float(np.linalg.norm(motion.true_poses[-1, :2] - np.array(push.pose[:2]))) > STILL:
+            return False
+    return True
 
 
 def _draw_effects(rng: Rng, scene: Scene, names: Sequence[str]) -> tuple[list[Effect], list[float]]:

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from physid_drake.errors import ProofError
+from physid_drake.errors import ParameterError, ProofError
 from physid_drake.prove.contact import IMPEDANCE, SCALE, SINKAGE, TIP_RATES, tip_law
 from physid_drake.prove.effects.effect import Effect, Moment
 from physid_drake.prove.feet import weighted_feet
@@ -172,6 +172,8 @@ class PushWorld:
         z = height_of(self.plan.shape) / 2.0 - SINKAGE
         state.qpos[q : q + 7] = [*self._to_simulation(*pose[:2]), z, math.cos(half), 0.0, 0.0, math.sin(half)]
         state.qvel[v : v + 6] = [*self._to_simulation(*velocity[:2]), 0.0, 0.0, 0.0, velocity[2]]
+        if self.plan.table_grain is not None and self.plan.underside_grain is not None:
+            raise ParameterError("a contact of MuJoCo has one grain: the table's or the object's, not both.")
         grain = self.plan.table_grain or self.plan.underside_grain
         stretch = math.sqrt(grain.ratio) if grain is not None else 1.0
         # A plane's tangents are the simulation's y and -x; a lying capsule's are its axis and the other.

@@ -6,6 +6,7 @@ import dataclasses as dc
 import json
 import math
 from collections.abc import Sequence
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ CLEAR = 5.0  # standard deviations of motion: an effect that must be found
 MOST_NAMES = 2  # in a class that counts as the right answer
 _NO_ERRORS = (math.nan, math.nan, math.nan)
 # Components of one vector: their errors are over its length, since one of them may be next to nothing.
+_HALF_TURN = math.pi  # rad: a grain is the same from both sides
 _VECTORS = (("x", "y"), ("slope_x", "slope_y"))
 
 
@@ -48,8 +50,9 @@ class Outcome:
         verdict: of the diagnosis, or ``failed``.
         classes: per finding, its name and those it cannot be told from.
         probabilities: stated for the first name of each finding.
-        errors: relative error of each parameter that was found.
-        covered: whether each 90 % interval holds the truth.
+        errors: relative error of each amplitude (a parameter with a null value) that was found.
+        covered: whether each one's 90 % interval holds the truth.
+        others_covered: the same of the parameters that say where, which way or how fast.
         theta_errors, theta_covered: the same of friction and mass, where these pushes tell them.
         chi2: cost per degree of freedom after; nan where the diagnosis failed.
         held_out: errors before and after, and those of the true world.
@@ -66,6 +69,7 @@ class Outcome:
     probabilities: tuple[float, ...] = ()
     errors: tuple[float, ...] = ()
     covered: tuple[bool, ...] = ()
+    others_covered: tuple[bool, ...] = ()
     theta_errors: tuple[float, ...] = ()
     theta_covered: tuple[bool, ...] = ()
     chi2: float = math.nan
@@ -86,11 +90,7 @@ class Outcome:
     @property
     def right(self) -> bool:
         """Whether the name is right, or in a class of at most two."""
-        return any(
-            name in names[:1] or (name in names and len(names) <= MOST_NAMES)
-            for name in self.true
-            for names in self.classes
-        )
+        return any(_names(names, name) for name in self.true for names in self.classes)
 
     @property
     def first(self) -> bool:
@@ -109,8 +109,10 @@ class Outcome:
 
     @property
     def named(self) -> int:
-        """How many of the world's effects were named, by themselves or in a class."""
-        return sum(any(name in names for names in self.classes) for name in self.true)
+        """How many of the world's effects were named rightly, each by a finding of its own."""
+        findings = [*self.classes, *((),) * len(self.true)]
+        chosen = permutations(findings, len(self.true))
+        return max(sum(map(_names, some, self.true)) for some in chosen)
 
     @property
     def both(self) -> bool:
@@ -131,6 +133,11 @@ class Outcome:
         if self.kind == "pair":
             return None if self.both else "one of two" if self.named else "not named"
         return None if self.right else "a large class" if self.in_class else "not named"
+
+
+def _names(names: Sequence[str], effect: str) -> bool:
+    """Whether a finding names an effect: first, or in a class of at most two."""
+    return effect in names[:1] or (effect in names and len(names) <= MOST_NAMES)
 
 
 def outcome(truth: dict[str, Any], diagnosis: dict[str, Any], seconds: float = math.nan) -> Outcome:
@@ -154,6 +161,7 @@ def outcome(truth: dict[str, Any], diagnosis: dict[str, Any], seconds: float = m
         probabilities=tuple(e["probability"] for e in named),
         errors=tuple(error for error, _ in compared),
         covered=tuple(covered for _, covered in compared),
+        others_covered=tuple(c for effect in named for c in _others_covered(truth["effects"], effect)),
         theta_errors=tuple(error for error, _ in theta),
         theta_covered=tuple(covered for _, covered in theta),
         chi2=number(diagnosis["reduced_chi2_after"]),
@@ -213,6 +221,18 @@ def _parameters(true: Sequence[dict[str, Any]], effect: dict[str, Any]) -> list[
                 (abs(found["value"] - value) / scale, bool(found["ci90"][0] <= value <= found["ci90"][1]))
             )
     return compared
+
+
+def _others_covered(true: Sequence[dict[str, Any]], effect: dict[str, Any]) -> list[bool]:
+    """Whether the interval of each parameter without a null value holds the truth."""
+    match: dict[str, Any] = next((t["parameters"] for t in true if t["name"] == effect["name"]), {})
+    covered = []
+    for name, found in effect["parameters"].items():
+        value, ends = match.get(name), found["ci90"]
+        if isinstance(value, float) and isinstance(found["value"], float) and found["null"] is None and ends:
+            turns = (-_HALF_TURN, 0.0, _HALF_TURN) if name == "angle" else (0.0,)
+            covered.append(any(ends[0] <= value + turn <= ends[1] for turn in turns))
+    return covered
 
 
 def _theta(true: dict[str, float], found: dict[str, Any]) -> list[tuple[float, bool]]:

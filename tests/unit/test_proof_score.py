@@ -66,6 +66,44 @@ def test_a_pair_needs_both_names():
     assert outcome(pair, said(names=("table_tilt", "viscous_drag"))).both
 
 
+@pytest.mark.parametrize(
+    ("classes", "named"),
+    [
+        ([("table_tilt", "viscous_drag")], 1),  # one finding names one effect
+        ([("table_tilt", "viscous_drag"), ("table_tilt", "viscous_drag")], 2),
+        ([("magnet", "table_tilt"), ("viscous_drag",)], 2),
+        ([("magnet", "tether", "table_tilt"), ("viscous_drag",)], 1),  # too large a class
+        ([("table_tilt", "magnet", "tether"), ("viscous_drag",)], 2),
+        ([], 0),
+    ],
+)
+def test_each_effect_of_a_pair_needs_a_finding_of_its_own(classes, named):
+    answer = said()
+    answer["effects"] = [
+        {"name": name, "indistinguishable_from": others, "probability": 0.5, "parameters": {}}
+        for name, *others in classes
+    ]
+    answer["verdict"] = "ambiguous" if classes else "unexplained"
+    found = outcome(truth(kind="pair", names=("viscous_drag", "table_tilt")), answer)
+    assert (found.named, found.both) == (named, named == 2)
+
+
+@pytest.mark.parametrize(
+    ("ends", "covered"),
+    [([0.0, 0.2], True), ([0.2, 0.3], False), ([3.1, 3.3], True), ([-3.1, -3.0], True)],
+)
+def test_an_angle_that_is_half_a_turn_off_is_right(ends, covered):
+    true = truth(names=("anisotropic_table",))
+    true["effects"][0]["parameters"] = {"ratio": 1.5, "angle": 0.1}
+    answer = said(names=("anisotropic_table",))
+    answer["effects"][0]["parameters"] = {
+        "ratio": {"value": 1.5, "ci90": [1.4, 1.6], "null": 1.0, "unit": "-"},
+        "angle": {"value": 0.1, "ci90": ends, "null": None, "unit": "rad"},
+    }
+    found = outcome(true, answer)
+    assert found.covered == (True,) and found.others_covered == (covered,)
+
+
 def test_the_table_counts_worlds(tmp_path):
     worlds = [
         ("none", (), "consistent", ()), ("none", (), "unexplained", ()),
@@ -87,4 +125,4 @@ def test_the_table_counts_worlds(tmp_path):
     assert rows["named rightly, or in a class of two"] == "1 of 1 (100 %)"
     assert rows["effect below 5 sigma: found"] == "0 of 0"
     assert rows["not in the catalogue: unexplained"] == "0 of 1 (0 %)"
-    assert rows["90 % intervals that hold the truth"] == "1 of 1 (100 %)"
+    assert rows["amplitudes of both: 90 % intervals that hold the truth"] == "1 of 1 (100 %)"

@@ -4,13 +4,14 @@ import ast
 import json
 from dataclasses import fields, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 pytest.importorskip("mujoco")
 
-from physid_drake.errors import ProofError
+from physid_drake.errors import ParameterError, ProofError
 from physid_drake.prove import make, mujoco_world
 from physid_drake.prove.effects import catalogue as fx
 from physid_drake.prove.effects.effect import parameters_of
@@ -106,3 +107,18 @@ def test_parameters_are_plain_numbers():
     for effect in (fx.CATALOGUED | fx.OTHERS).values():
         written = json.loads(json.dumps(parameters_of(effect())))
         assert set(written) == {field.name for field in fields(effect)}
+
+
+def test_a_world_has_one_grain():
+    drawn = {frozenset(make.assign(index, 7, "pair", "anisotropic_table").effects) for index in range(300)}
+    assert frozenset(make.GRAINS) not in drawn and len(drawn) == len(fx.CATALOGUED) - 2
+    grains = [draw_knob(name, np.random.default_rng(0), SimpleNamespace(plan=PLAN)).at(0.3) for name in make.GRAINS]
+    with pytest.raises(ParameterError, match="one grain"):
+        PushWorld(PLAN, grains, pushes=1).run((0.0, 0.0, 0.0), None, push=0, duration=0.01)
+
+
+@pytest.mark.parametrize(("tilt", "ratio", "rests"), [(0.1, 1.0, True), (0.0, 0.3, True), (0.1, 0.3, False)])
+def test_two_effects_that_set_an_object_going_before_the_hand_comes_make_no_world(tilt, ratio, rests):
+    push = SimpleNamespace(pose=(0.0, 0.0, 0.0), friction_factor=1.0)
+    effects = [fx.CATALOGUED["table_tilt"](x=tilt, y=0.0), fx.CATALOGUED["friction_patch"](ratio=ratio, radius=1.0)]
+    assert make.stands(SimpleNamespace(plan=PLAN, pushes=[push]), effects) is rests
