@@ -16,7 +16,9 @@ from physid_drake.diagnose import Evidence
 from physid_drake.diagnose.leaving import predicted
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.looks import SAID
-from physid_drake.diagnose.values import Diagnosis, EffectFinding, ParameterEstimate, ThetaEstimate
+from physid_drake.diagnose.noise import UNKNOWN
+from physid_drake.diagnose.values import Detectable, Diagnosis, EffectFinding, ParameterEstimate, ThetaEstimate
+from physid_drake.effects import effect_named
 from physid_drake.recording import Recording
 from physid_drake.report.diagnosis_figures import (
     arrow_figure,
@@ -26,7 +28,17 @@ from physid_drake.report.diagnosis_figures import (
     views_from_above,
 )
 from physid_drake.report.effect_laws import law_figure
-from physid_drake.report.numbers import chance, fixed, interval, number, quantity, share, tenths, tiny
+from physid_drake.report.numbers import (
+    chance,
+    digits_between,
+    fixed,
+    interval,
+    number,
+    quantity,
+    share,
+    tenths,
+    tiny,
+)
 from physid_drake.report.svg import AFTER, BEFORE, CONTACT, FREE, INK, MUTED, drawn
 from physid_drake.report.table_view import MM, ShownPush, TableView, outline_of
 
@@ -135,6 +147,8 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "theta": [_theta_row(name, t) for name, t in diagnosis.theta.items()],
         "next_push": None if diagnosis.next_push is None else next_push_figure(diagnosis.next_push, recording, view),
         "noise": _noise(diagnosis),
+        "noise_known": not any(warning.startswith(UNKNOWN) for warning in diagnosis.warnings),
+        "detectable": [_detectable_row(one) for one in diagnosis.detectable],
         "warnings": [
             *diagnosis.warnings,
             *(f"{push.name}: {warning}" for push in recording.pushes for warning in push.warnings),
@@ -174,7 +188,18 @@ def _parameter_row(name: str, p: ParameterEstimate) -> tuple[str, str, str, str]
         shape = f"{len(p.value)} × {len(p.value[0])} values"
         return name, shape, "in the drawing", "even"
     null = "–" if p.null is None else quantity(p.null, p.unit)
-    return name, quantity(p.value, p.unit), interval(p.ci90, p.unit), null
+    beside = [*([] if p.null is None else [p.null]), *(p.ci90 or ())]
+    digits = digits_between(p.value, beside)
+    return name, quantity(p.value, p.unit, digits), interval(p.ci90, p.unit, digits), null
+
+
+def _detectable_row(one: Detectable) -> tuple[str, str, str, str]:
+    """Effect, parameter, the smallest value that would have shown, motion."""
+    null = getattr(effect_named(one.name)(), one.parameter)
+    # Weights of an underside are grids, and even is 1.
+    digits = digits_between(one.value, [null if isinstance(null, float) else 1.0])
+    value = quantity(one.value, one.unit, digits)
+    return one.name, one.parameter, value, number(one.sigmas, 2)
 
 
 def _frame(frame: str) -> str:

@@ -202,10 +202,13 @@ def _support(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str] | None
     figure, axes = map_axes((*(low - pad), *(high + pad)), 3.8, 3.6)
     axes.grid(visible=False)
     middles = _middles(outline, x, y)
+    ends = np.asarray(p["ci90"], dtype=np.float64)
+    # Over the mean of what lies under the object: pushes say nothing of the other cells.
+    under = float(weights[np.isfinite(middles[..., 0])].mean())
+    weights, ends = weights / under, ends / under
     shown = np.ma.masked_where(np.isnan(middles[..., 0]), weights)
     mesh = axes.pcolormesh(x, y, shown.T, cmap="Blues", vmin=0.0, vmax=1.35 * float(shown.max()), edgecolors="white")
     mesh.set_clip_path(axes.add_patch(Polygon(outline, closed=True, facecolor="none", edgecolor=INK, linewidth=1.0)))
-    ends = np.asarray(p["ci90"], dtype=np.float64)
     for i, j in np.argwhere(np.isfinite(middles[..., 0])):
         at = (middles[i, j, 0], middles[i, j, 1])
         dark = "white" if weights[i, j] > 0.8 * shown.max() else INK

@@ -23,6 +23,14 @@ def number(value: float | None, digits: int = 3) -> str:
     return text.replace("-", "−")
 
 
+def digits_between(value: float, others: Sequence[float]) -> int:
+    """Significant digits, three to eight, with which a value is told from others: a scale of 1.0005 is not 1."""
+    apart = [abs(value - other) for other in others if other != value and math.isfinite(other)]
+    if not apart or value == 0.0 or not math.isfinite(value):
+        return 3
+    return min(8, max(3, 1 + math.ceil(math.log10(3.0 * abs(value) / min(apart)))))
+
+
 def fixed(value: float) -> str:
     """Two decimals, so that the numbers of a column are alike."""
     return f"{value:.2f}".replace("-", "−") if abs(value) < 1e4 else number(value)
@@ -55,12 +63,14 @@ def quantity(value: float | None, unit: str, digits: int = 3) -> str:
     return text
 
 
-def interval(ends: Sequence[float] | None, unit: str) -> str:
+def interval(ends: Sequence[float] | None, unit: str, digits: int = 3) -> str:
     """From one end to the other, angles in degrees too; a dash where there is none."""
     if ends is None:
         return "–"
-    scale = f" ({number(math.degrees(ends[0]))}° to {number(math.degrees(ends[1]))}°)" if unit == "rad" else ""
-    return f"{number(ends[0])} to {number(ends[1])} {_unit(unit)}".strip() + scale
+    low, high = (number(end, digits) for end in ends)
+    turned = [number(math.degrees(end), digits) for end in ends]
+    scale = f" ({turned[0]}° to {turned[1]}°)" if unit == "rad" else ""
+    return f"{low} to {high} {_unit(unit)}".strip() + scale
 
 
 def share(value: float, longest: float) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from physid_drake.diagnose.localise import MissingWrench
+from physid_drake.diagnose.noise import UNKNOWN
 from physid_drake.diagnose.values import (
     Detectable,
     Diagnosis,
@@ -25,6 +26,7 @@ from physid_drake.diagnose.values import (
 from physid_drake.recording import Box, Cylinder, Hand, ObjectModel, PoseStream, Push, Recording, Sensors, Table
 from physid_drake.report import effect_laws
 from physid_drake.report.diagnosis_page import ShownPush, diagnosis_page
+from physid_drake.report.numbers import digits_between, number
 
 NAMES = ("pushes/<b>1</b>.csv", "pushes/$2$ & co.csv")
 VOID = {"meta", "br", "link", "img", "hr", "input"}
@@ -280,3 +282,32 @@ def test_cells_under_a_triangle_have_a_middle_under_it_and_those_beside_it_have_
     )
     np.testing.assert_allclose(middles[0, 0], [-25.0, -25.0])
     np.testing.assert_allclose(middles[1, 1], [16.7, 16.7], atol=2.0)  # the half of a cell: a third of its side
+
+
+@pytest.mark.parametrize(
+    ("value", "others", "said"),
+    [
+        (1.00047, [1.0], "1.0005"),
+        (math.nan, [1.0], "–"),
+        (1.02435, [1.0, 1.02392, 1.02481], "1.0244"),
+        (0.4731, [0.0, 0.453, 0.517], "0.473"),
+        (1.0, [1.0], "1"),
+        (0.0, [0.1], "0"),
+    ],
+)
+def test_a_ratio_near_one_is_told_from_one(value, others, said):
+    assert number(value, digits_between(value, others)) == said
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_where_nobody_knows_the_noise_the_captions_say_so(known):
+    warnings = () if known else (f"{UNKNOWN}: the object's noise is taken to be what the plain cell leaves, 2 mm",)
+    text = diagnosis_page(diagnosis_with(warnings=warnings), recording_of(), shown_pushes(), WRENCHES)
+    assert ("1 is noise alone" in text) is known
+    assert ("as loud as what" in text) is not known
+
+
+def test_where_it_is_has_no_empty_lines():
+    endless = Location(statement="at the end", phase=(), dof=(), frame="world", windows=())
+    text = diagnosis_page(diagnosis_with(location=endless), recording_of(), shown_pushes(), WRENCHES)
+    assert "<dt>frame</dt>" in text and "<dt>when</dt>" not in text and "<dt>in what</dt>" not in text
