@@ -22,7 +22,7 @@ from physid_drake.cell.hand_path import HandPath, subdivided
 
 Array = NDArray[np.float64]
 
-MOST_KNOTS = 24
+MOST_KNOTS = 24, 12.0  # of a stream, or so many a second: an approach, a push and a retreat take twelve
 SMALLEST_STD = 2e-5  # m: a stream recorded without noise is still sampled and rounded
 SHORTEST_PIECE = 2e-3  # s between knots
 PIECES = 24  # of a smooth ramp: speeds to 0.2 % of its height
@@ -127,6 +127,8 @@ def _polygon_path(times: Array, positions: Array) -> HandPath:
 class _Fit:
     """Least squares of truncated parabolas: position = p0 + v0 t + sum c_j (t - k_j)_+^2."""
 
+    _has_slopes = True
+
     def __init__(self, times: Array, positions: Array, sigmas: Array) -> None:
         self._take(times, positions, sigmas)
         self._moving = self._starts_moving()
@@ -180,6 +182,11 @@ class _Fit:
         columns += [np.maximum(self._t - k, 0.0) ** 2 / self._span**2 for k in knots]
         return np.column_stack(columns) / self._sigmas[:, None]
 
+    def _slopes(self, knots: Array) -> Array:
+        """Derivatives (n, k) of the knots' columns with respect to their places."""
+        slopes: Array = -2.0 * np.maximum(self._t[:, None] - knots, 0.0) / self._span**2 / self._sigmas[:, None]
+        return slopes
+
     def _ending(self, knots: Array) -> Array:
         """Rows that make velocity and acceleration vanish after the last knot (in the design's scaling)."""
         lead = 2 if self._moving else 1
@@ -211,7 +218,7 @@ class _Fit:
         candidates = self._t[1:-1]
         columns = np.maximum(self._t[:, None] - candidates, 0.0) ** 2 / self._span**2 / self._sigmas[:, None]
         knots = np.array([], dtype=np.float64)
-        while len(knots) < MOST_KNOTS:
+        while len(knots) < max(MOST_KNOTS[0], MOST_KNOTS[1] * self._span):
             design = self._design(knots)
             q, _ = np.linalg.qr(design)
             residual = self._scaled - q @ (q.T @ self._scaled)
@@ -242,9 +249,23 @@ class _Fit:
             coefficients, *_ = np.linalg.lstsq(design, self._scaled, rcond=1e-13)
             return (self._scaled - design @ coefficients).ravel()
 
+        def slopes(places: Array) -> Array:
+            """By Kaufman's approximation of variable projection (BIT 15, 1975): one factorisation, not one a knot."""
+            order = np.argsort(places)
+            design = self._design(places[order])
+            q, r = np.linalg.qr(design)
+            coefficients, *_ = np.linalg.lstsq(r, q.T @ self._scaled, rcond=1e-13)
+            moved = self._slopes(places[order])
+            moved -= q @ (q.T @ moved)
+            by_knot = -moved[:, None, :] * coefficients[-len(places) :].T[None]
+            jacobian = np.empty((2 * len(self._t), len(places)))
+            jacobian[:, order] = by_knot.reshape(-1, len(places))
+            return jacobian
+
         found = least_squares(
-            residual, knots, bounds=(-0.5 * SHORTEST_PIECE, self._span), x_scale=0.01, max_nfev=evaluations
-        )
+            residual, knots, jac=slopes if self._has_slopes and len(knots) > MOST_KNOTS[0] else "2-point",
+            bounds=(-0.5 * SHORTEST_PIECE, self._span), x_scale=0.01, max_nfev=evaluations,
+        )  # fmt: skip
         moved = self._separate(np.sort(found.x))
         # Knots that merged must have been worth less than their price, or both are needed where they were.
         allowed = (len(knots) - len(moved)) * self._price
@@ -290,20 +311,26 @@ class _Fit:
 class _SmoothFit(_Fit):
     """The same where the hand starts and brakes along smooth ramps of speed: position = p0 + sum v_k Phi_k(t)."""
 
+    _has_slopes = False
+
     def __init__(self, straight: _Fit, ramp: Polynomial) -> None:
         self._take(straight._t, straight._p, straight._sigmas)
         self._moving = straight._moving
         self._ramp = ramp
+        self._straight_way, self._smooth_way = STRAIGHT.integ(), ramp.integ()
         self.knots = self._prune(self._place(np.clip(_widened(straight.knots), 0.0, self._span)))
 
     def _ramp_after(self, k: int, count: int) -> Polynomial:
         """The shape of the speed between knots k and k + 1: smooth from and to rest, else straight."""
-        smooth = (k == 0 and not self._moving) or k == count - 2
-        return self._ramp if smooth else STRAIGHT
+        return self._ramp if self._is_smooth(k, count) else STRAIGHT
+
+    def _is_smooth(self, k: int, count: int) -> bool:
+        return (k == 0 and not self._moving) or k == count - 2
 
     def _design(self, knots: Array) -> Array:
         spans = pairwise(knots.tolist())
-        rises = [self._rise(*span, self._ramp_after(k, len(knots))) for k, span in enumerate(spans)]
+        count = len(knots)
+        rises = [self._rise(*span, smooth=self._is_smooth(k, count)) for k, span in enumerate(spans)]
         # The way of a hand whose speed is 1 at a knot and 0 at the others; before and after them it does not change.
         ups, downs = [self._t, *rises], [*rises, np.zeros_like(self._t)]
         columns = [up - down for up, down in zip(ups, downs, strict=True)] if len(knots) else []
@@ -311,10 +338,11 @@ class _SmoothFit(_Fit):
         columns = [np.ones_like(self._t), *(columns if self._moving else columns[1:])]
         return np.column_stack(columns) / self._sigmas[:, None]
 
-    def _rise(self, begin: float, end: float, ramp: Polynomial) -> Array:
+    def _rise(self, begin: float, end: float, *, smooth: bool) -> Array:
         """Way (n,) of a hand that is at rest before ``begin`` and has the speed 1 after ``end``."""
         x = np.clip((self._t - begin) / max(end - begin, 1e-9), 0.0, 1.0)
-        way: Array = (end - begin) * ramp.integ()(x) + np.maximum(self._t - end, 0.0)
+        along = self._smooth_way if smooth else self._straight_way
+        way: Array = (end - begin) * along(x) + np.maximum(self._t - end, 0.0)
         return way
 
     def _solve(self, knots: Array, *, ended: bool) -> tuple[Array, float]:

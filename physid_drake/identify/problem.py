@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from physid_drake.cell import CellConfig, HandPath, Start
 from physid_drake.cell.hand_fit import fit_hand_paths, stream_std
+from physid_drake.cell.solid import solid_of
 from physid_drake.errors import RecordingError
 from physid_drake.identify.force_windows import force_windows
 from physid_drake.identify.frames import check_clocks, check_hand_near, check_on_table, check_upright
@@ -34,7 +36,8 @@ DEFAULT_FORCE_STD = 0.05  # N
 LARGEST_CORRELATION = 0.98
 STANDING = 0.3  # area that the x and y axes of the tip span in the plane: less, and the tip lies
 DISPROVED = 2.0  # times what is stated of hand or force: noise that is seen to be louder is believed
-MOVED = 5e-3  # m: more than a tracker's noise
+MOVED = 5e-3  # m, beside the tracker's noise: an object that moves
+SPREAD = 8.0  # deviations between the outermost of a stream's samples, in two dimensions
 LONGEST_SLIDE = 1.5  # s: after it a released object rests
 BLINK = 0.1  # s: a hand that is away from the object for so long is not
 GRIP = 0.5  # of a round tip's radius: so far beyond the object's edge it still touches it nearly as wide as it is
@@ -205,7 +208,7 @@ def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[Push
             table, tips, or cannot be compared.
     """
     check_hand_near(recording)
-    hands = {k: _beside(recording, push, height) for k, push in enumerate(recording.pushes)}
+    hands = {k: _beside(recording, push, height, noise) for k, push in enumerate(recording.pushes)}
     moving = {k: hand for k, hand in hands.items() if hand is not None}
     fitted = fit_hand_paths([(hand.times, hand.positions[:, :2]) for hand in moving.values()], noise.hand)
     paths = dict(zip(moving, fitted, strict=True))
@@ -253,7 +256,7 @@ def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[S
     """Start pose from the rest before the motion, or pose and velocity of a free motion from its first samples."""
     sigmas = noise.sigmas
     if free:
-        return _moving_start(push, planar, sigmas)
+        return _moving_start(push, planar, noise)
     rests = rest_segments(push)
     if rests and rests[0].start == 0:
         still = planar[rests[0]]
@@ -262,8 +265,8 @@ def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[S
     return Start(pose=triple(planar[0])), sigmas.copy()
 
 
-def _moving_start(push: Push, planar: Array, sigmas: Array) -> tuple[Start, Array]:
-    times = push.object.times
+def _moving_start(push: Push, planar: Array, noise: Noise) -> tuple[Start, Array]:
+    times, sigmas = push.object.times, noise.sigmas
     n = int(min(len(times), max(3, np.searchsorted(times, times[0] + 0.08))))
     if n < 3:
         raise RecordingError(
@@ -272,8 +275,11 @@ def _moving_start(push: Push, planar: Array, sigmas: Array) -> tuple[Start, Arra
     t = times[:n] - times[0]
     design = np.column_stack([np.ones(n), t, 0.5 * t**2])
     coefficients, *_ = np.linalg.lstsq(design, planar[:n], rcond=None)
-    spread = np.sqrt(np.diag(np.linalg.pinv(design.T @ design)))
-    std = np.concatenate([spread[0] * sigmas, spread[1] * sigmas])
+    apart = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
+    fit = np.linalg.pinv(design)[:2]
+    # Of place and velocity (2, 3), by the noise's correlation from sample to sample.
+    spread = np.sqrt([np.diag(fit @ rho**apart @ fit.T) for rho in noise.correlations]).T
+    std = (spread * sigmas).ravel()
     return Start(pose=triple(coefficients[0]), velocity=triple(coefficients[1])), std
 
 
@@ -282,13 +288,13 @@ def triple(values: Array) -> tuple[float, float, float]:
     return float(values[0]), float(values[1]), float(values[2])
 
 
-def _beside(recording: Recording, push: Push, height: float) -> PoseStream | None:
+def _beside(recording: Recording, push: Push, height: float, noise: Noise) -> PoseStream | None:
     """The hand's stream from where it has come down beside the object to where it lifts off.
 
     All of it where the object moves at other times, too: then heights tell nothing.
 
     Raises:
-        RecordingError: if the hand passes above or below the object.
+        RecordingError: if the hand passes above or below the object, or comes down beside it for several pushes.
     """
     tip, hand = recording.hand, push.hand
     if tip is None or hand is None:
@@ -297,9 +303,17 @@ def _beside(recording: Recording, push: Push, height: float) -> PoseStream | Non
     beside = (z - max(reach, GRIP * tip.radius) < height) & (z + reach > 0.0)
     if beside.all():
         return hand
-    kept = _longest_run(beside, hand.times)
-    if kept is not None and _rests_outside(push, hand.times[kept]):
+    runs = _runs_of(beside, hand.times)
+    kept = max(runs, key=lambda run: run.stop - run.start, default=None)
+    if kept is not None and _rests_outside(push, hand.times[kept], noise):
         return PoseStream(times=hand.times[kept], positions=hand.positions[kept], quaternions=hand.quaternions[kept])
+    pushing = [hand.times[run] for run in runs if _moves(push, *_felt(hand.times[run]), noise)]
+    if len(pushing) > 1 and _is_over(recording, push, hand)[~beside].any():
+        spans = ", ".join(f"{times[0]:.2f} to {times[-1]:.2f} s" for times in pushing)
+        raise RecordingError(
+            f"push '{push.name}': the hand pushes the object more than once, and passes over it in between"
+            f" ({spans}); record each as a push of its own."
+        )
     if beside.mean() < 0.5:
         raise RecordingError(
             f"push '{push.name}': the hand at z = {np.median(z):.3f} m passes the object, which is {height:.3f} m"
@@ -308,31 +322,43 @@ def _beside(recording: Recording, push: Push, height: float) -> PoseStream | Non
     return hand
 
 
-def _longest_run(flags: NDArray[np.bool_], times: Array) -> slice | None:
-    """The longest run of True, over gaps shorter than ``BLINK``; None if it is a single sample."""
+def _runs_of(flags: NDArray[np.bool_], times: Array) -> list[slice]:
+    """Runs of True, over gaps shorter than ``BLINK``, of more than one sample."""
     where = np.flatnonzero(flags)
-    if not len(where):
-        return None
     parted = (np.diff(where) > 1) & (np.diff(times[where]) > BLINK)
     runs = np.split(where, np.flatnonzero(parted) + 1)
-    longest = max(runs, key=len)
-    return slice(int(longest[0]), int(longest[-1]) + 1) if len(longest) > 1 else None
+    return [slice(int(run[0]), int(run[-1]) + 1) for run in runs if len(run) > 1]
 
 
-def _rests_outside(push: Push, times: Array) -> bool:
+def _is_over(recording: Recording, push: Push, hand: PoseStream) -> NDArray[np.bool_]:
+    """At which samples (n,) of the hand the middle of its tip is surely within the object's outline."""
+    seen, places = push.object.times, push.object.positions[:, :2]
+    there = np.column_stack([np.interp(hand.times, seen, column) for column in places.T])
+    inner = 0.5 * float(np.abs(solid_of(recording.object.shape).outline.extent()).min())
+    return np.asarray(np.linalg.norm(hand.positions[:, :2] - there, axis=1) < inner)
+
+
+def _rests_outside(push: Push, times: Array, noise: Noise) -> bool:
     """Whether the object moves only while the hand is beside it at times (n,) [s], and slides to rest after that.
 
     Nothing speaks against it where only the first and the last pose are known.
     """
     if push.endpoint_only:
         return True
-    places, seen = push.object.positions[:, :2], push.object.times
+    begin, end = _felt(times)
+    pushed = _moves(push, -math.inf, float(times[-1]) + BLINK, noise) or not _moves(push, -math.inf, math.inf, noise)
+    return pushed and not _moves(push, -math.inf, begin, noise) and not _moves(push, end, math.inf, noise)
 
-    def moves(when: NDArray[np.bool_]) -> bool:
-        return bool(when.any()) and float(np.linalg.norm(np.ptp(places[when], axis=0))) > MOVED
 
-    pushed = moves(seen <= times[-1] + BLINK) or not moves(np.ones(len(seen), dtype=bool))
-    return pushed and not moves(seen <= times[0]) and not moves(seen >= times[-1] + LONGEST_SLIDE)
+def _felt(times: Array) -> tuple[float, float]:
+    """Within which times a hand that is beside an object at times (n,) moves it [s]."""
+    return float(times[0]), float(times[-1]) + LONGEST_SLIDE
+
+
+def _moves(push: Push, begin: float, end: float, noise: Noise) -> bool:
+    """Whether the object moves from one time to another [s] by more than samples scatter."""
+    places = push.object.positions[(push.object.times >= begin) & (push.object.times <= end), :2]
+    return len(places) > 0 and float(np.linalg.norm(np.ptp(places, axis=0))) > MOVED + SPREAD * noise.position
 
 
 def _contact_height(recording: Recording, hand: PoseStream | None, height: float) -> float:

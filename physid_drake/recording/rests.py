@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -153,14 +154,19 @@ def _without_creep(times: Array, planar: Array, rest: slice) -> list[slice]:
 
 
 def _creeps(times: Array, planar: Array) -> bool:
-    """Whether a line through poses (n, 3) rises by more than rest and slow noise allow."""
+    """Whether a line through poses (n, 3) rises by more than rest and slow noise allow.
+
+    What scatters is seen within short blocks: about a line through all of a slow push, the push itself does. A line
+    through more of them is surer, and a rest ends where it began, however long it is.
+    """
     span = float(times[-1] - times[0])
     if span < LONG:
         return False
     design = np.column_stack([np.ones(len(times)), (times - times[0]) / span])
     line, *_ = np.linalg.lstsq(design, planar, rcond=None)
-    scatter = (planar - design @ line).std(axis=0)
-    return bool((np.abs(line[1]) > CREEP * scatter + _LIMITS * span).any())
+    blocks = np.array_split(planar, max(3, int(span / LONG)))
+    scatter = np.median([block.std(axis=0) for block in blocks], axis=0) * min(1.0, math.sqrt(4.0 * LONG / span))
+    return bool((np.abs(line[1]) > CREEP * scatter + _LIMITS * min(span, LONG)).any())
 
 
 def _stays(times: Array, planar: Array) -> bool:
@@ -168,7 +174,7 @@ def _stays(times: Array, planar: Array) -> bool:
     thirds = np.array_split(planar, 3)
     away = np.abs(thirds[-1].mean(axis=0) - thirds[0].mean(axis=0))
     scatter = np.min([third.std(axis=0) for third in thirds], axis=0)
-    return bool((away <= CREEP * scatter + _LIMITS * (times[-1] - times[0])).all())
+    return bool((away <= CREEP * scatter + _LIMITS * min(float(times[-1] - times[0]), LONG)).all())
 
 
 def _before_creep(times: Array, planar: Array) -> int | None:

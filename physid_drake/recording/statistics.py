@@ -11,6 +11,8 @@ from physid_drake.recording.rests import SHORTEST_REST, TO_STD, rests_of
 from physid_drake.recording.screening import find_gaps
 from physid_drake.recording.values import Array, PoseStream, Push, Recording
 
+NOT_ODD = 0.99  # of a rounded stream's deviations: the others are outliers
+
 
 @dataclass(frozen=True, kw_only=True)
 class NoiseEstimate:
@@ -146,7 +148,10 @@ def _largest_speed(stream: PoseStream) -> float | None:
 def _robust_std(residuals: Sequence[Array]) -> float | None:
     if not residuals:
         return None
-    return float(TO_STD * np.median(np.abs(np.concatenate(residuals))))
+    sizes = np.abs(np.concatenate(residuals))
+    seen = float(TO_STD * np.median(sizes))
+    # Of a rounded stream most samples may be the same; the others tell its noise, and some are outliers.
+    return seen if seen > 0.0 else float(np.sqrt(np.mean(np.minimum(sizes, np.quantile(sizes, NOT_ODD)) ** 2)))
 
 
 def _autocorrelation(residuals: Sequence[Array]) -> float | None:

@@ -213,7 +213,7 @@ def test_every_noisy_path_is_fitted_with_few_knots():
             case 3:
                 stream[count // 3 : 2 * count // 3] = stream[count // 3]
         fit = fit_hand_path(times, stream, None if seed % 3 else std)
-        assert len(fit.times[:: fit.pieces]) <= MOST_KNOTS + 3
+        assert len(fit.times[:: fit.pieces]) <= MOST_KNOTS[0] + 3
         assert (np.diff(fit.times) > 0.0).all()
         assert np.isfinite(fit.velocities).all()
 
@@ -250,3 +250,16 @@ def test_the_jitter_of_stamps_is_seen(jitter):
     _, streams = late_or_early(jitter)
     seen = hand_fit._jitter_of([hand_fit._fit_of(*stream, STD) for stream in streams])
     assert seen == pytest.approx(jitter / np.sqrt(3.0), rel=0.3, abs=2e-5)
+
+
+@pytest.mark.parametrize("touches", [2, 3])
+def test_a_hand_that_comes_and_goes_several_times_is_followed(touches):
+    """Each touch takes some twelve knots: approach, push, retreat."""
+    lead = np.array([0.2, 0.1, 0.3, 0.1, 0.3, 0.08, 0.5, 0.08, 0.4, 0.1, 0.3, 0.1])
+    speeds = np.tile([0.0, 0.15, 0.15, 0.0, 0.0, 0.08, 0.08, 0.0, 0.0, -0.2, -0.2, 0.0], touches)
+    path = HandPath(
+        times=np.cumsum(np.tile(lead, touches)), velocities=np.outer(speeds, [0.96, 0.28]), start=np.zeros(2)
+    )
+    times, stream = sampled(path, float(path.times[-1]) + 0.2)
+    away = np.linalg.norm(fit_hand_path(times, stream, STD).positions(times) - path.positions(times), axis=1)
+    assert away.max() < 3e-4  # measured: 0.04 to 0.16 mm; 2 and 4.5 mm with 24 knots

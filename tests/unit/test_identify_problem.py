@@ -9,6 +9,7 @@ from runs import shipped_pushes
 from physid_drake.errors import RecordingError
 from physid_drake.identify.problem import Noise, noise_of, problems_of, spec_of
 from physid_drake.recording import (
+    Box,
     Cylinder,
     Hand,
     ObjectModel,
@@ -161,6 +162,43 @@ def test_a_hand_that_pushes_twice_is_taken_whole(recording):
     twice = with_pushes(recording, lambda p: lifted(p, lambda t: (t > 0.35) & (t < 0.5)))
     plain, seen = first(recording), first(twice)
     assert np.array_equal(plain.path.positions(plain.times), seen.path.positions(plain.times))
+
+
+def there_and_back(noise):
+    """A box of 0.1 m, 0.05 m high, pushed along x, and pushed back from the other side; the tip passes over it."""
+    times = np.arange(0.0, 8.0, 0.01)
+    knots = [0.0, 0.5, 2.5, 2.8, 3.2, 3.7, 4.1, 4.5, 6.5, 8.0]
+    x = np.interp(times, knots, [-0.1, -0.1, 0.0, 0.0, 0.0, 0.21, 0.21, 0.21, 0.06, 0.06])
+    z = np.interp(times, knots, [0.025] * 4 + [0.1] * 2 + [0.025] * 4)
+    there = np.interp(times, [1.3, 2.5, 4.6, 6.5], [0.0, 0.06, 0.06, 0.0])
+    places = np.column_stack([there, 0.0 * times, 0.025 + 0.0 * times])
+    places[:, :2] += noise * np.random.default_rng(0).standard_normal((len(times), 2))
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1))
+    box = PoseStream(times=times, positions=places, quaternions=still)
+    tip = PoseStream(times=times, positions=np.column_stack([x, 0.0 * x, z]), quaternions=still)
+    return Push(name="both ways", object=box, hand=tip, force=None)
+
+
+@pytest.mark.parametrize("noise", [1e-4, 1e-3])
+def test_a_hand_that_passes_over_the_object_between_two_pushes_is_refused(recording, noise):
+    """Taken whole, its path would push the object on its way back."""
+    both = replace(
+        recording, pushes=(there_and_back(noise),), hand=Hand(tip="sphere", radius=0.01),
+        object=ObjectModel(shape=Box(size=(0.1, 0.1, 0.05))),
+    )  # fmt: skip
+    with pytest.raises(RecordingError, match="record each as a push of its own"):
+        problems_of(both, replace(QUIET, position=noise), 0.05)
+
+
+@pytest.mark.parametrize("noise", [1e-4, 1e-3, 2e-3])
+def test_a_loud_tracker_does_not_hide_where_the_hand_lifts_off(recording, noise):
+    def loud(push):
+        s = lifted(push, lambda times: times > 0.8 * times[-1]).hand
+        shaken = push.object.positions + noise * np.random.default_rng(0).standard_normal((len(push.object), 3))
+        return replace(push, hand=s, object=replace(push.object, positions=shaken))
+
+    cut = problems_of(with_pushes(recording, loud), replace(QUIET, position=noise), 0.03)[0]
+    assert cut.path.times[-1] < recording.pushes[0].hand.times[-1] - 0.1
 
 
 @pytest.mark.parametrize("low", [0.005, 0.04], ids=["one sample", "some samples"])
