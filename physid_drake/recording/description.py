@@ -63,6 +63,10 @@ for _resolves in (_Loader, Dumper):
     )
 
 
+class _PlacedError(RecordingError):
+    """A refusal that already says in which file and line."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Section:
     """One mapping of the file, which knows where it stands so that it can refuse by name."""
@@ -79,13 +83,15 @@ class Section:
 
     def refuse(self, key: str, message: str) -> RecordingError:
         """The error for one key."""
-        return RecordingError(f"{self._place(key)}: {message}")
+        return _PlacedError(f"{self._place(key)}: {message}")
 
     @contextmanager
     def naming(self, key: str = "") -> Iterator[None]:
         """Puts file, line and key before the message of a refusal inside."""
         try:
             yield
+        except _PlacedError:
+            raise
         except RecordingError as error:
             raise self.refuse(key, str(error)) from error
 

@@ -1,7 +1,8 @@
 """Finds where a tracked stream lost track, jumped, stalled or paused; leaves out only what cannot be a pose.
 
-Left out: rows that are all zeros (a tracker's way of saying "lost"), and a single sample that leaps away and
-comes straight back. Kept and reported: gaps, stalls that the tracker caught up from, lone leaps that stay.
+Left out: rows that are all zeros (a tracker's way of saying "lost"), a single sample that leaps away and comes
+straight back, and the repeats of a tracker that is slower than the log. Kept and reported: gaps, stalls that the
+tracker caught up from, lone leaps that stay.
 """
 
 from __future__ import annotations
@@ -24,6 +25,12 @@ STALL_SAMPLES: Final = 5
 
 LEAP_FACTOR: Final = 5.0
 """A leap is this much longer than nine tenths of the stream's steps, and than the steps beside it."""
+
+HELD: Final = 1.5
+"""A tracker that is slower than the log shows each of its poses so many times or more, on the average."""
+
+FEWEST_HELD: Final = 10
+"""Poses of such a tracker: what rests without noise has fewer."""
 
 SHORTEST_SCREENED: Final = 25
 """Streams shorter than this have too few steps to tell a leap from motion."""
@@ -85,13 +92,21 @@ def screen_poses(
         lost_rows = [rows[k] for k in np.flatnonzero(lost).tolist()]
         warnings.append(f"{what}: {describe_rows(lost_rows)}: track lost (all zeros), left out.")
     tracked = np.flatnonzero(~lost)
+    repeats = _find_repeats(positions[tracked], quaternions[tracked])
+    if repeats.any():
+        shown = len(repeats) / float((~repeats).sum())
+        warnings.append(
+            f"{what}: each pose is shown {shown:.2g} times, by a tracker slower than the log; repeats left out."
+        )
+    tracked = tracked[~repeats]
     times, positions, quaternions = times[tracked], positions[tracked], quaternions[tracked]
     leaps, lone = _find_leaps(times, positions, quaternions)
     for k in leaps:
         distance = np.linalg.norm(positions[k] - positions[k - 1])
         row = rows[tracked[k]]
         warnings.append(f"{what}: row {row}: jumps {distance:.3g} m away and comes straight back, left out.")
-    keep = ~lost
+    keep = np.zeros(len(lost), dtype=np.bool_)
+    keep[tracked] = True
     keep[tracked[leaps]] = False
     stalls = _find_stalls(positions, quaternions)
     for first, last in stalls:
@@ -145,6 +160,26 @@ def _find_leaps(times: Array, positions: Array, quaternions: Array) -> tuple[lis
         if k not in beside and steps[k] > 2.0 * max(floor, LEAP_FACTOR * max(steps[k - 1], steps[k + 1]))
     ]
     return leaps, lone
+
+
+def _find_repeats(positions: Array, quaternions: Array) -> Flags:
+    """Samples (n,) that repeat the one before because the tracker is slower than the log; none of other repeats.
+
+    A slower clock shows all its poses about equally often. Rounded noise repeats as chance has it, and what rests
+    without noise repeats for as long as it rests.
+    """
+    poses = np.column_stack([positions, quaternions])
+    none = np.zeros(len(poses), dtype=np.bool_)
+    if len(poses) < SHORTEST_SCREENED:
+        return none
+    same = np.concatenate([[False], (poses[1:] == poses[:-1]).all(axis=1)])
+    runs = np.diff(np.append(np.flatnonzero(~same), len(poses)))
+    if len(runs) < FEWEST_HELD:
+        return none
+    low, high = np.quantile(runs, [0.05, 0.95])
+    usual = runs[(runs >= low) & (runs <= high)]
+    held = high - low <= 1.0 and float(usual.mean()) >= HELD
+    return same if held else none
 
 
 def _find_stalls(positions: Array, quaternions: Array) -> list[tuple[int, int]]:

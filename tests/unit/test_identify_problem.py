@@ -384,6 +384,26 @@ def test_a_free_slide_starts_with_the_velocity_of_its_first_samples():
     assert spec_of(slide(), None).hand_radius is None
 
 
+@pytest.mark.parametrize(("rate", "correlation"), [(500, 0.0), (500, 0.9), (120, 0.8)])
+def test_a_free_slides_start_is_as_sure_as_its_noise_allows(rate, correlation):
+    times, rng, off = np.arange(0.0, 0.3, 1.0 / rate), np.random.default_rng(0), []
+    noise = replace(QUIET, correlation=(correlation, 0.0))
+    for _ in range(200):
+        e = rng.standard_normal((len(times), 2))
+        for k in range(1, len(e)):
+            e[k] = correlation * e[k - 1] + np.sqrt(1.0 - correlation**2) * e[k]
+        places = np.column_stack([0.5 * times + 3e-4 * e[:, 0], 3e-4 * e[:, 1], 0.0 * times])
+        yaw = 0.5 * 3e-3 * rng.standard_normal(len(times))
+        turned = np.column_stack([np.cos(yaw), 0 * yaw, 0 * yaw, np.sin(yaw)])
+        push = Push(name="slide", hand=None, force=None,
+                    object=PoseStream(times=times, positions=places, quaternions=turned))  # fmt: skip
+        problem = problems_of(replace(slide(), pushes=(push,)), noise, 0.03)[0]
+        start = np.array([*problem.start.pose, *problem.start.velocity])
+        off.append((start - [0.0, 0.0, 0.0, 0.5, 0.0, 0.0]) / problem.start_std)
+    # Three standard errors of 200 slides; 2.1 to 2.6 where the noise counts as white.
+    np.testing.assert_allclose(np.sqrt(np.mean(np.square(off), axis=0)), 1.0, atol=0.16)
+
+
 def test_a_free_slide_of_two_poses_has_no_velocity_and_is_refused():
     with pytest.raises(RecordingError, match=r"'slide'.*at least 3 poses"):
         first(slide(2))

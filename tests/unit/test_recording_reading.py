@@ -289,6 +289,28 @@ def pause(poses):
     return np.delete(poses, slice(40, 50), axis=0)
 
 
+@pytest.mark.parametrize(("rate", "left"), [(0.5, 40), (0.6, 48), (0.25, 20)])
+def test_a_tracker_that_is_slower_than_the_log_shows_each_pose_once(written, rate, left):
+    def held(poses):
+        frame = np.floor(rate * np.arange(len(poses)) + 1e-9)
+        first = np.searchsorted(frame, frame)
+        poses[:, 1:] = poses[first, 1:]
+        return poses
+
+    push = read_recording(written(rows=long_table(held, noise=2e-4))).pushes[0]
+    assert len(push.object) == left
+    assert any("by a tracker slower than the log; repeats left out" in w for w in push.warnings)
+
+
+@pytest.mark.parametrize("step", [2e-5, 1e-4, 1e-3])
+def test_rounded_poses_are_not_taken_for_those_of_a_slow_tracker(written, step):
+    def rounded(poses):
+        poses[:, 1] = step * np.round(poses[:, 1] / step)
+        return poses
+
+    assert len(read_recording(written(rows=long_table(rounded, noise=1e-5, count=400))).pushes[0].object) == 400
+
+
 @pytest.mark.parametrize("noise", [0.0, 1e-5])
 @pytest.mark.parametrize(
     ("change", "expected", "left"),

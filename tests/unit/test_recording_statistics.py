@@ -102,6 +102,43 @@ def test_a_slow_push_is_no_rest(speed, std, rate):
     assert estimate_noise(recording_of(push)).object_position_std == pytest.approx(std, rel=0.15)
 
 
+@pytest.mark.parametrize(
+    ("speed", "std", "rate", "still", "way"),
+    [
+        (2e-3, 3e-4, 100, 5.0, 0.006),
+        (5e-3, 3e-4, 30, 3.0, 0.01),
+        (0.01, 1e-3, 100, 3.0, 0.05),
+        (0.02, 1e-3, 30, 1.0, 0.1),
+        (1e-3, 1e-4, 240, 3.0, 0.03),
+    ],
+)
+def test_a_long_rest_does_not_swallow_a_slow_or_short_push(speed, std, rate, still, way):
+    times = np.arange(0.0, 2 * still + way / speed, 1.0 / rate)
+    moved = speed * np.clip(times - still, 0.0, way / speed)
+    for seed in range(4):
+        x, y, yaw = (share * moved + s * np.random.default_rng(seed).standard_normal(len(times))
+                     for share, s in ((1.0, std), (0.0, std), (0.0, 10 * std)))  # fmt: skip
+        push = Push(name="slow", object=planar_stream(times, x, y, yaw), hand=None, force=None)
+        rests = rest_segments(push)
+        first = rests[0] if rests else slice(0, 0)
+        # Off by 0.25 mm at most, or by one deviation of a loud tracker; by 3 to 6 mm where the push counts as scatter.
+        assert first.start == 0 and (first.stop == 0 or moved[first].mean() < max(5e-4, 1.2 * std))
+
+
+@pytest.mark.parametrize("noise", [3e-5, 2e-4])
+def test_a_rounded_stream_tells_its_noise(noise):
+    rng, pushes = np.random.default_rng(0), []
+    for k in range(8):
+        p = rest_move_rest(rng, noise, 3e-3)
+        rounded = np.round(p.object.positions, 4)
+        stream = PoseStream(times=p.object.times, positions=rounded, quaternions=p.object.quaternions)
+        pushes.append(Push(name=str(k), object=stream, hand=p.hand, force=p.force))
+    # Rounding to 0.1 mm adds 0.029 mm in the square, where noise is not so small that hardly a sample flips.
+    assert estimate_noise(recording_of(*pushes)).object_position_std == pytest.approx(
+        np.hypot(noise, 2.9e-5), rel=0.4
+    )
+
+
 @pytest.mark.parametrize(("rate", "memory"), [(100, 0.03), (200, 0.02), (200, 0.044), (500, 0.03)])
 def test_short_rests_are_seen_under_slow_noise(rate, memory):
     """0.35 s at rest, struck to 0.4 m/s, at rest again for as long: noise that wanders in a window is no motion."""
