@@ -121,7 +121,7 @@ def test_a_long_rest_does_not_swallow_a_slow_or_short_push(speed, std, rate, sti
         push = Push(name="slow", object=planar_stream(times, x, y, yaw), hand=None, force=None)
         rests = rest_segments(push)
         first = rests[0] if rests else slice(0, 0)
-        # Off by 0.25 mm at most, or by one deviation of a loud tracker; by 3 to 6 mm where the push counts as scatter.
+        # Off by 0.25 mm, or one deviation of a loud tracker; by 3 to 6 mm where the push counts as scatter.
         assert first.start == 0 and (first.stop == 0 or moved[first].mean() < max(5e-4, 1.2 * std))
 
 
