@@ -28,7 +28,7 @@ Tick = Callable[[int, int], None]
 
 DRAWS = 1000
 FEWEST_FOR_A_TREND = 6  # pushes
-IN_ORDER = math.log(1e-4)  # of a p-value
+IN_ORDER = 1e-4  # p-value
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -87,7 +87,7 @@ class Score:
     @property
     def in_order(self) -> bool:
         """Whether the frictions of whole pushes follow the effect, which is all that it changes, beyond chance."""
-        return bool(self.signature.friction_changes) and self.log_p < IN_ORDER
+        return bool(self.signature.friction_changes) and self.log_p < math.log(IN_ORDER)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
