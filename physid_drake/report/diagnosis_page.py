@@ -195,9 +195,9 @@ def _parameter_row(name: str, p: ParameterEstimate) -> tuple[str, str, str, str]
 
 def _detectable_row(one: Detectable) -> tuple[str, str, str, str]:
     """Effect, parameter, the smallest value that would have shown, motion."""
-    null = getattr(effect_named(one.name)(), one.parameter)
-    # Weights of an underside are grids, and even is 1.
-    digits = digits_between(one.value, [null if isinstance(null, float) else 1.0])
+    # A coordinate that is no parameter, as of the weights of an underside, is 0 where nothing is missing.
+    null = getattr(effect_named(one.name)(), one.parameter, 0.0)
+    digits = digits_between(one.value, [null])
     value = quantity(one.value, one.unit, digits)
     return one.name, one.parameter, value, number(one.sigmas, 2)
 

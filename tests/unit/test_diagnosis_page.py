@@ -97,7 +97,7 @@ def diagnosis_with(**changes):
             ranked("table_tilt", gain=math.nan, p_value=1.0, held_out_gain=None, held_out_se=None, why="too little"),
         ),
         detectable=(
-            Detectable(name="uneven_support", parameter="weights", value=math.nan, unit="-", sigmas=math.inf),
+            Detectable(name="uneven_support", parameter="ends_x", value=math.nan, unit="-", sigmas=math.inf),
             Detectable(name="table_tilt", parameter="x", value=2e-3, unit="rad", sigmas=0.7),
         ),
         left="nothing beyond noise",
