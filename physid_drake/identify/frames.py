@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import RecordingError
-from physid_drake.recording import Box, Cylinder, Push, Recording
+from physid_drake.recording import Box, Cylinder, PoseStream, Push, Recording
 
 Array = NDArray[np.float64]
 
@@ -93,12 +93,16 @@ def _moves(push: Push) -> bool:
 def _least_gap(recording: Recording, push: Push) -> float:
     """Distance [m] that tip and object surely have at least, wherever the object is turned."""
     assert push.hand is not None and recording.hand is not None
-    times, places = push.object.times, push.object.positions[:, :2]
-    there = np.column_stack([np.interp(push.hand.times, times, column) for column in places.T])
-    apart = np.linalg.norm(push.hand.positions[:, :2] - there, axis=1)
     extent = np.abs(solid_of(recording.object.shape).outline.extent())
     corner = float(np.hypot(max(extent[0], extent[2]), max(extent[1], extent[3])))
-    return float(apart.min()) - corner - recording.hand.radius
+    return float(from_object(push, push.hand).min()) - corner - recording.hand.radius
+
+
+def from_object(push: Push, hand: PoseStream) -> Array:
+    """Distances (n,) in the plane from Bo to samples of the hand [m]."""
+    seen, places = push.object.times, push.object.positions[:, :2]
+    there = np.column_stack([np.interp(hand.times, seen, column) for column in places.T])
+    return np.asarray(np.linalg.norm(hand.positions[:, :2] - there, axis=1))
 
 
 def unseen_motion(recording: Recording, sigma: float) -> tuple[str, ...]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -11,13 +10,12 @@ from numpy.typing import NDArray
 
 from physid_drake.cell import CellConfig, HandPath, Start
 from physid_drake.cell.hand_fit import fit_hand_paths, stream_std
-from physid_drake.cell.solid import solid_of
 from physid_drake.errors import RecordingError
 from physid_drake.identify.force_windows import force_windows
 from physid_drake.identify.frames import check_clocks, check_hand_near, check_on_table, check_upright
+from physid_drake.identify.hand_stream import beside_object, vertical_reach
 from physid_drake.recording import Cylinder as CylinderShape
 from physid_drake.recording import (
-    Hand,
     NoiseEstimate,
     PoseStream,
     Push,
@@ -36,11 +34,6 @@ DEFAULT_FORCE_STD = 0.05  # N
 LARGEST_CORRELATION = 0.98
 STANDING = 0.3  # area that the x and y axes of the tip span in the plane: less, and the tip lies
 DISPROVED = 2.0  # times what is stated of hand or force: noise that is seen to be louder is believed
-MOVED = 5e-3  # m, beside the tracker's noise: an object that moves
-SPREAD = 8.0  # deviations between the outermost of a stream's samples, in two dimensions
-LONGEST_SLIDE = 1.5  # s: after it a released object rests
-BLINK = 0.1  # s: a hand that is away from the object for so long is not
-GRIP = 0.5  # of a round tip's radius: so far beyond the object's edge it still touches it nearly as wide as it is
 # A simulation without noise, or a tracker that is quiet at rest: below these the cell's own error is what differs.
 FINEST_POSITION = 1e-5  # m
 FINEST_ROTATION = 1e-4  # rad
@@ -58,7 +51,7 @@ class Noise:
         rotation: of its yaw [rad].
         hand: of the hand's x and y [m].
         force: of a force component [N].
-        correlation: between neighbouring samples, of the noise of position and of rotation [-].
+        position_correlation, rotation_correlation: of either noise between neighbouring samples [-].
         source: where each figure comes from: ``stated``, ``seen`` or ``assumed``.
     """
 
@@ -66,7 +59,8 @@ class Noise:
     rotation: float
     hand: float
     force: float
-    correlation: tuple[float, float]
+    position_correlation: float
+    rotation_correlation: float
     source: dict[str, str]
 
     @property
@@ -77,7 +71,7 @@ class Noise:
     @property
     def correlations(self) -> Array:
         """From sample to sample (3,), of x, y, yaw [-]."""
-        return np.array([self.correlation[0], *self.correlation])
+        return np.array([self.position_correlation, self.position_correlation, self.rotation_correlation])
 
     def mean_std(self, samples: float) -> Array:
         """Standard deviations (3,) of a mean over so many samples of a rest [m, m, rad]."""
@@ -107,20 +101,19 @@ def noise_of(recording: Recording) -> Noise:
 
     place = stated.object_position_std, seen.object_position_std
     turn = stated.object_rotation_std, seen.object_rotation_std
-    # Of rests that tell one stream's only: it is the same tracker's filter.
-    of_place = _known_of(seen.position_autocorrelation, seen.rotation_autocorrelation)
-    of_turn = _known_of(seen.rotation_autocorrelation, seen.position_autocorrelation)
     return Noise(
         position=choose("position", *place, DEFAULT_POSITION_STD, FINEST_POSITION),
         rotation=choose("rotation", *turn, DEFAULT_ROTATION_STD, FINEST_ROTATION),
         hand=choose("hand", stated.hand_position_std, _hand_std(recording), DEFAULT_HAND_STD, FINEST_HAND),
         force=choose("force", stated.force_std, seen.force_std, DEFAULT_FORCE_STD, FINEST_FORCE),
-        correlation=(of_place, of_turn),
+        position_correlation=_correlation(seen.position_autocorrelation, seen.rotation_autocorrelation),
+        rotation_correlation=_correlation(seen.rotation_autocorrelation, seen.position_autocorrelation),
         source=source,
     )
 
 
-def _known_of(own: float | None, other: float | None) -> float:
+def _correlation(own: float | None, other: float | None) -> float:
+    """What the rests tell of one noise, or of the other: it is the same tracker's filter."""
     seen = other if own is None else own
     return 0.0 if seen is None else float(np.clip(seen, 0.0, LARGEST_CORRELATION))
 
@@ -208,7 +201,7 @@ def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[Push
             table, tips, or cannot be compared.
     """
     check_hand_near(recording)
-    hands = {k: _beside(recording, push, height, noise) for k, push in enumerate(recording.pushes)}
+    hands = {k: beside_object(recording, push, height, noise.position) for k, push in enumerate(recording.pushes)}
     moving = {k: hand for k, hand in hands.items() if hand is not None}
     fitted = fit_hand_paths([(hand.times, hand.positions[:, :2]) for hand in moving.values()], noise.hand)
     paths = dict(zip(moving, fitted, strict=True))
@@ -288,79 +281,6 @@ def triple(values: Array) -> tuple[float, float, float]:
     return float(values[0]), float(values[1]), float(values[2])
 
 
-def _beside(recording: Recording, push: Push, height: float, noise: Noise) -> PoseStream | None:
-    """The hand's stream from where it has come down beside the object to where it lifts off.
-
-    All of it where the object moves at other times, too: then heights tell nothing.
-
-    Raises:
-        RecordingError: if the hand passes above or below the object, or comes down beside it for several pushes.
-    """
-    tip, hand = recording.hand, push.hand
-    if tip is None or hand is None:
-        return None
-    z, reach = hand.positions[:, 2], _vertical_reach(tip)
-    beside = (z - max(reach, GRIP * tip.radius) < height) & (z + reach > 0.0)
-    if beside.all():
-        return hand
-    runs = _runs_of(beside, hand.times)
-    kept = max(runs, key=lambda run: run.stop - run.start, default=None)
-    if kept is not None and _rests_outside(push, hand.times[kept], noise):
-        return PoseStream(times=hand.times[kept], positions=hand.positions[kept], quaternions=hand.quaternions[kept])
-    pushing = [hand.times[run] for run in runs if _moves(push, *_felt(hand.times[run]), noise)]
-    if len(pushing) > 1 and _is_over(recording, push, hand)[~beside].any():
-        spans = ", ".join(f"{times[0]:.2f} to {times[-1]:.2f} s" for times in pushing)
-        raise RecordingError(
-            f"push '{push.name}': the hand pushes the object more than once, and passes over it in between"
-            f" ({spans}); record each as a push of its own."
-        )
-    if beside.mean() < 0.5:
-        raise RecordingError(
-            f"push '{push.name}': the hand at z = {np.median(z):.3f} m passes the object, which is {height:.3f} m"
-            " high; correct hand_z_m or the object's size."
-        )
-    return hand
-
-
-def _runs_of(flags: NDArray[np.bool_], times: Array) -> list[slice]:
-    """Runs of True, over gaps shorter than ``BLINK``, of more than one sample."""
-    where = np.flatnonzero(flags)
-    parted = (np.diff(where) > 1) & (np.diff(times[where]) > BLINK)
-    runs = np.split(where, np.flatnonzero(parted) + 1)
-    return [slice(int(run[0]), int(run[-1]) + 1) for run in runs if len(run) > 1]
-
-
-def _is_over(recording: Recording, push: Push, hand: PoseStream) -> NDArray[np.bool_]:
-    """At which samples (n,) of the hand the middle of its tip is surely within the object's outline."""
-    seen, places = push.object.times, push.object.positions[:, :2]
-    there = np.column_stack([np.interp(hand.times, seen, column) for column in places.T])
-    inner = 0.5 * float(np.abs(solid_of(recording.object.shape).outline.extent()).min())
-    return np.asarray(np.linalg.norm(hand.positions[:, :2] - there, axis=1) < inner)
-
-
-def _rests_outside(push: Push, times: Array, noise: Noise) -> bool:
-    """Whether the object moves only while the hand is beside it at times (n,) [s], and slides to rest after that.
-
-    Nothing speaks against it where only the first and the last pose are known.
-    """
-    if push.endpoint_only:
-        return True
-    begin, end = _felt(times)
-    pushed = _moves(push, -math.inf, float(times[-1]) + BLINK, noise) or not _moves(push, -math.inf, math.inf, noise)
-    return pushed and not _moves(push, -math.inf, begin, noise) and not _moves(push, end, math.inf, noise)
-
-
-def _felt(times: Array) -> tuple[float, float]:
-    """Within which times a hand that is beside an object at times (n,) moves it [s]."""
-    return float(times[0]), float(times[-1]) + LONGEST_SLIDE
-
-
-def _moves(push: Push, begin: float, end: float, noise: Noise) -> bool:
-    """Whether the object moves from one time to another [s] by more than samples scatter."""
-    places = push.object.positions[(push.object.times >= begin) & (push.object.times <= end), :2]
-    return len(places) > 0 and float(np.linalg.norm(np.ptp(places, axis=0))) > MOVED + SPREAD * noise.position
-
-
 def _contact_height(recording: Recording, hand: PoseStream | None, height: float) -> float:
     """Middle of the heights that tip and object share: there a sphere is an upright tip without ambiguity."""
     if recording.hand is None or hand is None:
@@ -368,7 +288,7 @@ def _contact_height(recording: Recording, hand: PoseStream | None, height: float
     shape = recording.object.shape
     if isinstance(shape, CylinderShape) and shape.axis == "y":
         return shape.radius
-    centre, reach = float(np.median(hand.positions[:, 2])), _vertical_reach(recording.hand)
+    centre, reach = float(np.median(hand.positions[:, 2])), vertical_reach(recording.hand)
     return 0.5 * float(np.clip(centre - reach, 0.0, height) + np.clip(centre + reach, 0.0, height))
 
 
@@ -380,8 +300,3 @@ def _plane_axes(quaternions: Array) -> Array:
     axes: Array = np.array([along_x, along_y]).mean(axis=2)
     # A tool that lies has an axis without a direction in the plane: its offset is said along W.
     return axes if abs(np.linalg.det(axes)) > STANDING else np.eye(2)
-
-
-def _vertical_reach(hand: Hand) -> float:
-    """Half the height over which the tip is as wide as its radius [m]."""
-    return 0.5 * hand.length if hand.length is not None else 0.0

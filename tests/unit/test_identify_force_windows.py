@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from problems import QUIET
 from runs import shipped_pushes
 
 from physid_drake.cell.hand_path import straight_path
 from physid_drake.identify.force_windows import SHARE, _touching
-from physid_drake.identify.problem import Noise, problems_of
+from physid_drake.identify.problem import problems_of
 from physid_drake.recording import ForceStream, PoseStream
-
-QUIET = Noise(position=3e-4, rotation=3e-3, hand=5e-5, force=0.02, correlation=(0.0, 0.0), source={})
 
 
 @pytest.fixture(scope="module")

@@ -19,8 +19,10 @@ def problem() -> PushProblem:
 
 
 def noise(place=0.0, turn=None) -> Noise:
-    correlation = place, place if turn is None else turn
-    return Noise(position=3e-4, rotation=3e-3, hand=5e-5, force=0.02, correlation=correlation, source={})
+    return Noise(
+        position=3e-4, rotation=3e-3, hand=5e-5, force=0.02, position_correlation=place,
+        rotation_correlation=place if turn is None else turn, source={},
+    )  # fmt: skip
 
 
 def long_problem(problem, times, forces=0):
