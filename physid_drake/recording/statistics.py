@@ -12,6 +12,7 @@ from physid_drake.recording.screening import find_gaps
 from physid_drake.recording.values import Array, PoseStream, Push, Recording
 
 NOT_ODD = 0.99  # of a rounded stream's deviations: the others are outliers
+TIED = 0.05  # of the deviations, as large as their median: the stream is rounded to a good part of its noise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,9 +150,11 @@ def _robust_std(residuals: Sequence[Array]) -> float | None:
     if not residuals:
         return None
     sizes = np.abs(np.concatenate(residuals))
-    seen = float(TO_STD * np.median(sizes))
-    # Of a rounded stream most samples may be the same; the others tell its noise, and some are outliers.
-    return seen if seen > 0.0 else float(np.sqrt(np.mean(np.minimum(sizes, np.quantile(sizes, NOT_ODD)) ** 2)))
+    middle = float(np.median(sizes))
+    if float(np.mean(np.abs(sizes - middle) < 1e-9)) < TIED:
+        return TO_STD * middle
+    # Medians of a rounded stream are a whole number of its steps, or none; its mean square is not.
+    return float(np.sqrt(np.mean(np.minimum(sizes, np.quantile(sizes, NOT_ODD)) ** 2)))
 
 
 def _autocorrelation(residuals: Sequence[Array]) -> float | None:

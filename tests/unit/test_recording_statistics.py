@@ -125,18 +125,17 @@ def test_a_long_rest_does_not_swallow_a_slow_or_short_push(speed, std, rate, sti
         assert first.start == 0 and (first.stop == 0 or moved[first].mean() < max(5e-4, 1.2 * std))
 
 
-@pytest.mark.parametrize("noise", [3e-5, 2e-4])
-def test_a_rounded_stream_tells_its_noise(noise):
+@pytest.mark.parametrize(("noise", "seen"), [(3e-5, 3.0e-5), (1e-4, 1.04e-4), (2e-4, 2.02e-4), (1e-3, 1e-3)])
+def test_a_stream_rounded_to_a_tenth_of_a_millimetre_tells_its_noise(noise, seen):
+    """Step / sqrt(12) is added in the square, where noise is not so small that few samples differ at all."""
     rng, pushes = np.random.default_rng(0), []
     for k in range(8):
         p = rest_move_rest(rng, noise, 3e-3)
         rounded = np.round(p.object.positions, 4)
         stream = PoseStream(times=p.object.times, positions=rounded, quaternions=p.object.quaternions)
         pushes.append(Push(name=str(k), object=stream, hand=p.hand, force=p.force))
-    # Rounding to 0.1 mm adds 0.029 mm in the square, where noise is not so small that hardly a sample flips.
-    assert estimate_noise(recording_of(*pushes)).object_position_std == pytest.approx(
-        np.hypot(noise, 2.9e-5), rel=0.4
-    )
+    # Measured on five seeds: 1 to 3 % below; medians are 0 and 27 % below in the first and third row.
+    assert estimate_noise(recording_of(*pushes)).object_position_std == pytest.approx(seen, rel=0.06)
 
 
 @pytest.mark.parametrize(("rate", "memory"), [(100, 0.03), (200, 0.02), (200, 0.044), (500, 0.03)])
