@@ -127,8 +127,6 @@ def _polygon_path(times: Array, positions: Array) -> HandPath:
 class _Fit:
     """Least squares of truncated parabolas: position = p0 + v0 t + sum c_j (t - k_j)_+^2."""
 
-    _has_slopes = True
-
     def __init__(self, times: Array, positions: Array, sigmas: Array) -> None:
         self._take(times, positions, sigmas)
         self._moving = self._starts_moving()
@@ -181,11 +179,6 @@ class _Fit:
             columns += [self._t / self._span]
         columns += [np.maximum(self._t - k, 0.0) ** 2 / self._span**2 for k in knots]
         return np.column_stack(columns) / self._sigmas[:, None]
-
-    def _slopes(self, knots: Array) -> Array:
-        """Derivatives (n, k) of the knots' columns with respect to their places."""
-        slopes: Array = -2.0 * np.maximum(self._t[:, None] - knots, 0.0) / self._span**2 / self._sigmas[:, None]
-        return slopes
 
     def _ending(self, knots: Array) -> Array:
         """Rows that make velocity and acceleration vanish after the last knot (in the design's scaling)."""
@@ -249,23 +242,9 @@ class _Fit:
             coefficients, *_ = np.linalg.lstsq(design, self._scaled, rcond=1e-13)
             return (self._scaled - design @ coefficients).ravel()
 
-        def slopes(places: Array) -> Array:
-            """By Kaufman's approximation of variable projection (BIT 15, 1975): one factorisation, not one a knot."""
-            order = np.argsort(places)
-            design = self._design(places[order])
-            q, r = np.linalg.qr(design)
-            coefficients, *_ = np.linalg.lstsq(r, q.T @ self._scaled, rcond=1e-13)
-            moved = self._slopes(places[order])
-            moved -= q @ (q.T @ moved)
-            by_knot = -moved[:, None, :] * coefficients[-len(places) :].T[None]
-            jacobian = np.empty((2 * len(self._t), len(places)))
-            jacobian[:, order] = by_knot.reshape(-1, len(places))
-            return jacobian
-
         found = least_squares(
-            residual, knots, jac=slopes if self._has_slopes and len(knots) > MOST_KNOTS[0] else "2-point",
-            bounds=(-0.5 * SHORTEST_PIECE, self._span), x_scale=0.01, max_nfev=evaluations,
-        )  # fmt: skip
+            residual, knots, bounds=(-0.5 * SHORTEST_PIECE, self._span), x_scale=0.01, max_nfev=evaluations
+        )
         moved = self._separate(np.sort(found.x))
         # Knots that merged must have been worth less than their price, or both are needed where they were.
         allowed = (len(knots) - len(moved)) * self._price
@@ -310,8 +289,6 @@ class _Fit:
 
 class _SmoothFit(_Fit):
     """The same where the hand starts and brakes along smooth ramps of speed: position = p0 + sum v_k Phi_k(t)."""
-
-    _has_slopes = False
 
     def __init__(self, straight: _Fit, ramp: Polynomial) -> None:
         self._take(straight._t, straight._p, straight._sigmas)
