@@ -22,7 +22,7 @@ from physid_drake.cell.hand_path import HandPath, subdivided
 
 Array = NDArray[np.float64]
 
-MOST_KNOTS = 24, 12.0  # of a stream, or so many a second: an approach, a push and a retreat take twelve
+MOST_KNOTS, KNOTS_PER_SECOND = 24, 12.0  # whichever is more: an approach, a push and a retreat take twelve
 SMALLEST_STD = 2e-5  # m: a stream recorded without noise is still sampled and rounded
 SHORTEST_PIECE = 2e-3  # s between knots
 PIECES = 24  # of a smooth ramp: speeds to 0.2 % of its height
@@ -211,7 +211,7 @@ class _Fit:
         candidates = self._t[1:-1]
         columns = np.maximum(self._t[:, None] - candidates, 0.0) ** 2 / self._span**2 / self._sigmas[:, None]
         knots = np.array([], dtype=np.float64)
-        while len(knots) < max(MOST_KNOTS[0], MOST_KNOTS[1] * self._span):
+        while len(knots) < max(MOST_KNOTS, KNOTS_PER_SECOND * self._span):
             design = self._design(knots)
             q, _ = np.linalg.qr(design)
             residual = self._scaled - q @ (q.T @ self._scaled)
