@@ -134,6 +134,57 @@ def confirm(
         most: effects that are fitted in any case, if they are worth it; as long as none leads near an explanation,
             twice as many. Far from the plain cell a score test says little of what a fit will find.
     """
+    worth, more = _worth_fitting(scores, most)
+    step = _Step(fitter=fitter, before=before, plain=push_scores(before), tick=tick)
+    for k, one in enumerate((*worth, *more)):
+        if k == len(worth) and not step.leads_near:
+            # Before what promises little: derivatives of the model before may have led the best one astray.
+            step.fit_once_more(_most_promising(step.found))
+        if k >= len(worth) and (step.leads_near or step.spent):
+            break
+        if _explained([c for c in step.found if c.accepted]) and one.gain < RIVAL * worth[0].gain:
+            break
+        tick(f"fit with {one.kind.name}", k, len(worth))
+        step.found.append(_candidate(fitter, one, _fit(fitter, before, one), step.plain))
+    step.found = _tried_elsewhere(fitter, before, ranked(step.found), step.plain, tick)
+    for k in _once_more(step.found):
+        step.fit_once_more(k)
+    return tuple(_tried_from_nearer_theta(fitter, before, ranked(step.found), step.plain, tick))
+
+
+class _Step:
+    """The candidates of one step, and which of them were fitted from elsewhere."""
+
+    def __init__(self, *, fitter: Fitter, before: Fitted, plain: Array, tick: Progress) -> None:
+        self.fitter, self.before, self.plain, self.tick = fitter, before, plain, tick
+        self.found: list[Candidate] = []
+        self._again: set[str] = set()
+        self._most = fitter.case.pool.count + ENOUGH * len(fitter.case.problems)
+
+    @property
+    def spent(self) -> bool:
+        """Whether the step took its share of rollouts."""
+        return self.fitter.case.pool.count > self._most
+
+    @property
+    def leads_near(self) -> bool:
+        """Whether a candidate leads near an explanation."""
+        return any(worthwhile(self.before, c) and c.fitted.reduced_chi2 <= FAR_OFF for c in self.found)
+
+    def fit_once_more(self, k: int) -> None:
+        """Fit candidate k from elsewhere, if it was not yet and may do better."""
+        one = self.found[k]
+        if self.spent or one.name in self._again or not _may_do_better(self.before, one, _explained(self.found)):
+            return
+        self._again.add(one.name)
+        self.tick(f"fit with {one.name} once more", 0, 0)
+        again = _fit_from_afar(self.fitter, self.before, one)
+        if again is not None and again.score > one.fitted.score:
+            self.found[k] = _candidate(self.fitter, one.score, again, self.plain)
+
+
+def _worth_fitting(scores: Sequence[Score], most: int) -> tuple[list[Score], list[Score]]:
+    """Effects to fit in any case, the best first, and those to fit as long as none leads near an explanation."""
     ordered = sorted((s for s in scores if s.kept), key=lambda s: -s.gain)
     worth = [s for s in ordered if s.gain >= WORTH_A_FIT * ordered[0].gain][:most]
     taken = {s.kind for s in worth}
@@ -141,31 +192,7 @@ def confirm(
     worth += [s for s in ordered if s.in_order and s.kind not in taken]
     taken = {s.kind for s in worth}
     rest = [s for s in ordered if s.gain >= WORTH_A_TRY * ordered[0].gain and s.kind not in taken]
-    more = rest[: 2 * most - len(worth)]
-    plain = push_scores(before)
-    spent = fitter.case.pool.count + ENOUGH * len(fitter.case.problems)
-    found: list[Candidate] = []
-    for k, one in enumerate((*worth, *more)):
-        if k >= len(worth) and (_some_leads_near(before, found) or fitter.case.pool.count > spent):
-            break
-        if _explained([c for c in found if c.accepted]) and one.gain < RIVAL * ordered[0].gain:
-            break
-        tick(f"fit with {one.kind.name}", k, len(worth))
-        found.append(_candidate(fitter, one, _fit(fitter, before, one), plain))
-    found = _tried_elsewhere(fitter, before, ranked(found), plain, tick)
-    for k in _once_more(found):
-        candidate = found[k]
-        if fitter.case.pool.count > spent or not _may_do_better(before, candidate, _explained(found)):
-            continue
-        tick(f"fit with {candidate.name} once more", 0, 0)
-        again = _fit_from_afar(fitter, before, candidate)
-        if again is not None and again.score > candidate.fitted.score:
-            found[k] = _candidate(fitter, candidate.score, again, plain)
-    return tuple(_tried_from_nearer_theta(fitter, before, ranked(found), plain, tick))
-
-
-def _some_leads_near(before: Fitted, found: Sequence[Candidate]) -> bool:
-    return any(worthwhile(before, c) and c.fitted.reduced_chi2 <= FAR_OFF for c in found)
+    return worth, rest[: 2 * most - len(worth)]
 
 
 def _tried_elsewhere(
@@ -228,8 +255,14 @@ def _may_do_better(before: Fitted, candidate: Candidate, explained: bool) -> boo
 def _once_more(found: Sequence[Candidate]) -> list[int]:
     """Which candidates to fit again: the one that promised most, whatever came of it, and the best."""
     best = list(range(len(found)))[:PERSISTENT]
-    promised = max(range(len(found)), key=lambda k: found[k].score.gain, default=0)
-    return best if promised in best or not found else [promised, *best]
+    if not found:
+        return []
+    promised = _most_promising(found)
+    return best if promised in best else [promised, *best]
+
+
+def _most_promising(found: Sequence[Candidate]) -> int:
+    return max(range(len(found)), key=lambda k: found[k].score.gain)
 
 
 def worthwhile(before: Fitted, candidate: Candidate) -> bool:

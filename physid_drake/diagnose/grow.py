@@ -28,6 +28,7 @@ from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.left_out import comes_nearer
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.pairs import confirmed_pairs, steps_of
+from physid_drake.diagnose.plain import search_theta
 from physid_drake.diagnose.screen import Screening, Signature, screen, signatures, with_frictions
 from physid_drake.diagnose.starts import corners, of_other_shape, of_other_strength
 from physid_drake.effects import Effect
@@ -252,7 +253,23 @@ class Growth:
             # The pushes' unknowns may have been imitating what is missing: once more, without them at first.
             far = fitter.fit(of_other_strength(fitter, best), rounds=4, careful=1, renew=True)
             best = max((best, far), key=lambda model: model.score)
+        if best.reduced_chi2 > FAR_OFF:
+            best = self._from_another_theta(best)
         return self._of_other_shape(best, before)
+
+    def _from_another_theta(self, model: Fitted) -> Fitted:
+        """A model far from an explanation, fitted again from where theta is best beside its effects.
+
+        The plain cell's theta made up for what was missing, and a hand's friction of a third of the true one leaves
+        no step that leads back.
+        """
+        fitter, effects = self.fitter, model.state.effects
+        u = search_theta(fitter.case, self.rng, self.tick, effects=effects, near=model.state.u)
+        if np.array_equal(u, model.state.u):
+            return model
+        self.tick(f"model with {' and '.join(e.kind.name for e in effects)} from another theta", 0, 0)
+        again = fitter.fit(fitter.start(u, effects), rounds=7, careful=4, renew=True)
+        return max((model, again), key=lambda one: one.score)
 
     def _of_other_shape(self, model: Fitted, before: Fitted) -> Fitted:
         """A model fitted again from other shapes of its last effect, as long as none explains the pushes.

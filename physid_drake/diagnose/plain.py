@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from physid_drake.cell import CellConfig
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.confirm import FAR_OFF
 from physid_drake.diagnose.fit import Fitter
-from physid_drake.diagnose.model import Fitted, State
+from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.identify.misfit import difference
 from physid_drake.identify.problem import spec_of
 from physid_drake.identify.rollouts import RolloutPool
@@ -27,15 +28,30 @@ CAREFUL = 3  # rounds
 SOME_PUSHES = 6  # the search needs a start, not an answer
 
 
-def search_theta(case: Case, rng: np.random.Generator, tick: Progress) -> Array:
-    """A start (d,) in the unit cube, by greedy entropy search over a part of the pushes."""
+def search_theta(
+    case: Case,
+    rng: np.random.Generator,
+    tick: Progress,
+    *,
+    effects: Sequence[EffectPoint] = (),
+    near: Array | None = None,
+) -> Array:
+    """A start (d,) in the unit cube, by greedy entropy search over a part of the pushes.
+
+    Args:
+        case: the pushes.
+        rng: of the candidates and the search.
+        tick: told the trials.
+        effects: in the cell meanwhile, where they are.
+        near: (d,) a point of the unit cube, returned where nothing better is found.
+    """
     fitter, space = Fitter(case), case.thetas.space
     some = np.unique(np.linspace(0, len(case.problems) - 1, min(SOME_PUSHES, len(case.problems))).round().astype(int))
 
     def objective(thetas: Array) -> Array:
         errors = []
         for theta in thetas:
-            state = fitter.start(np.asarray(space.to_unit(theta)))
+            state = fitter.start(np.asarray(space.to_unit(theta)), tuple(effects))
             vectors = fitter.vectors([fitter.task(state, int(i)) for i in some])
             squares = [np.mean((v - case.features[i].recorded) ** 2) for v, i in zip(vectors, some, strict=True)]
             errors.append(0.5 * np.log(np.mean(squares)))
@@ -44,10 +60,14 @@ def search_theta(case: Case, rng: np.random.Generator, tick: Progress) -> Array:
     candidates = space.sample(rng, CANDIDATES, from_prior=True)
     # Where people would start by hand is a candidate too.
     candidates[0] = space.nominal
+    beside = " and ".join(e.kind.name for e in effects)
+    stage = f"greedy entropy search beside {beside}" if effects else "greedy entropy search"
     found = search_minimum(
         objective, space, candidates, GreedyEntropySearch(), budget=BUDGET, rng=rng,
-        on_trial=lambda belief: tick("greedy entropy search", belief.n_trials, BUDGET),
+        on_trial=lambda belief: tick(stage, belief.n_trials, BUDGET),
     )  # fmt: skip
+    if near is not None and objective(np.asarray(space.from_unit(near))[None])[0] <= found.error_best:
+        return near
     return np.asarray(space.to_unit(found.theta_best))
 
 

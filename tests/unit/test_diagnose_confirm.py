@@ -210,6 +210,31 @@ def test_a_fit_is_tried_again_where_that_may_find_more(effects, before, after, p
     assert confirm._may_do_better(start, one, explained) == again
 
 
+@pytest.mark.parametrize(("again", "tried"), [(1.0, []), (15.0, ["tracker_latency", "sloshing"])])
+def test_what_promised_much_is_tried_again_before_what_promises_little(monkeypatch, again, tried):
+    kept = {"kept": (0,), "log_p": -5.0, "in_order": False}
+    promised = {"tracker_bias": 1000.0, "tracker_latency": 200.0, "sloshing": 150.0}
+    scores = [SimpleNamespace(gain=gain, kind=effect_named(name), **kept) for name, gain in promised.items()]
+    made = []
+
+    def fitted(name, left):
+        made.append(name)
+        return SimpleNamespace(reduced_chi2=left, score=-100.0 * left)
+
+    def judged(fitter, one, fitted, plain):
+        return Candidate(score=one, fitted=fitted, gains=np.full(8, 9.0), degenerate=False)
+
+    monkeypatch.setattr(confirm, "push_scores", lambda one: np.zeros(8))
+    monkeypatch.setattr(confirm, "_fit", lambda fitter, before, one: fitted(one.kind.name, 15.0))
+    monkeypatch.setattr(confirm, "_fit_from_afar", lambda fitter, before, one: fitted(f"{one.name} again", again))
+    monkeypatch.setattr(confirm, "_candidate", judged)
+    monkeypatch.setattr(confirm, "_once_more", lambda found: [])
+    fitter = SimpleNamespace(case=SimpleNamespace(pool=SimpleNamespace(count=0), problems=range(8)))
+    before = SimpleNamespace(reduced_chi2=20.0, score=-2000.0, state=SimpleNamespace(effects=()))
+    confirm.confirm(fitter, before, scores, lambda *said: None, most=4)
+    assert made == ["tracker_bias", "tracker_bias again", *tried]
+
+
 @pytest.mark.parametrize(("seen", "fits"), [(-500.0, 0), (-90.0, 1)])
 def test_no_fit_begins_where_all_of_a_scan_is_worse_than_no_effect(monkeypatch, seen, fits):
     made = []

@@ -277,3 +277,39 @@ def test_far_from_an_explanation_the_next_effect_must_promise_much(left, promise
     scores = (SimpleNamespace(gain=promised), SimpleNamespace(gain=5.0))
     looked = grow.Looked(fitted=model, signatures=(), screening=SimpleNamespace(scores=scores))
     assert looked.leads_on == leads
+
+
+class Thetas:
+    """Fits that end at the theta from which they start, with the score that it has."""
+
+    case = None
+
+    def __init__(self, scores):
+        self.scores, self.fits = scores, 0
+
+    def start(self, u, effects):
+        return SimpleNamespace(u=u, effects=effects)
+
+    def fit(self, state, **how):
+        self.fits += 1
+        return self.at(state)
+
+    def at(self, state):
+        return SimpleNamespace(state=state, score=self.scores[float(state.u[0])])
+
+
+@pytest.mark.parametrize(("searched", "end", "fits"), [(0.8, 0.8, 1), (0.3, 0.2, 1), (0.2, 0.2, 0)])
+def test_a_model_that_is_far_off_goes_to_a_better_theta_beside_its_effects(monkeypatch, searched, end, fits):
+    beside = []
+
+    def search_theta(case, rng, tick, *, effects, near):
+        beside.append(effects)
+        return near if searched == near[0] else np.array([searched])
+
+    monkeypatch.setattr(grow, "search_theta", search_theta)
+    thetas = Thetas({0.2: -900.0, 0.3: -950.0, 0.8: -60.0})
+    effects = (SimpleNamespace(kind=SimpleNamespace(name="tracker_bias")),)
+    model = thetas.at(thetas.start(np.array([0.2]), effects))
+    found = growth(thetas)._from_another_theta(model)
+    assert (found.state.u[0], thetas.fits) == (end, fits)
+    assert beside == [effects] and found.state.effects == effects
