@@ -10,15 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.case import UNIT_SCATTER, Case
-from physid_drake.diagnose.confirm import (
+from physid_drake.diagnose.candidate import (
     EXPLAINED,
     Candidate,
     out_of_question,
     push_scores,
     rivals,
+    spread,
     standard_error,
+    surely_better,
 )
+from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.estimates import parameters_of, smallest, theta_of
 from physid_drake.diagnose.evidence import (
     MOST_OF_UNKNOWN,
@@ -51,7 +53,6 @@ Array = NDArray[np.float64]
 
 ALIKE = 0.95  # cosine of two projected signatures that these pushes cannot tell apart
 SURELY = 3.0  # standard errors of a difference of gains: signatures that are alike need more than others
-SCORE_ERROR = 2.0  # nats: of a difference of gains, beside its standard error
 CHANCE = 0.05  # of all looks: what explains no more is not worth a word
 FEWEST_PUSHES = 3
 GOOD_PART = 0.25  # of the squared error: less is not worth a word
@@ -185,14 +186,10 @@ def class_of(plain: Fitted, step: Sequence[Candidate]) -> tuple[str, ...]:
     best = step[0]
     close = {c.name for c in rivals(best, step)}
     for other in step[1:]:
-        if (
-            other.accepted
-            and not out_of_question(best, other)
-            and abs(cosine(plain, best.score, other.score)) > ALIKE
-        ):
-            difference = best.gains - other.gains
-            if difference.sum() < SURELY * standard_error(difference):
-                close.add(other.name)
+        if not other.accepted or out_of_question(best, other) or surely_better(best, other, SURELY):
+            continue
+        if abs(cosine(plain, best.score, other.score)) > ALIKE:
+            close.add(other.name)
     return tuple(sorted(close))
 
 
@@ -214,12 +211,10 @@ def _probability(step: Sequence[Candidate], others: set[str]) -> float:
         if other.name in others or out_of_question(best, other):
             continue
         difference = best.gains - other.gains
-        # Some error of the scores themselves, so that few pushes do not make sure.
-        spread = math.hypot(standard_error(difference), SCORE_ERROR)
         deficit = float(difference.sum())
         if other.coordinates > best.coordinates:  # a little better for being more complicated is not likelier
             deficit = max(0.0, deficit)
-        worse = float(stats.norm.sf(deficit / spread))
+        worse = float(stats.norm.sf(deficit / spread(difference)))
         total += worse / max(1.0 - worse, 1e-9)
     return 1.0 / total
 

@@ -7,13 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
+from physid_drake.diagnose.candidate import EXPLAINED, FAR_OFF, Candidate, push_scores, ranked
 from physid_drake.diagnose.fit import Fitter
-from physid_drake.diagnose.linear import left_out_scores
 from physid_drake.diagnose.model import EffectPoint, Fitted
 from physid_drake.diagnose.screen import Score
-from physid_drake.diagnose.starts import elsewhere, scanned_start, start_of
+from physid_drake.diagnose.starts import elsewhere, in_place, scanned_start, start_of
 from physid_drake.progress import Progress
 
 Array = NDArray[np.float64]
@@ -22,103 +21,14 @@ WORTH_A_FIT = 0.35  # of the best score test's gain
 RIVAL = 0.5  # where one explains the pushes already
 WORTH_A_TRY = 0.1  # where none takes a good part of the mismatch away
 ENOUGH = 120  # rollouts per push in one step after which no further effect is tried, nor another shape of one
-SURE = 2.0  # standard errors
-LEAST = 4.0  # nats of held-out gain
-CERTAIN = 40.0  # nats of held-out gain, the best push not counted
-UNLIKELY = 0.05  # of the signed-rank test of held-out gains
-BOUND = 10.0  # nats: no push counts more, for or against
-CLOSE = 1.5  # nats: gains that differ by less tell no rivals apart, however sure
 STUCK = 1.6  # cost per degree of freedom after which a fit is tried again from elsewhere
 NEAR = 0.5  # of the cost beyond noise: an effect that leaves more is not near another place or shape
 HOP = 3  # steps of a fit from another place or shape: an effect that belongs there shows by then
 ANOTHER_BASIN = 10.0  # nats by which a fit must be better to be another one
 FELL_SHORT = 0.8  # of the gain that the score test promised: such a fit is tried again too
 PERSISTENT = 2  # candidates that are worth that, where none explains the pushes
-EXPLAINED = 1.5  # cost per degree of freedom above which something is still missing
 LEAST_SHARE = 0.25  # of the cost beyond noise that an effect must take away unless nothing is left
-A_COORDINATE = 2.0  # nats of held-out gain that one more coordinate must be worth
-A_LAW = 0.01  # of the gain: two honest implementations of one effect differ by more
-FAR_OFF = 3.0  # cost per degree of freedom from which the pushes' unknowns would imitate what is missing
 FAR = 0.3  # of theta's unit cube
-
-
-@dc.dataclass(frozen=True, kw_only=True)
-class Candidate:
-    """One effect in the model, fitted.
-
-    Attributes:
-        score: its score test.
-        fitted: the model with it.
-        gains: (n,) log predictive density of each push, left out, over that without the effect.
-        degenerate: whether an amplitude ran to its null, so that it is another effect or none.
-        coordinates: how many numbers of the effect were fitted.
-    """
-
-    score: Score
-    fitted: Fitted
-    gains: Array
-    degenerate: bool
-    coordinates: int = 1
-
-    @property
-    def name(self) -> str:
-        """The effect's."""
-        return self.score.kind.name
-
-    @property
-    def gain(self) -> float:
-        """Total."""
-        return float(self.gains.sum())
-
-    @property
-    def standard_error(self) -> float:
-        """Of the total."""
-        return standard_error(self.gains)
-
-    @property
-    def accepted(self) -> bool:
-        """Whether held-out pushes confirm the effect.
-
-        Either most of them do, or, for what only a few pushes feel (a patch, a magnet), more than one does far beyond
-        what the simulator's own error explains. Pushes differ in what they feel of an effect, so that the sum of
-        their gains is as unsure as the largest of them; gains are bounded before they are compared with their spread.
-
-        Or their frictions follow what the effect does to them beyond chance. Whole pushes' frictions differ anyway:
-        an effect that orders them makes the first and last pushes likelier by far and those between hardly, so that
-        gains spread as widely as they are large.
-        """
-        if self.degenerate or self.gain < LEAST:
-            return False
-        if self.score.in_order:
-            return True
-        bounded = np.clip(self.gains, -BOUND, BOUND)
-        some = np.sort(self.gains)[:-1]
-        local = some.sum() > CERTAIN and (self.gains > CERTAIN / 4.0).sum() >= 2
-        return bool((bounded.sum() > SURE * standard_error(bounded) and self._most_gain()) or local)
-
-    def _most_gain(self) -> bool:
-        """Whether gains outweigh losses in number and size; one large gain does not make an effect."""
-        return len(self.gains) < 5 or float(stats.wilcoxon(self.gains, alternative="greater").pvalue) < UNLIKELY
-
-
-def standard_error(values: Array) -> float:
-    """Of the sum of values (n,) over pushes; infinite for one push."""
-    return float(np.std(values, ddof=1) * np.sqrt(len(values))) if len(values) > 1 else np.inf
-
-
-def push_scores(fitted: Fitted, folds: Sequence[Sequence[int]] | None = None) -> Array:
-    """Log predictive density (n,) of each push, fitted without it; each bears its part of the tolerances' use.
-
-    Args:
-        fitted: the model.
-        folds: indices of pushes that are left out together; None leaves out one at a time.
-
-    A model may claim that all pushes share an error of the simulator or of a caliper. The others then predict the
-    push that is left out with that very error, at no cost: a centre of mass off by ten tolerances would be predicted
-    as well as by the effect.
-    """
-    scores, _ = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std, folds)
-    return scores - fitted.tolerance_cost / len(scores)
 
 
 def confirm(
@@ -149,7 +59,8 @@ def confirm(
     step.found = _tried_elsewhere(fitter, before, ranked(step.found), step.plain, tick)
     for k in _once_more(step.found):
         step.fit_once_more(k)
-    return tuple(_tried_from_nearer_theta(fitter, before, ranked(step.found), step.plain, tick))
+    step.found = _tried_from_nearer_theta(fitter, before, ranked(step.found), step.plain, tick)
+    return tuple(_tried_in_its_place(fitter, before, step.found, scores, step.plain, tick))
 
 
 class _Step:
@@ -240,6 +151,28 @@ def _tried_from_nearer_theta(
     return ranked(tried)
 
 
+def _tried_in_its_place(
+    fitter: Fitter, before: Fitted, found: Sequence[Candidate], scores: Sequence[Score], plain: Array, tick: Progress
+) -> list[Candidate]:
+    """The candidates; where the best has a place, what else may act there is fitted from there.
+
+    A weak attraction to a place slows and speeds an object about it as a patch does.
+    """
+    tried = {c.name: c for c in found}
+    best = found[0] if found and found[0].accepted else None
+    place = None if best is None else best.fitted.state.effects[-1].effect(fitter.case).place
+    if best is None or place is None:
+        return list(found)
+    for one in in_place(fitter, before, [s.kind for s in scores if s.kind is not best.score.kind], place):
+        if one.gain < RIVAL * best.score.gain:
+            continue
+        tick(f"fit with {one.kind.name} in the same place", 0, 0)
+        there = _fit(fitter, before, one)
+        if one.kind.name not in tried or there.score > tried[one.kind.name].fitted.score:
+            tried[one.kind.name] = _candidate(fitter, one, there, plain)
+    return ranked(list(tried.values()))
+
+
 def _may_do_better(before: Fitted, candidate: Candidate, explained: bool) -> bool:
     """Whether a fit from elsewhere may find more.
 
@@ -270,28 +203,6 @@ def worthwhile(before: Fitted, candidate: Candidate) -> bool:
     after = candidate.fitted.reduced_chi2
     enough = after <= EXPLAINED or after - 1.0 <= (1.0 - LEAST_SHARE) * (before.reduced_chi2 - 1.0)
     return candidate.accepted and enough
-
-
-def rejudged(candidates: Sequence[Candidate], plain: Fitted) -> tuple[Candidate, ...]:
-    """The candidates with their gains over another model."""
-    before = push_scores(plain)
-    return tuple(ranked([dc.replace(c, gains=push_scores(c.fitted) - before) for c in candidates]))
-
-
-def ranked(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Best held-out gain first; before it the simplest that does as well: a far-off spring is a tilted table."""
-    ordered = sorted(candidates, key=lambda c: (c.degenerate, -c.gain))
-    if not ordered:
-        return []
-    best = ordered[0]
-    as_good = [c for c in ordered if c is best or (c.accepted and _does_as_well(c, best))]
-    first = min(as_good, key=lambda c: c.coordinates)
-    return [first, *(c for c in ordered if c is not first)]
-
-
-def _does_as_well(simple: Candidate, best: Candidate) -> bool:
-    spared = best.coordinates - simple.coordinates
-    return spared > 0 and best.gain - simple.gain < A_COORDINATE * spared + A_LAW * best.gain
 
 
 def _explained(candidates: Sequence[Candidate]) -> bool:
@@ -358,25 +269,3 @@ def _degenerate(fitter: Fitter, one: Score, point: EffectPoint) -> bool:
         one_sided and point.point[j] <= chart[j].lower + 1e-3 * chart[j].step
         for j, one_sided in zip(free, one.signature.one_sided, strict=True)
     )
-
-
-def out_of_question(best: Candidate, other: Candidate) -> bool:
-    """Whether a candidate ran to nothing, or leaves pushes far from explained that the best one explains.
-
-    One push in which an effect shows a hundredfold makes the difference of two gains unsure, and yet tells them
-    apart.
-    """
-    explains = best.fitted.reduced_chi2 <= EXPLAINED
-    return other.degenerate or (explains and other.fitted.reduced_chi2 > FAR_OFF)
-
-
-def rivals(best: Candidate, others: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """Accepted candidates whose held-out gain is not surely below the best one's."""
-    close = []
-    for other in others:
-        if other is best or not other.accepted or out_of_question(best, other):
-            continue
-        difference = best.gains - other.gains
-        if difference.sum() < max(SURE * standard_error(difference), CLOSE):
-            close.append(other)
-    return tuple(close)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from physid_drake.diagnose.candidate import Candidate
 from physid_drake.diagnose.case import UNIT_SCATTER, Case
-from physid_drake.diagnose.confirm import Candidate
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.linear import LinearPush, Whitened, solve
 from physid_drake.diagnose.localise import MissingWrench
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 SLACK = 1.15
 # What a model with effects may leave, as cost per degree of freedom above 1:
 NOISE_LIKE = 0.2  # always, as the cell leaves where nothing is missing
-MOST_SHARE = 0.25  # of what the plain cell leaves: an effect that leaves more explains something else
+MOST_SHARE = 0.16  # of what the plain cell leaves: an effect that leaves more explains something else
 MOST_LEFT = 0.5  # beside what two laws of one effect differ by
 EVER_LEFT = 2.0  # in all
 LAW_ERROR = 0.1  # of an effect's motion: two honest implementations of a spring or a liquid differ by that much

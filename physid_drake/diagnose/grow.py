@@ -7,22 +7,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from physid_drake.diagnose.candidate import A_LAW, EXPLAINED, FAR_OFF, Candidate, push_scores, ranked, rejudged
 from physid_drake.diagnose.conclude import class_of
-from physid_drake.diagnose.confirm import (
-    A_LAW,
-    ANOTHER_BASIN,
-    ENOUGH,
-    EXPLAINED,
-    FAR_OFF,
-    HOP,
-    Candidate,
-    confirm,
-    push_scores,
-    ranked,
-    rejudged,
-    takes_most,
-    worthwhile,
-)
+from physid_drake.diagnose.confirm import ANOTHER_BASIN, ENOUGH, HOP, confirm, takes_most, worthwhile
 from physid_drake.diagnose.evidence import mismatch, unexplained
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.left_out import comes_nearer

@@ -214,7 +214,10 @@ def _explained(
     """Gains (minus logs of a chi-square's p) and coefficients of looks, and (f,) the best gain of flipped pushes."""
     pushes = tuple(_sobered(push, len(plain.state.u)) for push in plain.pushes)
     # What differs from push to push may be what is missing, and not friction that scatters.
-    bare = dc.replace(plain, pushes=pushes, state=dc.replace(plain.state, scatter=min(plain.state.scatter, 1.0)))
+    bare = dc.replace(
+        plain, pushes=pushes, state=dc.replace(plain.state, scatter=min(plain.state.scatter, 1.0)),
+        prior_std=np.full(len(plain.state.u), np.inf),
+    )  # fmt: skip
     basis, blocks = projected(bare, [_signature(plain, wrenches, look.weights) for look in looks])
     white = Whitened.of(bare.pushes, bare.state.scatter)
     edges = np.cumsum([len(r) for r in white.residuals])[:-1]

@@ -13,7 +13,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.confirm import A_COORDINATE, A_LAW, Candidate, candidate_of, push_scores
+from physid_drake.diagnose.candidate import A_COORDINATE, A_LAW, Candidate, push_scores
+from physid_drake.diagnose.confirm import candidate_of
 from physid_drake.diagnose.evidence import unexplained
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.linear import Whitened, best_scatter, solve

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import CellConfig
+from physid_drake.diagnose.candidate import FAR_OFF
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.confirm import FAR_OFF
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.identify.misfit import difference

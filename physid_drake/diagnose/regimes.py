@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from physid_drake.diagnose.candidate import push_scores, standard_error
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.confirm import push_scores, standard_error
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import RegimeGain
 

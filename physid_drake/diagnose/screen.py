@@ -120,12 +120,16 @@ def signatures(
         kinds: the effects.
         tick: told how many rollouts are done, and of how many.
     """
+    return filled(fitter, fitted, empty_signatures(fitter, kinds), tick)
+
+
+def filled(fitter: Fitter, fitted: Fitted, blank: Sequence[Signature], tick: Tick | None = None) -> list[Signature]:
+    """Signatures that have no columns yet, with them."""
     case, state = fitter.case, fitted.state
     base = fitter.vectors([fitter.task(state, i) for i in range(len(case.problems))])
     present = [e.effect(case) for e in state.effects]
     plan: list[tuple[int, int, int]] = []  # signature, push, direction
     tasks: list[Task] = []
-    blank = empty_signatures(fitter, kinds)
     for s, (kind, family) in enumerate((b.kind, b.family) for b in blank):
         chart = kind.chart(case.around)
         for i in range(len(case.problems)):
@@ -220,10 +224,11 @@ def _gain_at(log_p: float, directions: int, pushes: int, spent: int) -> float:
 
 def empty_signatures(fitter: Fitter, kinds: Sequence[type[Effect]]) -> list[Signature]:
     """All families of the effects, their columns still to be found."""
-    return [_empty_signature(fitter, kind, family) for kind in kinds for family in kind.families(fitter.case.around)]
+    return [empty_signature(fitter, kind, family) for kind in kinds for family in kind.families(fitter.case.around)]
 
 
-def _empty_signature(fitter: Fitter, kind: type[Effect], family: Family) -> Signature:
+def empty_signature(fitter: Fitter, kind: type[Effect], family: Family) -> Signature:
+    """One family of an effect, its columns still to be found."""
     chart = kind.chart(fitter.case.around)
     return Signature(
         kind=kind,
@@ -347,18 +352,26 @@ def _null_draws(fitted: Fitted, found: Sequence[Signature], rng: np.random.Gener
 
 
 def projected(fitted: Fitted, columns: Sequence[Sequence[Array]]) -> tuple[Array, list[Array]]:
-    """Whitened signatures without what theta and the pushes' unknowns imitate.
+    """Whitened signatures without what theta, tolerances and the pushes' unknowns imitate.
+
+    What has a prior imitates no more than that allows: it is an observation of its own, a row for each (f of them). A
+    tolerance that were taken away whole would take the effect with it that it is a little of.
 
     Args:
         fitted: the model.
         columns: per signature, per push (m, p).
 
     Returns:
-        An orthonormal basis (M, d) of theta's directions, and per signature (M, p).
+        An orthonormal basis (M + f, d) of the shared directions, and per signature (M + f, p).
     """
     count = fitted.pushes[0].shared.shape[1]
     stacked = [np.column_stack([c[i] for c in columns]) for i in range(len(fitted.pushes))]
     x = Whitened.of(extended(fitted.pushes, stacked), fitted.state.scatter).x
+    known = np.flatnonzero(np.isfinite(fitted.prior_std))
+    if len(known):
+        priors = np.zeros((len(known), x.shape[1]))
+        priors[np.arange(len(known)), known] = 1.0 / fitted.prior_std[known]
+        x = np.vstack([x, priors])
     theta, _ = np.linalg.qr(x[:, :count])
     rest = x[:, count:] - theta @ (theta.T @ x[:, count:])
     edges = np.cumsum([c[0].shape[1] for c in columns])[:-1]

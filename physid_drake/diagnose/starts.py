@@ -7,6 +7,7 @@ place, from which a fit does not find out; a few rollouts of strong versions tel
 from __future__ import annotations
 
 import dataclasses as dc
+from collections.abc import Sequence
 from itertools import product, zip_longest
 
 import numpy as np
@@ -15,7 +16,8 @@ from numpy.typing import NDArray
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
-from physid_drake.diagnose.screen import Score
+from physid_drake.diagnose.screen import Score, empty_signature, filled, score
+from physid_drake.effects import Effect
 
 Array = NDArray[np.float64]
 
@@ -67,6 +69,23 @@ def elsewhere(case: Case, one: Score) -> list[Score]:
             turns[alike].append(other)
     mixed = zip_longest(turns[False], turns[True])
     return [s for pair in mixed for s in pair if s is not None][:ELSEWHERE]
+
+
+def in_place(
+    fitter: Fitter, before: Fitted, kinds: Sequence[type[Effect]], place: tuple[float, float]
+) -> list[Score]:
+    """Score tests at one place [m] of the effects that have a place, the best size of each; one rollout per size.
+
+    Grids of places are too wide to tell what acts there.
+    """
+    around = fitter.case.around
+    found = []
+    for kind in kinds:
+        blank = [empty_signature(fitter, kind, family) for family in kind.families_at(place, around)]
+        tested = [one for one in (score(before, s) for s in filled(fitter, before, blank)) if one.kept]
+        if tested:
+            found.append(max(tested, key=lambda one: one.gain))
+    return found
 
 
 def _place(case: Case, one: Score) -> tuple[float, ...]:

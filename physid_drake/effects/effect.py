@@ -212,6 +212,17 @@ class Effect:
         count = len(cls.chart(around))
         return (Family(point=(0.0,) * count, free=tuple(range(count))),)
 
+    @property
+    def place(self) -> tuple[float, float] | None:
+        """The place on the table about which it acts [m], for an effect that has one."""
+        return None
+
+    @classmethod
+    def families_at(cls, place: tuple[float, float], around: Surroundings) -> tuple[Family, ...]:
+        """Families of several sizes at a place [m], for an effect that has one; none for others."""
+        del place, around
+        return ()
+
     @classmethod
     def leading(cls, around: Surroundings) -> tuple[int, ...]:
         """Indices of the coordinates that a first fit moves; the others follow once the effect is accepted."""

@@ -18,6 +18,7 @@ from physid_drake.effects.places import grid_of_places
 Array = NDArray[np.float64]
 WEAKEST = 1e-9  # N/m: a spring weaker than this has no anchor
 SHORT = 0.1  # m: of a cable beside a table, at least as likely
+CORES = (0.015, 0.03, 0.06)  # m, of a magnet
 PULL = 20.0  # times what friction holds: a stiff cable that is slack nearly everywhere
 
 
@@ -163,12 +164,27 @@ class Magnet(Effect):
     def families(cls, around: Surroundings) -> tuple[Family, ...]:
         """A grid of places."""
         places, _ = grid_of_places(around)
-        return tuple(Family(point=(0.0, float(x), float(y), math.log(0.03)), free=(0,)) for x, y in places)
+        return tuple(_magnet_family((x, y), CORES[1]) for x, y in places.tolist())
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """What it attracts to."""
+        return self.x, self.y
+
+    @classmethod
+    def families_at(cls, place: tuple[float, float], around: Surroundings) -> tuple[Family, ...]:
+        """Of several cores."""
+        del around
+        return tuple(_magnet_family(place, core) for core in CORES)
 
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
         """The attraction."""
         del facts
         return (_MagnetLaw(self.strength, self.x, self.y, self.core),)
+
+
+def _magnet_family(place: tuple[float, float], core: float) -> Family:
+    return Family(point=(0.0, *place, math.log(core)), free=(0,))
 
 
 @dc.dataclass(frozen=True)

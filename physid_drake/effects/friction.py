@@ -190,9 +190,24 @@ class FrictionPatch(Effect):
         """
         places, spacing = close_grid_of_places(around)
         radius = BASE * spacing
-        simulated = tuple(_patch_family(place, radius) for place in places)
-        wide = (_patch_family(p, w * radius, _shares(places, p, w, radius, spacing)) for w in WIDE for p in places)
+        simulated = tuple(_patch_family((x, y), radius) for x, y in places.tolist())
+        wide = (
+            _patch_family((x, y), w * radius, _shares(places, np.array((x, y)), w, radius, spacing))
+            for w in WIDE
+            for x, y in places.tolist()
+        )
         return (*simulated, *wide)
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """The middle."""
+        return self.x, self.y
+
+    @classmethod
+    def families_at(cls, place: tuple[float, float], around: Surroundings) -> tuple[Family, ...]:
+        """Of several radii."""
+        _, spacing = close_grid_of_places(around)
+        return tuple(_patch_family(place, size * BASE * spacing) for size in (0.5, 1.0, WIDE[0]))
 
     def reaches(self, places: Array, around: Surroundings) -> bool:
         """Whether a corner of the object may have been on the patch, which a fit may still make a little larger."""
@@ -205,9 +220,8 @@ class FrictionPatch(Effect):
         return (_PatchLaw(self.ratio, self.x, self.y, self.radius),)
 
 
-def _patch_family(place: Array, radius: float, shares: tuple[float, ...] = ()) -> Family:
-    x, y = place.tolist()
-    return Family(point=(0.0, x, y, math.log(radius)), free=(0,), shares=shares)
+def _patch_family(place: tuple[float, float], radius: float, shares: tuple[float, ...] = ()) -> Family:
+    return Family(point=(0.0, *place, math.log(radius)), free=(0,), shares=shares)
 
 
 def _shares(places: Array, place: Array, wide: float, radius: float, spacing: float) -> tuple[float, ...]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from physid_drake.diagnose import conclude
-from physid_drake.diagnose.confirm import Candidate
+from physid_drake.diagnose.candidate import Candidate
 from physid_drake.identify.misfit import FAILED
 
 PUSHES, WINDOWS = 6, 5

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from physid_drake.diagnose import grow
-from physid_drake.diagnose.confirm import ENOUGH, Candidate
+from physid_drake.diagnose.candidate import Candidate
+from physid_drake.diagnose.confirm import ENOUGH
 from physid_drake.diagnose.evidence import unexplained
 from physid_drake.diagnose.model import State
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from physid_drake.diagnose import pairs
-from physid_drake.diagnose.confirm import Candidate
+from physid_drake.diagnose.candidate import Candidate
 
 PUSHES = 8
 TETHER, TILT, SLOSHING, DRAG = (SimpleNamespace(name=name) for name in ("tether", "table_tilt", "sloshing", "drag"))

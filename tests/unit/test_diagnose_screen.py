@@ -1,5 +1,6 @@
 """Score tests in linear algebra: pairs of effects, and frictions that follow the order of the pushes."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy import stats
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve
 from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.pairs import promising
-from physid_drake.diagnose.screen import Signature, by_trend, log_probability, score
+from physid_drake.diagnose.screen import Signature, by_trend, cosine, log_probability, projected, score
 from physid_drake.effects import Family
 
 PUSHES, NUMBERS = 12, 20
@@ -70,6 +71,28 @@ def test_a_pair_of_which_one_acts_the_other_way_round_is_none(columns):
     wrong = signature_of("two", columns["two"], one_sided=True)
     kept = SimpleNamespace(kind=wrong.kind, signature=wrong, kept=(0,), gain=1.0, coefficients=np.zeros(1))
     assert promising(fitted, [one, kept]) == []
+
+
+def with_tolerance(fitted, columns, std):
+    """The model, its pushes sharing an error that looks like ``columns``."""
+    pushes = tuple(
+        replace(push, shared=np.column_stack([push.shared, c]))
+        for push, c in zip(fitted.pushes, columns, strict=True)
+    )
+    return replace(fitted, pushes=pushes, prior_mean=np.zeros(2), prior_std=np.array([1.0, std]))
+
+
+@pytest.mark.parametrize(("std", "left"), [(0.01, 1.0), (np.inf, 0.0)])
+def test_a_tolerance_imitates_an_effect_no_further_than_it_goes(columns, std, left):
+    """A lag was told from a latency, of which 0.2 ms are a tolerance that was taken away whole: cosine 0.04."""
+    fitted = with_tolerance(fitted_to(columns["noise"], np.zeros((PUSHES, NUMBERS))), columns["one"], std)
+    bare = fitted_to(columns["noise"], np.zeros((PUSHES, NUMBERS)))
+    _, (whole,) = projected(bare, [[c[:, None] for c in columns["one"]]])
+    _, (rest,) = projected(fitted, [[c[:, None] for c in columns["one"]]])
+    assert np.linalg.norm(rest) == pytest.approx(left * np.linalg.norm(whole), rel=0.02, abs=1e-9)
+    alike = columns["one"] + 0.2 * columns["two"]
+    one, other = (score(bare, signature_of(name, c)) for name, c in (("one", columns["one"]), ("other", alike)))
+    assert (cosine(fitted, one, other) > 0.95) == (left > 0.5)
 
 
 ORDER = np.arange(PUSHES)
