@@ -32,6 +32,7 @@ from physid_drake.diagnose.evidence import (
     scatter_p_value,
     unexplained,
 )
+from physid_drake.diagnose.foils import Foil
 from physid_drake.diagnose.frictions import friction_trend
 from physid_drake.diagnose.left_out import comes_nearer, errors_of, shown_by_several
 from physid_drake.diagnose.looks import locate
@@ -74,7 +75,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
     return Diagnosis(
         recording=case.recording.name,
         verdict=verdict,
-        sentence=_sentence(verdict, findings, partly),
+        sentence=_sentence(verdict, findings, partly, evidence.foil),
         p_value=p_value,
         alpha=alpha,
         effects=findings,
@@ -164,7 +165,7 @@ def _by_several(evidence: Evidence) -> bool:
 
 def _explained(evidence: Evidence) -> bool:
     """Whether the last model accounts for the pushes."""
-    if not _predicts(evidence) or not _by_several(evidence):
+    if evidence.foil is not None or not _predicts(evidence) or not _by_several(evidence):
         return False
     if evidence.case.noise.known:
         return not unexplained(evidence.plain, evidence.final)
@@ -239,7 +240,7 @@ def _findings(evidence: Evidence) -> tuple[EffectFinding, ...]:
 def _partly(evidence: Evidence) -> Partly | None:
     """The effects that were added, or the best one that left-out pushes confirm, if they take a good part away."""
     found = confirmed(evidence.steps, evidence.rejected, evidence.final)
-    if found is None:
+    if found is None or evidence.foil is not None:
         return None
     names, model = found
     before, after = (errors_of(evidence.case, e) for e in (evidence.errors_before, evidence.errors_after))
@@ -310,6 +311,8 @@ def _why_fitted_in_vain(candidate: Candidate, named: set[str], evidence: Evidenc
 
 
 def _why_not_named(evidence: Evidence) -> str:
+    if evidence.foil is not None:
+        return "a law that the catalogue does not have predicts pushes that were left out better"
     if not _predicts(evidence):
         return "pushes that were left out are simulated hardly better with it"
     if not _by_several(evidence):
@@ -328,6 +331,9 @@ def _why_not_fitted(name: str, evidence: Evidence) -> str:
 def _left(evidence: Evidence, verdict: str, after: Fitted, partly: Partly | None) -> str:
     if _is_own_error(evidence):
         return "no more than what two simulators differ by"
+    if verdict == "unexplained" and evidence.foil is not None:
+        foil = evidence.foil
+        return f"what {foil.instead_of} stands in for: that {foil.statement} makes left-out pushes likelier"
     named = verdict in ("explained", "ambiguous")
     hidden = verdict == "unexplained" or (named and scatter_p_value(after) < TOO_SCATTERED)
     if after.reduced_chi2 <= EXPLAINED and hidden:
@@ -359,7 +365,7 @@ def _percent(share: float) -> str:
     return "more than 99 %" if share > 0.99 else f"{100.0 * share:.0f} %"
 
 
-def _sentence(verdict: str, findings: Sequence[EffectFinding], partly: Partly | None) -> str:
+def _sentence(verdict: str, findings: Sequence[EffectFinding], partly: Partly | None, foil: Foil | None) -> str:
     match verdict:
         case "consistent":
             return "The plain cell explains these pushes: nothing is missing that they could show."
@@ -369,6 +375,11 @@ def _sentence(verdict: str, findings: Sequence[EffectFinding], partly: Partly | 
             return (
                 "Simulation and recording differ, and nothing in the catalogue accounts for all of it:"
                 f" {' and '.join(partly.effects)} would take {_percent(partly.share)} of the squared error away."
+            )
+        case "unexplained" if foil is not None:
+            return (
+                "Simulation and recording differ, and nothing in the catalogue accounts for it: that"
+                f" {foil.statement} would explain more than {foil.instead_of}."
             )
         case "unexplained":
             return "Simulation and recording differ, and nothing in the catalogue accounts for it."

@@ -89,7 +89,7 @@ class _Step:
             return
         self._again.add(one.name)
         self.tick(f"fit with {one.name} once more", 0, 0)
-        again = _fit_from_afar(self.fitter, self.before, one)
+        again = _fit_from_afar(self.fitter, self.before, one.score)
         if again is not None and again.score > one.fitted.score:
             self.found[k] = _candidate(self.fitter, one.score, again, self.plain)
 
@@ -221,6 +221,15 @@ def candidate_of(fitter: Fitter, one: Score, fitted: Fitted, point: EffectPoint,
     )  # fmt: skip
 
 
+def fit_with(fitter: Fitter, before: Fitted, one: Score) -> Fitted:
+    """The model with an effect; from the best of a scan, too, where it falls short of its promise."""
+    first = _fit(fitter, before, one)
+    if first.score - before.score >= FELL_SHORT * 0.5 * one.gain:
+        return first
+    again = _fit_from_afar(fitter, before, one)
+    return again if again is not None and again.score > first.score else first
+
+
 def _fit(fitter: Fitter, before: Fitted, one: Score) -> Fitted:
     """The model with an effect, from where the score test says, with the derivatives of the model before."""
     effects = (*before.state.effects, start_of(fitter, one))
@@ -249,12 +258,12 @@ def _fit_elsewhere(fitter: Fitter, before: Fitted, candidate: Candidate) -> Fitt
     return None if best is candidate.fitted else fitter.fit(best.state, rounds=4, like=before)
 
 
-def _fit_from_afar(fitter: Fitter, before: Fitted, candidate: Candidate) -> Fitted | None:
+def _fit_from_afar(fitter: Fitter, before: Fitted, one: Score) -> Fitted | None:
     """The same from the best of a scan, all derivatives taken on the way: far off, the plain ones mislead.
 
     None where all of the scan is worse than no effect: objects topple, or leave.
     """
-    point, theta, score = scanned_start(fitter, before, candidate.score)
+    point, theta, score = scanned_start(fitter, before, one)
     if score < before.score:
         return None
     u = np.clip(before.state.u + np.clip(theta, -FAR, FAR), 1e-3, 1.0 - 1e-3)

@@ -12,6 +12,7 @@ from scipy import stats
 from physid_drake.diagnose.candidate import Candidate
 from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.fit import Fitter
+from physid_drake.diagnose.foils import Foil
 from physid_drake.diagnose.linear import LinearPush, Whitened, solve
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.model import Fitted
@@ -56,6 +57,7 @@ class Evidence:
         noise_share: where the noise is not known, the share of its variance that the last model needs of what the
             plain cell needs; 1 where it is known.
         detected: p-value of the plain cell where the noise was as loud as what it leaves; None where it is known.
+        foil: a law beside the catalogue that does better than an effect that was found, if there is one.
     """
 
     case: Case
@@ -75,6 +77,7 @@ class Evidence:
     superfluous: tuple[tuple[Candidate, ...], ...] = ()
     noise_share: float = 1.0
     detected: float | None = None
+    foil: Foil | None = None
 
 
 def confirmed(

@@ -153,7 +153,7 @@ class Growth:
             if len(steps) == 1:
                 break
             name = steps[k][0].name
-            made[name] = without = self._without(name, last.fitted)
+            made[name] = without = self.without(name, last.fitted)
             gains = push_scores(last.fitted) - push_scores(without)
             confirmed = dc.replace(steps[k][0], fitted=last.fitted, gains=gains).accepted
             if not confirmed or not self._shows(without, last.fitted):
@@ -168,7 +168,7 @@ class Growth:
         before, after = (self.fitter.left_out(m) for m in (without, model))
         return comes_nearer(self.fitter.case, before, after)
 
-    def _without(self, name: str, model: Fitted) -> Fitted:
+    def without(self, name: str, model: Fitted) -> Fitted:
         """A model fitted again without one of its effects."""
         self.tick(f"model without {name}", 0, 0)
         effects = tuple(e for e in model.state.effects if e.kind.name != name)
@@ -195,7 +195,7 @@ class Growth:
             self.tick(f"{other.name} in place of {step[0].name}", 0, 0)
             point = next(e for e in other.fitted.state.effects if e.kind.name == other.name)
             models[other.name] = self.fitter.fit(with_kth(point), rounds=4, like=model)
-        bare = grown.without.get(step[0].name) or self._without(step[0].name, model)
+        bare = grown.without.get(step[0].name) or self.without(step[0].name, model)
         without = push_scores(bare)
         scores = {name: push_scores(one) for name, one in models.items()}
         best = ranked([dc.replace(c, gains=scores[c.name] - without) for c in (step[0], *rivals)])[0].name

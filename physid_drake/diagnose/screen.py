@@ -315,7 +315,7 @@ def screen(fitted: Fitted, found: Sequence[Signature], rng: np.random.Generator)
         if signature.friction_changes:
             one = by_trend(fitted, one)
         families.setdefault(signature.kind.name, []).append(one)
-    scores = tuple(sorted((_best_family(every) for every in families.values()), key=_rank))
+    scores = tuple(sorted((best_family(every) for every in families.values()), key=_rank))
     null = _null_draws(fitted, found, rng)
     # As many independent looks as give the draws' median of the smallest p.
     looks = max(1.0, float(np.log(2.0) / np.exp(np.median(null))))
@@ -328,7 +328,8 @@ def _rank(one: Score) -> tuple[float, float]:
     return one.log_p, -one.gain
 
 
-def _best_family(every: Sequence[Score]) -> Score:
+def best_family(every: Sequence[Score]) -> Score:
+    """The best of the scores of an effect's families, with the others."""
     best, *others = sorted(every, key=_rank)
     return dc.replace(best, others=tuple(others))
 

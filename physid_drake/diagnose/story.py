@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.conclude import class_of, conclude
 from physid_drake.diagnose.confirm import WORTH_A_TRY
-from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, confirmed
+from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, confirmed, unexplained
 from physid_drake.diagnose.fit import Fitter
+from physid_drake.diagnose.foils import Foil, better_foil
 from physid_drake.diagnose.grow import HOPELESS, Grown, Growth, Looked
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
 from physid_drake.diagnose.loudness import as_loud_as_left, quieter
@@ -93,7 +94,7 @@ def _on_short_ticks(answer: _Answer, tick: Progress) -> Evidence:
         case=case, fitter=fine, plain=refined, nearest=closest or refined, errors_before=before, errors_after=after,
         screening=grown.base.screening, signatures=grown.base.signatures,
         steps=grown.steps, rejected=grown.rejected, superfluous=grown.superfluous, final=final,
-        remaining=grown.last.screening, noise_share=answer.noise_share, detected=answer.detected,
+        remaining=grown.last.screening, noise_share=answer.noise_share, detected=answer.detected, foil=answer.foil,
     )  # fmt: skip
 
 
@@ -106,6 +107,22 @@ class _Answer:
     grown: Grown
     noise_share: float = 1.0
     detected: float | None = None
+    foil: Foil | None = None
+
+
+def _better_foil(growth: Growth, grown: Grown) -> Foil | None:
+    """A law beside the catalogue that does better than an effect of a model that explains the pushes."""
+    plain, model = grown.base.fitted, grown.last.fitted
+    if not grown.steps or unexplained(plain, model):
+        return None
+    for step in grown.steps:
+        name = step[0].name
+        alone = len(grown.steps) == 1
+        without = plain if alone else grown.without.get(name) or growth.without(name, model)
+        foil = better_foil(growth.fitter, without, model, name, growth.tick)
+        if foil is not None:
+            return foil
+    return None
 
 
 def _in_question(grown: Grown) -> list[type[Effect]]:
@@ -134,7 +151,8 @@ class _Search:
         asked = [s for s in found if s.kind in self.kinds]
         looked = Looked.at(fitter.guard(first), asked, self.rng)
         growth = Growth(fitter=fitter, kinds=self.kinds, alpha=self.alpha, rng=self.rng, tick=self.tick)
-        return _Answer(case=case, fitter=fitter, grown=growth.grow(looked))
+        grown = growth.grow(looked)
+        return _Answer(case=case, fitter=fitter, grown=grown, foil=_better_foil(growth, grown))
 
     def answer_by_ratios(self, case: Case, rough: Case, first: Fitted, memory: Memory) -> _Answer:
         """The same where the noise is not known: as loud as the plain cell leaves, then as what was found leaves."""

@@ -11,6 +11,7 @@ from twin import SIGMA, body_of, config_of
 
 from physid_drake.cell import Cell, HandPath, Outcome, Start
 from physid_drake.effects import CATALOGUE, PushFacts, Surroundings, applicable, effect_named
+from physid_drake.effects.foils import FOILS
 from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
 from physid_drake.errors import ConfigError
 from physid_drake.recording import Box, Cylinder
@@ -60,7 +61,8 @@ MEANING = {
 # straight only over shorter ways.
 CURVED = ("hand_compliance",)
 
-every_effect = pytest.mark.parametrize("kind", CATALOGUE, ids=lambda kind: kind.name)
+every_name = pytest.mark.parametrize("kind", CATALOGUE, ids=lambda kind: kind.name)
+every_effect = pytest.mark.parametrize("kind", (*CATALOGUE, *FOILS), ids=lambda kind: kind.name)
 
 
 def push(start, heading, speed, pose, order):
@@ -180,7 +182,7 @@ def test_the_catalogue_is_complete_and_in_order():
 LEFT_OPEN = {"sloshing": {"turning": ("-", None)}}  # by the catalogue, which fixes the other parameters
 
 
-@every_effect
+@every_name
 def test_names_elements_parameters_and_units_are_the_catalogues(kind):
     element, parameters = EXPECTED[kind.name]
     parameters = parameters | LEFT_OPEN.get(kind.name, {})
@@ -192,7 +194,7 @@ def test_names_elements_parameters_and_units_are_the_catalogues(kind):
     assert kind.nulls() == {name: null for name, (_, null) in parameters.items()}
 
 
-@every_effect
+@every_name
 def test_an_effect_says_what_it_is_and_where_it_is_constant(kind):
     assert len(kind.statement.split()) > 3
     assert kind.frame in {

@@ -7,6 +7,7 @@ import pytest
 
 from physid_drake.diagnose import conclude
 from physid_drake.diagnose.candidate import Candidate
+from physid_drake.diagnose.foils import Foil
 from physid_drake.identify.misfit import FAILED
 
 PUSHES, WINDOWS = 6, 5
@@ -29,7 +30,7 @@ def features():
     return SimpleNamespace(poses=poses, sigmas=SIGMAS, middles=np.zeros(WINDOWS))
 
 
-def evidence(*, steps=(), rejected=(), superfluous=(), final=None, after=10.0):
+def evidence(*, steps=(), rejected=(), superfluous=(), final=None, after=10.0, foil=None):
     plain = model_that_leaves(100.0)
     screening = SimpleNamespace(scores=(SimpleNamespace(kind=SimpleNamespace(name="viscous_drag")),))
     return SimpleNamespace(
@@ -37,7 +38,7 @@ def evidence(*, steps=(), rejected=(), superfluous=(), final=None, after=10.0):
         plain=plain, nearest=plain, screening=screening,
         remaining=SimpleNamespace(scores=()), steps=steps, rejected=rejected, superfluous=superfluous,
         final=final or plain,
-        errors_before=errors(10.0), errors_after=errors(after),
+        errors_before=errors(10.0), errors_after=errors(after), foil=foil,
     )  # fmt: skip
 
 
@@ -52,10 +53,20 @@ def test_the_best_effect_that_pushes_confirm_is_said_to_take_its_part():
     assert found.effects == ("viscous_drag",)
     assert found.share == pytest.approx(1.0 - 0.4**2)
     assert found.position == pytest.approx(np.sqrt(2.0) * 4e-3) and found.rotation == pytest.approx(4e-2)
-    sentence = conclude._sentence("unexplained", (), found)
+    sentence = conclude._sentence("unexplained", (), found, None)
     assert "viscous_drag would take 84 % of the squared error away" in sentence
     plain = evidence().plain
     assert conclude._left(evidence(), "unexplained", plain, found).endswith("with viscous_drag 4.0 times")
+
+
+def test_a_foil_that_does_better_takes_the_name_away_and_says_what_it_is():
+    foil = Foil(statement="friction grows", instead_of="viscous_drag", gain=20.0)
+    steps = ((tried("viscous_drag", 50.0, None),),)
+    told = evidence(steps=steps, final=model_that_leaves(1.0), after=1.0, foil=foil)
+    assert not conclude._explained(told) and conclude._partly(told) is None
+    sentence = conclude._sentence("unexplained", (), None, foil)
+    assert sentence.endswith("that friction grows would explain more than viscous_drag.")
+    assert "friction grows" in conclude._left(told, "unexplained", told.plain, None)
 
 
 def test_effects_that_were_added_and_did_not_suffice_are_said_together():
@@ -69,7 +80,7 @@ def test_what_is_not_confirmed_or_takes_little_away_is_not_worth_a_word(rejected
     candidates = tuple(tried("magnet", gain, model_that_leaves(4.0)) for gain in rejected)
     assert conclude._partly(evidence(rejected=candidates, after=after)) is None
     told = evidence()
-    assert "nothing in the catalogue accounts for it" in conclude._sentence("unexplained", (), None)
+    assert "nothing in the catalogue accounts for it" in conclude._sentence("unexplained", (), None, None)
     assert conclude._left(told, "unexplained", told.plain, None).endswith(
         "is viscous_drag, which does not account for it"
     )

@@ -276,7 +276,9 @@ def test_what_promised_much_is_tried_again_before_what_promises_little(monkeypat
 
     monkeypatch.setattr(confirm, "push_scores", lambda one: np.zeros(8))
     monkeypatch.setattr(confirm, "_fit", lambda fitter, before, one: fitted(one.kind.name, 15.0))
-    monkeypatch.setattr(confirm, "_fit_from_afar", lambda fitter, before, one: fitted(f"{one.name} again", again))
+    monkeypatch.setattr(
+        confirm, "_fit_from_afar", lambda fitter, before, one: fitted(one.kind.name + " again", again)
+    )
     monkeypatch.setattr(confirm, "_candidate", judged)
     monkeypatch.setattr(confirm, "_once_more", lambda found: [])
     fitter = SimpleNamespace(case=SimpleNamespace(pool=SimpleNamespace(count=0), problems=range(8)))
@@ -296,7 +298,7 @@ def test_no_fit_begins_where_all_of_a_scan_is_worse_than_no_effect(monkeypatch, 
     monkeypatch.setattr(confirm, "scanned_start", lambda fitter, before, one: ("point", np.zeros(1), seen))
     fitter = SimpleNamespace(start=lambda u, effects: (u, effects), fit=fit)
     before = SimpleNamespace(score=-100.0, state=SimpleNamespace(u=np.full(1, 0.5), effects=()))
-    again = confirm._fit_from_afar(fitter, before, SimpleNamespace(score=None))
+    again = confirm._fit_from_afar(fitter, before, None)
     assert (again, len(made)) == ("fitted" if fits else None, fits)
 
 

@@ -27,6 +27,7 @@ def test_pushes_may_share_the_same_whatever_is_looked_for(names, monkeypatch):
     )
     monkeypatch.setattr(story, "Looked", SimpleNamespace(at=lambda model, found, rng: [s.kind for s in found]))
     monkeypatch.setattr(story, "Growth", lambda **_: SimpleNamespace(grow=lambda looked: looked))
+    monkeypatch.setattr(story, "_better_foil", lambda growth, grown: None)
     search = story._Search(kinds=asked, alpha=0.01, rng=np.random.default_rng(0), tick=lambda *_: None)
     answer = search.answer(None, SimpleNamespace(around=AROUND), None, None)
     assert answer.grown == list(asked)
