@@ -1,5 +1,6 @@
 """Where theta is looked for."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 import numpy as np
@@ -69,3 +70,55 @@ def test_what_nothing_is_better_than_is_returned_as_it_was_given(case):
 def test_what_is_given_is_left_for_something_better(case):
     theta, u, _ = searched(case, near=np.array([0.95, 0.05]))
     assert u[0] != 0.95 and np.linalg.norm(theta - TRUE) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("loudness", "few"),
+    [([50.0, 7.0, 7.0, 5.0, 5.0, 5.0, 2.0, 1.0], True), ([9.0, 8.0, 7.0, 6.0, 5.0], False), ([9.0], False)],
+)
+def test_what_a_quarter_of_the_pushes_leaves_is_odd(loudness, few):
+    pushes = tuple(SimpleNamespace(residual=np.full(6, size)) for size in loudness)
+    assert plain._few_are_odd(SimpleNamespace(pushes=pushes)) == few
+
+
+class Fork:
+    """Two pushes tell theta, and a third goes the other way from everywhere but near the truth.
+
+    A fit goes to where it leaves least, with each push as noisy as its features say.
+    """
+
+    def __init__(self, case):
+        self.case = case
+        self.noise = [one.noise[0, 0] for one in case.features]
+
+    def start(self, u):
+        return u
+
+    def _left(self, u):
+        odd = 0.0 if abs(u - 0.7) < 0.1 else 50.0 + 10.0 * (1.0 - u)
+        return np.array([5.0 * abs(u - 0.7), 5.0 * abs(u - 0.7), odd])
+
+    def fit(self, u, **_):
+        grid = np.linspace(max(0.0, u - 0.3), min(1.0, u + 0.3), 61)
+        near = [v for v in grid if (abs(v - 0.7) < 0.1) == (abs(u - 0.7) < 0.1)] if self.noise[2] == 1.0 else grid
+        costs = [float(np.sum(self._left(v) ** 2 / self.noise)) for v in near]
+        best = near[int(np.argmin(costs))]
+        pushes = tuple(SimpleNamespace(residual=np.array([left])) for left in self._left(best))
+        return SimpleNamespace(state=SimpleNamespace(u=best), pushes=pushes, score=-min(costs))
+
+
+def test_one_push_that_goes_the_other_way_does_not_keep_theta_from_the_others(monkeypatch):
+    monkeypatch.setattr(plain, "Fitter", Fork)
+
+    @dataclass(frozen=True)
+    class One:
+        noise: np.ndarray
+
+    @dataclass(frozen=True)
+    class Case:
+        features: tuple
+
+    case = Case(features=(One(np.eye(1)),) * 3)
+    stuck = Fork(case).fit(0.95)
+    assert stuck.state.u > 0.9
+    assert plain._without_the_odd(case, stuck).state.u == pytest.approx(0.7, abs=0.02)
