@@ -22,6 +22,7 @@ class FrictionByDistance(Effect):
     """Friction changes by a factor of ``ratio`` ^ (1 - exp(-s / length)) as an object slides a distance s.
 
     It begins anew in each push: what warms or wears off cools or recovers while the object rests.
+    The form is the plainest one that saturates, and from no source.
     """
 
     name: ClassVar[str] = "friction_by_distance"
