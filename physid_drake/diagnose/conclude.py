@@ -333,7 +333,7 @@ def _left(evidence: Evidence, verdict: str, after: Fitted, partly: Partly | None
         return "no more than what two simulators differ by"
     if verdict == "unexplained" and evidence.foil is not None:
         foil = evidence.foil
-        return f"what {foil.instead_of} stands in for: that {foil.statement} makes left-out pushes likelier"
+        return f"what {foil.instead_of} stands in for; left-out pushes are likelier if {foil.statement}"
     named = verdict in ("explained", "ambiguous")
     hidden = verdict == "unexplained" or (named and scatter_p_value(after) < TOO_SCATTERED)
     if after.reduced_chi2 <= EXPLAINED and hidden:
@@ -378,8 +378,8 @@ def _sentence(verdict: str, findings: Sequence[EffectFinding], partly: Partly | 
             )
         case "unexplained" if foil is not None:
             return (
-                "Simulation and recording differ, and nothing in the catalogue accounts for it: that"
-                f" {foil.statement} would explain more than {foil.instead_of}."
+                f"Simulation and recording differ, and nothing in the catalogue accounts for it: {foil.instead_of}"
+                f" explains less than this would: {foil.statement}."
             )
         case "unexplained":
             return "Simulation and recording differ, and nothing in the catalogue accounts for it."

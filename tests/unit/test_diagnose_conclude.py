@@ -65,7 +65,7 @@ def test_a_foil_that_does_better_takes_the_name_away_and_says_what_it_is():
     told = evidence(steps=steps, final=model_that_leaves(1.0), after=1.0, foil=foil)
     assert not conclude._explained(told) and conclude._partly(told) is None
     sentence = conclude._sentence("unexplained", (), None, foil)
-    assert sentence.endswith("that friction grows would explain more than viscous_drag.")
+    assert sentence.endswith("viscous_drag explains less than this would: friction grows.")
     assert "friction grows" in conclude._left(told, "unexplained", told.plain, None)
 
 
