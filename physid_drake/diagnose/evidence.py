@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 SLACK = 1.15
 # What a model with effects may leave, as cost per degree of freedom above 1:
 NOISE_LIKE = 0.2  # always, as the cell leaves where nothing is missing
+DOUBTS = 2.0  # standard deviations of the noise's variance, as rests tell it, if that is more
 MOST_SHARE = 0.16  # of what the plain cell leaves: an effect that leaves more explains something else
 MOST_LEFT = 0.5  # beside what two laws of one effect differ by
 EVER_LEFT = 2.0  # in all
@@ -98,14 +99,22 @@ def mismatch(fitted: Fitted, screening: Screening | None) -> float:
         screening: of the catalogue; None where pushes that were left out confirm nothing of it, so that only the cost
             speaks: one odd push is no physics.
     """
-    cost = float(stats.chi2.sf(fitted.solution.chi2 / SLACK, fitted.degrees))
-    looks = [cost, 1.0 if screening is None else screening.p_value]
+    looks = [_cost_p_value(fitted), 1.0 if screening is None else screening.p_value]
     scatter = scatter_p_value(fitted)
     # One within its bounds says nothing and is no look: of frictions that scatter by just so much, its own test calls
     # 0.2 % where 1 % is asked.
     if scatter < 1.0:
         looks.append(scatter)
     return float(-np.expm1(len(looks) * np.log1p(-min(*looks, 1.0 - 1e-16))))
+
+
+def _cost_p_value(fitted: Fitted) -> float:
+    """Of "noise and the cell's own error leave as much"; by Snedecor's F where rests had to tell the noise."""
+    cost, degrees = fitted.solution.chi2 / SLACK, fitted.degrees
+    if fitted.doubt == 0.0:
+        return float(stats.chi2.sf(cost, degrees))
+    # A variance seen with n degrees of freedom has a logarithm that is sqrt(2 / n) off.
+    return float(stats.f.sf(cost / max(1, degrees), degrees, 2.0 / fitted.doubt**2))
 
 
 def scatter_p_value(fitted: Fitted) -> float:
@@ -140,4 +149,5 @@ def unexplained(plain: Fitted, final: Fitted) -> bool:
     """
     before, left = plain.reduced_chi2 - 1.0, final.reduced_chi2 - 1.0
     most = min(MOST_LEFT + LAW_ERROR**2 * max(0.0, before), EVER_LEFT)
-    return left > most or left > max(NOISE_LIKE, MOST_SHARE * before) or scatter_p_value(final) < TOO_SCATTERED
+    noise_like = max(NOISE_LIKE, DOUBTS * final.doubt)
+    return left > most or left > max(noise_like, MOST_SHARE * before) or scatter_p_value(final) < TOO_SCATTERED

@@ -204,7 +204,7 @@ class Fitter:
         solution = solve(Whitened.of(pushes, scatter), mean, std)
         return Fitted(
             state=state, pushes=pushes, prior_mean=mean, prior_std=std, solution=solution, predicted=predicted,
-            score=score,
+            score=score, doubt=self.case.noise.doubt,
         )  # fmt: skip
 
     def guard(self, fitted: Fitted) -> Fitted:

@@ -92,6 +92,7 @@ class Fitted:
         solution: of the linear problem at the state; its beta is what was left to move.
         predicted: per push (m,), features at the state, unknowns included.
         score: log likelihood with the scatter's prior.
+        doubt: standard deviation of the logarithm of the noise's variance [-].
     """
 
     state: State
@@ -101,6 +102,7 @@ class Fitted:
     solution: Solution
     predicted: tuple[Array, ...]
     score: float
+    doubt: float = 0.0
 
     @property
     def own_dimension(self) -> int:

@@ -8,15 +8,19 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
-from scipy.optimize import minimize
+from scipy import special, stats
 
 from physid_drake.identify.problem import FINEST_POSITION, FINEST_ROTATION, SILENT, Noise, noise_of
 from physid_drake.recording import Push, Recording, rest_segments
 
 Array = NDArray[np.float64]
 
+# Of the correlation from one sample to the next: its logit, and that one's prior, which is weak; a short rest cannot
+# tell slow noise from none.
+LOGITS = np.linspace(-5.0, 5.5, 43)
+LOGIT_PRIOR = -0.5 * ((LOGITS + 1.5) / 2.0) ** 2
 LONGEST = 60  # samples of a rest that are looked at together
+UNCORRELATED = 0.02  # from sample to sample
 FEWEST = 40  # samples at rest, in all, that tell a noise
 FORCE_SCATTER = 0.03
 UNKNOWN = "neither stated nor seen at rest"
@@ -24,6 +28,21 @@ UNUSUAL = 3.0  # times the median scatter of rests: one of more is none
 SMALLEST = 1e-18  # m^2
 CHANCE = 0.05  # of pushes that agree on a jitter there is not; fewer than five cannot agree as surely
 CONTRADICTS = 1.5  # seen over stated: beyond it the stated figure is not believed
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class SeenNoise:
+    """What rests tell of a stream's noise.
+
+    Attributes:
+        std: standard deviation [m or rad].
+        correlation_time: of a first-order autoregressive process [s]; 0 is white.
+        doubt: standard deviation of the logarithm of the variance [-].
+    """
+
+    std: float
+    correlation_time: float
+    doubt: float
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -49,6 +68,7 @@ class TrackerNoise:
         jitter: standard deviation of the time stamps [s], as far as moving samples show more noise than resting ones.
         stated: whether the recording states the standard deviations, and they are believed.
         known: whether they were stated or seen; if not, what the plain cell leaves has to serve.
+        doubt: standard deviation of the logarithm of the variance [-], 0 where it is stated.
         forces: of the hand's force.
         warnings: what was found to contradict the recording.
     """
@@ -59,6 +79,7 @@ class TrackerNoise:
     jitter: float
     stated: bool
     known: bool = True
+    doubt: float = 0.0
     forces: ForceNoise = ForceNoise()
     warnings: tuple[str, ...] = ()
 
@@ -93,32 +114,34 @@ class TrackerNoise:
 def tracker_noise(recording: Recording) -> tuple[TrackerNoise, Noise]:
     """The object's noise as seen at rest and stated, and the identification's view of all sensors.
 
-    Restricted maximum likelihood of a first-order autoregressive process, so that a short rest, whose mean takes a
-    part of a slow noise away, does not make the noise look smaller.
+    Restricted likelihood of a first-order autoregressive process, so that a short rest, whose mean takes a part of a
+    slow noise away, does not make the noise look smaller.
     """
     plain = noise_of(recording)
     pieces = _usual(
         [(push.object.times[r], push.object.planar[r]) for push in recording.pushes for r in rest_segments(push)]
     )
-    seen_xy = _reml([(t, p[:, k]) for t, p in pieces for k in (0, 1)], FINEST_POSITION)
-    seen_yaw = _reml([(t, p[:, 2]) for t, p in pieces], FINEST_ROTATION)
+    seen_xy = seen_noise([(t, p[:, k]) for t, p in pieces for k in (0, 1)], FINEST_POSITION)
+    seen_yaw = seen_noise([(t, p[:, 2]) for t, p in pieces], FINEST_ROTATION)
     warnings: list[str] = []
-    position, tau_xy = _chosen("position", plain.position, plain.source["position"], seen_xy, warnings)
-    rotation, tau_yaw = _chosen("rotation", plain.rotation, plain.source["rotation"], seen_yaw, warnings)
+    position = _chosen("position", plain.position, plain.source["position"], seen_xy, warnings)
+    rotation = _chosen("rotation", plain.rotation, plain.source["rotation"], seen_yaw, warnings)
+    tau_xy, tau_yaw = position.correlation_time, rotation.correlation_time
     if seen_yaw is None:  # too little rest for one stream, enough for two: it is the same tracker's filter
         tau_yaw = tau_xy
     believed = not warnings
     warnings += _of_hand_and_force(recording, plain)
     noise = TrackerNoise(
-        position=position,
-        rotation=rotation,
+        position=position.std,
+        rotation=rotation.std,
         correlation_time=(tau_xy, tau_yaw),
         jitter=_jitter(recording.pushes),
         stated=plain.source["position"] == "stated" and believed,
         known=_known(plain, "position", seen_xy) and _known(plain, "rotation", seen_yaw),
+        doubt=math.hypot(2.0 * position.doubt, rotation.doubt) / 3.0,  # two of three degrees of freedom are places
         warnings=tuple(warnings),
     )
-    return noise, dc.replace(plain, position=position, rotation=rotation)
+    return noise, dc.replace(plain, position=position.std, rotation=rotation.std)
 
 
 def _usual(pieces: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
@@ -130,7 +153,7 @@ def _usual(pieces: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
     return [piece for piece, kept in zip(pieces, usual, strict=True) if kept]
 
 
-def _known(plain: Noise, what: str, seen: tuple[float, float] | None) -> bool:
+def _known(plain: Noise, what: str, seen: SeenNoise | None) -> bool:
     return seen is not None or plain.source[what] != "assumed"
 
 
@@ -145,26 +168,33 @@ def _of_hand_and_force(recording: Recording, plain: Noise) -> list[str]:
     ]
 
 
-def _chosen(
-    what: str, value: float, source: str, seen: tuple[float, float] | None, warnings: list[str]
-) -> tuple[float, float]:
+def _chosen(what: str, value: float, source: str, seen: SeenNoise | None, warnings: list[str]) -> SeenNoise:
+    """The stated noise, or the one seen at rest if none is stated or the rests contradict it."""
     if seen is None:
-        return value, 0.0
-    sigma, constant = seen
+        return SeenNoise(std=value, correlation_time=0.0, doubt=0.0)
     if source != "stated":
-        return sigma, constant
-    if sigma > CONTRADICTS * value:
+        return seen
+    if seen.std > CONTRADICTS * value:
         warnings.append(
-            f"the {what} noise at rest is {sigma:.3g}, {sigma / value:.1f} times what the recording states"
+            f"the {what} noise at rest is {seen.std:.3g}, {seen.std / value:.1f} times what the recording states"
         )
-        return sigma, constant
-    return value, constant
+        return seen
+    return SeenNoise(std=value, correlation_time=seen.correlation_time, doubt=0.0)
 
 
-def _reml(pieces: Sequence[tuple[Array, Array]], finest: float) -> tuple[float, float] | None:
-    """Standard deviation, at least ``finest``, and correlation time of rests (times, values), each with its mean.
+def seen_noise(pieces: Sequence[tuple[Array, Array]], finest: float) -> SeenNoise | None:
+    """The noise of rests (times, values), each with its mean.
 
-    None where they are too few, or silent: a coarse or filtered stream that stands still tells nothing of its noise.
+    Posterior means of the logarithm of the variance and of the logit of the correlation, over a grid of the latter,
+    for each point of which the variance has an inverse gamma distribution. The likeliest values would be 9 % below a
+    noise that correlates by 0.82 from sample to sample in ten rests of a quarter of a second.
+
+    Args:
+        pieces: rests.
+        finest: the least standard deviation.
+
+    Returns:
+        None where the rests are too few, or silent: a coarse or filtered stream that stands still tells no noise.
     """
     rests = [(t[:LONGEST], v[:LONGEST]) for t, v in pieces if len(t) >= 10]
     if sum(len(t) for t, _ in rests) < FEWEST:
@@ -173,25 +203,31 @@ def _reml(pieces: Sequence[tuple[Array, Array]], finest: float) -> tuple[float, 
     spread = math.sqrt(float(np.mean([np.var(v) for _, v in rests])))
     if spread < SILENT * finest:
         return None
+    correlations = special.expit(LOGITS)
+    told = np.array([_restricted(rests, interval, rho) for rho in correlations])  # (grid, 2)
+    half = 0.5 * sum(len(t) - 1 for t, _ in rests)
+    log_squares = np.log(0.5 * told[:, 0])
+    weights = special.softmax(LOGIT_PRIOR - 0.5 * told[:, 1] - half * log_squares)
+    log_variance = log_squares - float(special.digamma(half))
+    mean = float(weights @ log_variance)
+    doubt = math.sqrt(float(weights @ (log_variance - mean) ** 2) + float(special.polygamma(1, half)))
+    rho = float(special.expit(weights @ LOGITS))
+    constant = -interval / math.log(rho) if rho > UNCORRELATED else 0.0
+    return SeenNoise(std=max(math.exp(0.5 * mean), finest), correlation_time=constant, doubt=doubt)
 
-    def cost(x: Array) -> float:
-        sigma, rho = spread * math.exp(x[0]), 1.0 / (1.0 + math.exp(-x[1]))
-        total = 0.0
-        for times, values in rests:
-            gaps = np.abs(times[:, None] - times[None, :]) / interval
-            matrix = sigma**2 * (rho**gaps + 1e-9 * np.eye(len(times)))
-            lower = np.linalg.cholesky(matrix)
-            white = np.linalg.solve(lower, np.column_stack([values, np.ones(len(values))]))
-            ones = float(white[:, 1] @ white[:, 1])
-            residual = white[:, 0] - white[:, 1] * float(white[:, 1] @ white[:, 0]) / ones
-            total += 2.0 * float(np.log(np.diag(lower)).sum()) + math.log(ones) + float(residual @ residual)
-        # A weak prior: a short rest cannot tell slow noise from none.
-        return float(total + 0.5 * (x[0] / 1.0) ** 2 + 0.5 * ((x[1] + 1.5) / 2.0) ** 2)
 
-    found = minimize(cost, np.array([0.0, -1.5]), method="Nelder-Mead", options={"xatol": 1e-2, "fatol": 1e-2})
-    rho = 1.0 / (1.0 + math.exp(-found.x[1]))
-    constant = -interval / math.log(rho) if rho > 0.02 else 0.0
-    return max(spread * math.exp(float(found.x[0])), finest), constant
+def _restricted(rests: Sequence[tuple[Array, Array]], interval: float, rho: float) -> tuple[float, float]:
+    """Squares of rests (times, values), whitened and less their means, and the log determinant, at unit variance."""
+    squares = log_determinant = 0.0
+    for times, values in rests:
+        gaps = np.abs(times[:, None] - times[None, :]) / interval
+        lower = np.linalg.cholesky(rho**gaps + 1e-9 * np.eye(len(times)))
+        white = np.linalg.solve(lower, np.column_stack([values, np.ones(len(values))]))
+        ones = float(white[:, 1] @ white[:, 1])
+        residual = white[:, 0] - white[:, 1] * float(white[:, 1] @ white[:, 0]) / ones
+        squares += float(residual @ residual)
+        log_determinant += 2.0 * float(np.log(np.diag(lower)).sum()) + math.log(ones)
+    return squares, log_determinant
 
 
 def _jitter(pushes: Sequence[Push]) -> float:

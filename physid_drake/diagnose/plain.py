@@ -176,6 +176,18 @@ def _loudness(left: Array) -> float:
     return max(1.0, math.sqrt(float(np.mean(left**2)))) if len(left) else 1.0
 
 
+def _nominal(case: Case) -> Array:
+    """Where people would start by hand, a point (d,) of the unit cube."""
+    return np.asarray(case.thetas.space.to_unit(case.thetas.space.nominal))
+
+
+def _nearest_from(case: Case, u: Array) -> Fitted:
+    """The plain cell where it predicts best, by least squares from a point (d,) of the unit cube."""
+    fitter = Fitter(case)
+    there = fitter.linearise(fitter.start(u), learn_scatter=False)
+    return fitter.seen_from(there, fitter.start(least_squares(case, there).state.u), learn_scatter=False)
+
+
 def _squares_at_rest(fitted: Fitted) -> float:
     """Mean square of what a model leaves with the pushes' own unknowns at zero, in standard deviations."""
     at_zero = np.concatenate([push.residual for push in fitted.pushes])
@@ -186,7 +198,8 @@ def fit_plain(case: Case, rng: np.random.Generator, tick: Progress) -> Fitted:
     """The plain cell fitted, without guard and tolerances.
 
     Where something large is missing, the pushes' own unknowns stay at zero: moved, they would imitate it, and effects
-    would be looked for from a place where nothing is as it was recorded.
+    would be looked for from a place where nothing is as it was recorded. What is missing may then be so much larger
+    than what theta changes that the search ends anywhere; so the nominal theta is a start, too.
     """
     u = search_theta(case, rng, tick)
     fitter = Fitter(case)
@@ -202,9 +215,9 @@ def fit_plain(case: Case, rng: np.random.Generator, tick: Progress) -> Fitted:
         first = _without_the_odd(case, first)
     if first.reduced_chi2 > FAR_OFF:
         tick("plain fit with as much noise as it leaves", 0, 0)
-        searched = fitter.linearise(fitter.start(u), learn_scatter=False)
-        blunt = fitter.seen_from(searched, fitter.start(least_squares(case, searched).state.u), learn_scatter=False)
-        return min((first, blunt), key=_squares_at_rest)
+        first = min((first, *(_nearest_from(case, start) for start in (u, _nominal(case)))), key=_squares_at_rest)
+        if first.reduced_chi2 > FAR_OFF:
+            return first
     return fitter.fit(
         first.state, rounds=4, like=first, renew=True, say=lambda text: tick(f"plain fit, {text}", 0, 0)
     )  # fmt: skip

@@ -1,5 +1,6 @@
 """When a model explains the pushes: how often frictions that only scatter are called something else."""
 
+import dataclasses as dc
 from types import SimpleNamespace
 
 import numpy as np
@@ -48,6 +49,35 @@ def test_frictions_that_follow_something_else_are():
     of_a_slide = 0.25 * np.linspace(-1.0, 1.0, 10)  # say, of an object that sticks at first
     assert scatter_p_value(fitted_to(of_a_slide)) < 0.002
     assert scatter_p_value(fitted_to(0.2 * of_a_slide)) == 1.0
+
+
+@pytest.mark.parametrize(("doubt", "called"), [(0.0, 1.0), (0.2, 0.0)])
+def test_noise_that_rests_hardly_tell_is_no_mismatch(doubt, called):
+    # Left by noise whose variance is 1.5 times what rests made of it: two standard deviations, or impossible.
+    rng = np.random.default_rng(6)
+    worlds = [dc.replace(fitted_to_noise(1.5**0.5 * rng.standard_normal(400)), doubt=doubt) for _ in range(20)]
+    assert np.mean([mismatch(world, None) < 0.01 for world in worlds]) == pytest.approx(called, abs=0.2)
+
+
+@pytest.mark.parametrize("doubt", [0.1, 0.2, 0.4])
+def test_noise_that_was_seen_at_rest_is_called_a_mismatch_as_seldom_as_is_said(doubt):
+    rng, seen_with = np.random.default_rng(7), int(2.0 / doubt**2)
+    stds = np.sqrt(seen_with / rng.chisquare(seen_with, 400))  # true over seen
+    worlds = [dc.replace(fitted_to_noise(std * rng.standard_normal(100)), doubt=doubt) for std in stds]
+    assert np.mean([mismatch(world, None) < 0.05 for world in worlds]) <= 0.05
+
+
+def fitted_to_noise(left):
+    """A model without unknowns that leaves this of one push."""
+    push = LinearPush(
+        residual=left, shared=np.zeros((len(left), 0)), own=np.zeros((len(left), 1)), noise=np.eye(len(left)),
+        friction=0,
+    )  # fmt: skip
+    state = State(u=NOTHING, effects=(), own=(), scatter=1.0)
+    return Fitted(
+        state=state, pushes=(push,), prior_mean=NOTHING, prior_std=NOTHING, predicted=(), score=0.0,
+        solution=solve(Whitened.of((push,), 1.0), NOTHING, NOTHING),
+    )  # fmt: skip
 
 
 def test_a_single_push_does_not_scatter():

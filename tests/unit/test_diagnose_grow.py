@@ -197,7 +197,14 @@ def test_a_plain_fit_in_a_wrong_basin_is_left_if_an_effect_leads_out_of_it():
 )
 def test_a_large_effect_may_leave_what_two_honest_laws_of_it_differ_by(before, after, left):
     usual = SimpleNamespace(scatter=1.0)
-    plain, final = SimpleNamespace(reduced_chi2=before), SimpleNamespace(reduced_chi2=after, state=usual)
+    plain, final = SimpleNamespace(reduced_chi2=before), SimpleNamespace(reduced_chi2=after, state=usual, doubt=0.0)
+    assert unexplained(plain, final) is left
+
+
+@pytest.mark.parametrize(("doubt", "left"), [(0.0, True), (0.05, True), (0.2, False)])
+def test_noise_that_rests_hardly_tell_may_be_left(doubt, left):
+    usual = SimpleNamespace(scatter=1.0)
+    plain, final = SimpleNamespace(reduced_chi2=2.5), SimpleNamespace(reduced_chi2=1.35, state=usual, doubt=doubt)
     assert unexplained(plain, final) is left
 
 

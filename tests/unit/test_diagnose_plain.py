@@ -122,3 +122,36 @@ def test_one_push_that_goes_the_other_way_does_not_keep_theta_from_the_others(mo
     stuck = Fork(case).fit(0.95)
     assert stuck.state.u > 0.9
     assert plain._without_the_odd(case, stuck).state.u == pytest.approx(0.7, abs=0.02)
+
+
+class Flat:
+    """A plain cell that fits end where they begin, off by how far that is from 0.3."""
+
+    loudness = 100.0
+
+    def __init__(self, case):
+        pass
+
+    def start(self, u):
+        return u
+
+    def fit(self, u, **_):
+        return self.seen_from(None, u)
+
+    def linearise(self, u, **_):
+        return self.seen_from(None, u)
+
+    def seen_from(self, model, u, **_):
+        left = self.loudness * abs(float(np.mean(u)) - 0.3)
+        pushes = (SimpleNamespace(residual=np.array([left])),) * 4
+        return SimpleNamespace(state=SimpleNamespace(u=u), pushes=pushes, reduced_chi2=left**2, score=-(left**2))
+
+
+@pytest.mark.parametrize(("searched", "ends"), [(0.9, 0.4), (0.35, 0.35)])
+def test_far_from_an_explanation_theta_also_starts_where_people_would(monkeypatch, searched, ends):
+    nominal = SimpleNamespace(nominal=np.array([0.4]), to_unit=lambda theta: theta)
+    case = SimpleNamespace(thetas=SimpleNamespace(space=nominal), problems=[None] * 4)
+    monkeypatch.setattr(plain, "Fitter", Flat)
+    monkeypatch.setattr(plain, "search_theta", lambda *_: np.array([searched]))
+    monkeypatch.setattr(plain, "least_squares", lambda case, at: at)
+    assert plain.fit_plain(case, np.random.default_rng(0), lambda *_: None).state.u == pytest.approx(ends)
