@@ -66,7 +66,8 @@ def _register_inspect(subparsers: Subparsers) -> None:
 
 
 def _run_inspect(arguments: argparse.Namespace) -> int:
-    # Matplotlib takes half a second to import, which the other commands need not wait for.
+    # Matplotlib takes half a second to import and Drake a second, which the other commands need not wait for.
+    from physid_drake.identify.frames import refusals  # noqa: PLC0415
     from physid_drake.report.inspection import draw_pushes, inspection_table, warning_lines  # noqa: PLC0415
     from physid_drake.report.terminal import terminal  # noqa: PLC0415
 
@@ -74,7 +75,7 @@ def _run_inspect(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"--out must name a picture, such as pushes.png, but is '{arguments.out}'.")
     recording = read_recording(arguments.folder)
     terminal().print(inspection_table(recording))
-    for line in warning_lines(recording):
+    for line in (*warning_lines(recording), *(f"would be refused: {said}" for said in refusals(recording))):
         warnings.warn(line, UserWarning, stacklevel=1)
     if arguments.out is not None:
         out: Path = arguments.out
@@ -107,8 +108,8 @@ def _run_convert(arguments: argparse.Namespace) -> int:
 
 def _register_diagnose(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser("diagnose", help="say what physics a recording has that the simulation leaves out")
-    parser.add_argument("recording", metavar="RECORDING", help="a folder, or the name of a recording that ships")
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where results go (default: diagnoses/RECORDING)")
+    parser.add_argument("recording", metavar="RECORDING", help="a FOLDER, or the name of a recording that ships")
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where results go (default: diagnoses/FOLDER)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (default 0)")
     parser.add_argument("--alpha", type=float, default=0.01, metavar="P", help="false-alarm rate (default 0.01)")
     parser.add_argument("--effects", nargs="+", metavar="NAME", help="look at these effects only")

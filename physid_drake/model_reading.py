@@ -43,7 +43,9 @@ def load_model(path: Path | str) -> Model:
         return _model(content, file)
     except ConfigError as error:
         raise ConfigError(f"{where}: {error}") from error
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
+    except KeyError as error:
+        raise ConfigError(f"{where}: key {error} is missing.") from error
+    except (TypeError, ValueError, AttributeError) as error:
         cause = " ".join(str(error).split()).rstrip(".")
         raise ConfigError(f"{where}: {type(error).__name__}: {cause}.") from error
 
@@ -60,13 +62,13 @@ def _model(content: dict[str, Any], file: Path) -> Model:
         raise ConfigError(f"key 'effects': none may be there twice, but they are {', '.join(names)}.")
     intervals = _intervals(content.get("intervals", {}), effects)
     radius, height = content["hand_radius_m"], content.get("tip_height_m")
-    (x0, y0), (x1, y1) = content["table_m"]
+    (x0, y0), (x1, y1) = _rows("table_m", content["table_m"])
     return Model(
         recording=str(content["recording"]),
         shape=_shape(content["object"], file.parent),
         hand_radius=None if radius is None else _number("hand_radius_m", radius, above=0.0),
         table=(
-            (_number("table_m", x0), _number("table_m", y0)),
+            (x0, y0),
             (_number("table_m", x1, above=x0), _number("table_m", y1, above=y0)),
         ),
         config=config,
@@ -163,9 +165,14 @@ def _correlation(content: Mapping[str, Any], intervals: Mapping[str, Any]) -> Co
 def _axes(found: Any) -> tuple[tuple[float, float], tuple[float, float]]:
     if found is None:
         return AS_W
+    return _rows("hand_axes", found)
+
+
+def _rows(key: str, found: Any) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Two rows of two numbers."""
     if not (isinstance(found, list) and len(found) == 2):
-        raise ConfigError(f"key 'hand_axes': must be two rows of two numbers, but is {found!r}.")
-    (a, b), (c, d) = (_numbers("hand_axes", row, 2) for row in found)
+        raise ConfigError(f"key '{key}': must be two rows of two numbers, but is {found!r}.")
+    (a, b), (c, d) = (_numbers(key, row, 2) for row in found)
     return (a, b), (c, d)
 
 

@@ -50,21 +50,34 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"--time-step must be in (0, {LONGEST_STEP}] s, but is {arguments.time_step:g}.")
     if arguments.pushes < 1:
         raise ConfigError(f"--pushes must be at least 1, but is {arguments.pushes}.")
+    if arguments.jobs < 0:
+        raise ConfigError(f"--jobs must be at least 0, but is {arguments.jobs}.")
     for name in arguments.effects or ():
         effect_named(name)
     console = terminal()
-    recording = read_recording(recording_folder(arguments.recording))
+    source = recording_folder(arguments.recording)
+    recording = read_recording(source)
     config = cell_config(recording, contact=arguments.contact, time_step=arguments.time_step)
     case = case_of(recording, config, ThetaConfig(), jobs=arguments.jobs, most=arguments.pushes)
     settings = {"seed": arguments.seed, "alpha": arguments.alpha, "effects": arguments.effects,
                 "cell": dc.asdict(config), "pushes": arguments.pushes, "recording": digest_of(recording),
                 "versions": versions()}  # fmt: skip
-    out = arguments.out or Path("diagnoses") / named_after(recording.name)
+    # Not the recording's name, which those that were converted from one data set share.
+    out = arguments.out or Path("diagnoses") / named_after(source.resolve().name)
+    had_one = (out / FILES[0]).exists()
     folder = RunFolder.open(out, json.dumps(settings, indent=2) + "\n", name="settings.json", files=(STATE, *FILES))
-    diagnosis, evidence = run_case(
-        case, console, seed=arguments.seed, alpha=arguments.alpha, effects=arguments.effects,
-        memory=Memory(folder.path / STATE),
-    )  # fmt: skip
+    if had_one and not (out / FILES[0]).exists():
+        console.print(f"Note: {out} held a diagnosis of another recording, or with other settings; it is gone.")
+    memory = Memory(folder.path / STATE)
+    if memory.stages:
+        console.print(f"going on with what was kept: {', '.join(memory.stages)}")
+    try:
+        diagnosis, evidence = run_case(
+            case, console, seed=arguments.seed, alpha=arguments.alpha, effects=arguments.effects, memory=memory
+        )
+    except KeyboardInterrupt:
+        console.print("what was found is kept, and the same command goes on from there")
+        raise
     write(folder, diagnosis, evidence)
     folder.forget(STATE)
     show(console, diagnosis)

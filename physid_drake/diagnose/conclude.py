@@ -32,13 +32,13 @@ from physid_drake.diagnose.evidence import (
     scatter_p_value,
     unexplained,
 )
-from physid_drake.diagnose.foils import Foil
 from physid_drake.diagnose.frictions import friction_trend
 from physid_drake.diagnose.left_out import comes_nearer, errors_of, shown_by_several
 from physid_drake.diagnose.looks import locate
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import regime_gains
 from physid_drake.diagnose.screen import cosine
+from physid_drake.diagnose.sentence import sentence
 from physid_drake.diagnose.values import (
     Detectable,
     Diagnosis,
@@ -75,7 +75,14 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
     return Diagnosis(
         recording=case.recording.name,
         verdict=verdict,
-        sentence=_sentence(verdict, findings, partly, evidence.foil),
+        sentence=sentence(
+            verdict,
+            findings,
+            partly,
+            evidence.foil,
+            known=case.noise.known,
+            fewest=FEWEST_PUSHES if len(case.problems) < FEWEST_PUSHES else None,
+        ),
         p_value=p_value,
         alpha=alpha,
         effects=findings,
@@ -359,33 +366,3 @@ def _scatters(case: Case, fitted: Fitted) -> str:
     scatter = 100.0 * UNIT_SCATTER * fitted.state.scatter
     trend = friction_trend(case, fitted)
     return f"scatters by {scatter:.0f} % from push to push" + ("" if trend is None else f", {trend}")
-
-
-def _percent(share: float) -> str:
-    return "more than 99 %" if share > 0.99 else f"{100.0 * share:.0f} %"
-
-
-def _sentence(verdict: str, findings: Sequence[EffectFinding], partly: Partly | None, foil: Foil | None) -> str:
-    match verdict:
-        case "consistent":
-            return "The plain cell explains these pushes: nothing is missing that they could show."
-        case "underpowered":
-            return "These pushes cannot tell: an effect would have to be large to show in them."
-        case "unexplained" if partly is not None:
-            return (
-                "Simulation and recording differ, and nothing in the catalogue accounts for all of it:"
-                f" {' and '.join(partly.effects)} would take {_percent(partly.share)} of the squared error away."
-            )
-        case "unexplained" if foil is not None:
-            return (
-                f"Simulation and recording differ, and nothing in the catalogue accounts for it: {foil.instead_of}"
-                f" explains less than this would: {foil.statement}."
-            )
-        case "unexplained":
-            return "Simulation and recording differ, and nothing in the catalogue accounts for it."
-    names = [
-        f"{f.name} ({f.statement})"
-        + (f", or {' or '.join(f.indistinguishable_from)}" if f.indistinguishable_from else "")
-        for f in findings
-    ]
-    return "What is missing: " + "; and ".join(names) + "."

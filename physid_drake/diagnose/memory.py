@@ -24,6 +24,11 @@ class Memory:
             except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
                 self._kept = {}  # cut off while it was written: begin again
 
+    @property
+    def stages(self) -> list[str]:
+        """Names under which something is kept."""
+        return [name.removesuffix("/count") for name in self._kept if name.endswith("/count")]
+
     def recall(self, name: str) -> list[Array] | None:
         """The arrays of a name, or None."""
         count = self._kept.get(f"{name}/count")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +23,43 @@ LONGEST_LOOK = 0.2  # s, of a slow tracker
 SURE = 6.0  # standard deviations
 FEWEST = 4  # samples
 STILL_FAST = 0.5  # of a hand's speed: faster, it has not come to a stop
+LIGHTEST, HEAVIEST = 1.0, 23000.0  # kg/m^3, of the box around an object: lighter than air, denser than osmium
+SLOWEST = 1.0  # s between samples: slower, it is no stream of a push
 BESIDE = 0.05  # m between tip and object that no error of calibration explains
+
+
+def refusals(recording: Recording) -> tuple[str, ...]:
+    """What an identification or a diagnosis would refuse, as far as places, times and masses say so; in words."""
+    checks: list[Callable[[], None]] = [partial(check_mass, recording), partial(check_hand_near, recording)]
+    for push in recording.pushes:
+        checks += [
+            partial(check_upright, recording, push),
+            partial(check_on_table, recording, push),
+            partial(check_clocks, push),
+        ]
+    found = []
+    for check in checks:
+        try:
+            check()
+        except RecordingError as error:
+            found.append(str(error))
+    return tuple(found)
+
+
+def check_mass(recording: Recording) -> None:
+    """Refuses a mass that no object of that size has."""
+    mass = recording.object.mass
+    if mass is None:
+        return
+    solid = solid_of(recording.object.shape)
+    x0, y0, x1, y1 = solid.outline.extent()
+    density = mass / ((x1 - x0) * (y1 - y0) * solid.height)
+    if not LIGHTEST < density < HEAVIEST:
+        what = "lighter than air" if density <= LIGHTEST else "denser than any metal"
+        raise RecordingError(
+            f"recording '{recording.name}': with {mass:g} kg the object would be {what} ({density:.3g} kg/m^3);"
+            " is its mass in kg, and its size in m?"
+        )
 
 
 def check_upright(recording: Recording, push: Push) -> None:
@@ -51,7 +90,13 @@ def check_upright(recording: Recording, push: Push) -> None:
 
 
 def check_clocks(push: Push) -> None:
-    """Refuses a hand whose stream is over before the object's begins, or the other way round."""
+    """Refuses a hand whose stream is over before the object's begins, or the other way round, and times in ms."""
+    if not push.endpoint_only and len(push.object) >= FEWEST:
+        interval = float(np.median(np.diff(push.object.times)))
+        if interval > SLOWEST:
+            raise RecordingError(
+                f"push '{push.name}': the object's samples are {interval:.3g} s apart; are their times in seconds?"
+            )
     if push.hand is None:
         return
     hand, seen = push.hand.times, push.object.times
@@ -81,8 +126,8 @@ def check_hand_near(recording: Recording) -> None:
     gaps = [_least_gap(recording, push) for push in recording.pushes if _moves(push) and push.hand is not None]
     if gaps and min(gaps) > BESIDE:
         raise RecordingError(
-            f"recording '{recording.name}': objects move, but the hand never comes nearer to one than"
-            f" {1e3 * min(gaps):.0f} mm; are both streams in the same frame?"
+            f"recording '{recording.name}': the object moves, but the hand stays {1e3 * min(gaps):.0f} mm or more"
+            " away from it; are both streams in the same frame, and in m?"
         )
 
 

@@ -12,7 +12,7 @@ from physid_drake.cell import CellConfig, HandPath, Start
 from physid_drake.cell.hand_fit import fit_hand_paths, stream_std
 from physid_drake.errors import RecordingError
 from physid_drake.identify.force_windows import force_windows
-from physid_drake.identify.frames import check_clocks, check_hand_near, check_on_table, check_upright
+from physid_drake.identify.frames import check_clocks, check_hand_near, check_mass, check_on_table, check_upright
 from physid_drake.identify.hand_stream import beside_object, vertical_reach
 from physid_drake.recording import Cylinder as CylinderShape
 from physid_drake.recording import (
@@ -198,8 +198,9 @@ def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[Push
 
     Raises:
         RecordingError: if the hand passes above the object or never comes near it, or if an object stands beside the
-            table, tips, or cannot be compared.
+            table, tips, has an impossible mass, or cannot be compared.
     """
+    check_mass(recording)
     check_hand_near(recording)
     hands = {k: beside_object(recording, push, height, noise.position) for k, push in enumerate(recording.pushes)}
     moving = {k: hand for k, hand in hands.items() if hand is not None}

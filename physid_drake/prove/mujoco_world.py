@@ -40,7 +40,7 @@ def load_mujoco() -> Any:
         return importlib.import_module("mujoco")
     except ImportError as error:
         raise ProofError(
-            "the proof simulates its worlds with MuJoCo, which is missing; pip install 'physid_drake[proof]'."
+            "worlds are simulated with MuJoCo, which is missing; pip install '.[proof]' in the project's folder."
         ) from error
 
 

@@ -1,3 +1,4 @@
+import dataclasses as dc
 import subprocess
 import sys
 
@@ -51,6 +52,17 @@ def test_inspect_shows_every_push_and_warns_on_stderr(tmp_path, capsys):
     assert "some_$pushes" in shown.out and "pushes/p2.csv" in shown.out and "[mm/s]" in shown.out
     assert "warning: pushes/p0.csv: object: rows 21-32: gap" in shown.err
     assert (tmp_path / "top.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_inspect_says_what_a_diagnosis_would_refuse(tmp_path, capsys):
+    recording = some_recording()
+    beside = dc.replace(recording, table=Table(size=(1.0, 1.0), centre=(5.0, 0.0)))
+    heavy = dc.replace(beside, object=dc.replace(recording.object, mass=50.0))
+    write_recording(heavy, tmp_path / "r")
+    assert cli.main(["inspect", str(tmp_path / "r")]) == 0
+    said = capsys.readouterr().err
+    assert "would be refused: push 'pushes/p0.csv': the object starts at" in said
+    assert "would be refused: recording 'some_$pushes': with 50 kg" in said
 
 
 def test_a_broken_recording_is_one_line_and_status_one(tmp_path, capsys):
@@ -109,11 +121,11 @@ def test_wrong_usage_is_status_two(argv, capsys):
     capsys.readouterr()
 
 
-def test_the_module_runs_as_a_program_without_importing_drake(tmp_path):
+def test_the_command_line_and_recordings_do_without_drake(tmp_path):
     write_recording(some_recording(1), tmp_path / "r")
     code = (
-        "import sys; from physid_drake.cli import main; s = main(sys.argv[1:]); "
-        "sys.exit(s or ('pydrake' in sys.modules))"
+        "import sys; from physid_drake.cli import build_parser; from physid_drake.recording import read_recording; "
+        "read_recording(build_parser().parse_args(sys.argv[1:]).folder); sys.exit('pydrake' in sys.modules)"
     )
     run = subprocess.run(
         [sys.executable, "-c", code, "inspect", str(tmp_path / "r")], capture_output=True, text=True, check=False

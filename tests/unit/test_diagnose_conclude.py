@@ -8,6 +8,7 @@ import pytest
 from physid_drake.diagnose import conclude
 from physid_drake.diagnose.candidate import Candidate
 from physid_drake.diagnose.foils import Foil
+from physid_drake.diagnose.sentence import sentence
 from physid_drake.identify.misfit import FAILED
 
 PUSHES, WINDOWS = 6, 5
@@ -53,8 +54,8 @@ def test_the_best_effect_that_pushes_confirm_is_said_to_take_its_part():
     assert found.effects == ("viscous_drag",)
     assert found.share == pytest.approx(1.0 - 0.4**2)
     assert found.position == pytest.approx(np.sqrt(2.0) * 4e-3) and found.rotation == pytest.approx(4e-2)
-    sentence = conclude._sentence("unexplained", (), found, None)
-    assert "viscous_drag would take 84 % of the squared error away" in sentence
+    said = sentence("unexplained", (), found, None)
+    assert "viscous_drag would take 84 % of the squared error away" in said
     plain = evidence().plain
     assert conclude._left(evidence(), "unexplained", plain, found).endswith("with viscous_drag 4.0 times")
 
@@ -64,8 +65,8 @@ def test_a_foil_that_does_better_takes_the_name_away_and_says_what_it_is():
     steps = ((tried("viscous_drag", 50.0, None),),)
     told = evidence(steps=steps, final=model_that_leaves(1.0), after=1.0, foil=foil)
     assert not conclude._explained(told) and conclude._partly(told) is None
-    sentence = conclude._sentence("unexplained", (), None, foil)
-    assert sentence.endswith("viscous_drag explains less than this would: friction grows.")
+    said = sentence("unexplained", (), None, foil)
+    assert said.endswith("viscous_drag explains less than this would: friction grows.")
     assert "friction grows" in conclude._left(told, "unexplained", told.plain, None)
 
 
@@ -80,10 +81,17 @@ def test_what_is_not_confirmed_or_takes_little_away_is_not_worth_a_word(rejected
     candidates = tuple(tried("magnet", gain, model_that_leaves(4.0)) for gain in rejected)
     assert conclude._partly(evidence(rejected=candidates, after=after)) is None
     told = evidence()
-    assert "nothing in the catalogue accounts for it" in conclude._sentence("unexplained", (), None, None)
+    assert "nothing in the catalogue accounts for it" in sentence("unexplained", (), None, None)
     assert conclude._left(told, "unexplained", told.plain, None).endswith(
         "is viscous_drag, which does not account for it"
     )
+
+
+def test_what_a_verdict_rests_on_is_said_with_it():
+    assert "at least 3" in sentence("underpowered", (), None, None, fewest=3)
+    assert "would have to be large" in sentence("underpowered", (), None, None)
+    assert "nobody states" in sentence("consistent", (), None, None, known=False)
+    assert "nobody states" not in sentence("consistent", (), None, None)
 
 
 @pytest.mark.parametrize(

@@ -169,6 +169,22 @@ def test_streams_of_different_clocks_are_refused(recording):
         first(with_pushes(recording, later))
 
 
+def test_times_in_milliseconds_are_refused(recording):
+    def slower(push):
+        streams = (replace(stream, times=1e3 * stream.times) for stream in (push.object, push.hand))
+        return replace(push, **dict(zip(("object", "hand"), streams, strict=True)))
+
+    with pytest.raises(RecordingError, match="are their times in seconds"):
+        first(with_pushes(recording, slower))
+
+
+@pytest.mark.parametrize(("mass", "said"), [(50.0, "denser than any metal"), (1e-6, "lighter than air")])
+def test_a_mass_that_no_such_object_has_is_refused(recording, mass, said):
+    heavy = replace(recording, object=replace(recording.object, mass=mass, mass_std=None))
+    with pytest.raises(RecordingError, match=f"{said}.*in kg"):
+        first(heavy)
+
+
 def test_an_object_that_stands_beside_the_table_is_refused(recording):
     elsewhere = replace(recording, table=replace(recording.table, centre=(9.0, 0.0)))
     with pytest.raises(RecordingError, match=r"beside the table.*same frame"):
@@ -179,7 +195,7 @@ def test_a_hand_that_never_comes_near_what_moves_is_refused(recording):
     def away(push):
         return replace(push, hand=replace(push.hand, positions=push.hand.positions + np.array([0.5, 0.0, 0.0])))
 
-    with pytest.raises(RecordingError, match=r"never comes nearer to one than .* same frame"):
+    with pytest.raises(RecordingError, match=r"stays [0-9]+ mm or more away from it.* same frame"):
         first(with_pushes(recording, away))
     one, *others = recording.pushes
     first(replace(recording, pushes=(away(one), *others)))  # a push that misses

@@ -1,5 +1,6 @@
 """The ``diagnose`` command's refusals, and models that cannot be read: one clear line, nothing half-written."""
 
+import shutil
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -7,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from physid_drake import load_model
+from physid_drake import load_model, run_diagnose
 from physid_drake.cell import Body, CellConfig, Start
 from physid_drake.cell.hand_path import straight_path
 from physid_drake.cli import main
@@ -19,6 +20,7 @@ from physid_drake.effects.hand import HandOffset
 from physid_drake.errors import ConfigError
 from physid_drake.model import AS_W, Correlation, Model
 from physid_drake.recording import Prism
+from physid_drake.resources import shipped
 
 DRAG = "viscous_drag.coefficient"
 
@@ -30,6 +32,7 @@ DRAG = "viscous_drag.coefficient"
         (["eraser_reference", "--alpha", "2"], "--alpha"),
         (["eraser_reference", "--seed", "-1"], "--seed"),
         (["eraser_reference", "--pushes", "0"], "--pushes"),
+        (["eraser_reference", "--jobs", "-1"], "--jobs"),
         (["eraser_reference", "--time-step", "1"], "--time-step"),
         (["eraser_reference", "--effects", "phlogiston"], "phlogiston"),
     ],
@@ -45,6 +48,25 @@ def test_an_output_folder_that_cannot_be_written_is_refused(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert main(["diagnose", "eraser_reference", "--out", str(tmp_path / "file" / "out")]) == 1
     assert "cannot be written" in capsys.readouterr().err
+
+
+def test_results_go_to_a_folder_named_after_the_recordings(tmp_path, monkeypatch, capsys):
+    def interrupted(*_, memory, **__):
+        memory.keep("plain", [np.zeros(1)])
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(run_diagnose, "run_case", interrupted)
+    shutil.copytree(shipped("recordings") / "eraser_reference", tmp_path / "mine")
+    assert main(["diagnose", "mine"]) == 130
+    assert "the same command goes on from there" in capsys.readouterr().out
+    (tmp_path / "diagnoses" / "mine" / "diagnosis.json").write_text("{}")
+    assert main(["diagnose", "mine"]) == 130
+    shown = capsys.readouterr().out
+    assert "going on with what was kept: plain" in shown and "it is gone" not in shown
+    assert main(["diagnose", "mine", "--seed", "1"]) == 130
+    shown = capsys.readouterr().out
+    assert "going on" not in shown and "it is gone" in shown
 
 
 @pytest.fixture
@@ -160,6 +182,8 @@ def test_what_a_correlation_does_not_hold_is_independent():
         ({"hand_radius_m": -0.01}, "above 0"),
         ({"tip_height_m": float("nan")}, "tip_height_m"),
         ({"hand_axes": [[1.0, 0.0]]}, "hand_axes"),
+        ({"table_m": []}, "'table_m': must be two rows"),
+        ({"cell": {}}, "key 'contact' is missing"),
         ({"table_m": [[1.0, 1.0], [-1.0, -1.0]]}, "table_m"),
         ({"effects": [{"name": "size_error", "parameters": {"ratio": 0.0}}]}, "size_error.ratio"),
         ({"effects": [{"name": "uneven_support", "parameters": {"weights": [[1.0], [1.0, 2.0]]}}]}, "equally many"),

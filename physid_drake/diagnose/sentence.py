@@ -1,0 +1,67 @@
+"""A verdict in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from physid_drake.diagnose.foils import Foil
+from physid_drake.diagnose.values import EffectFinding, Partly
+
+
+def _nothing_found(verdict: str, *, fewest: int | None, known: bool) -> str:
+    if verdict == "underpowered" and fewest is not None:
+        return f"These pushes cannot tell: it takes at least {fewest} to say what is missing."
+    if verdict == "underpowered":
+        return "These pushes cannot tell: an effect would have to be large to show in them."
+    if not known:
+        return (
+            "The plain cell explains these pushes as far as they tell: their noise, which nobody states and no rest"
+            " shows, is taken to be as large as what it leaves."
+        )
+    return "The plain cell explains these pushes: nothing is missing that they could show."
+
+
+def sentence(
+    verdict: str,
+    findings: Sequence[EffectFinding],
+    partly: Partly | None,
+    foil: Foil | None,
+    *,
+    fewest: int | None = None,
+    known: bool = True,
+) -> str:
+    """The verdict in words.
+
+    Args:
+        verdict: as in ``diagnosis.json``.
+        findings: the effects that are named.
+        partly: what takes a good part of a mismatch away, if something does.
+        foil: a law beside the catalogue that does better, if there is one.
+        fewest: pushes that it takes to say anything; None where there are as many.
+        known: whether the noise was stated or seen.
+    """
+    match verdict:
+        case "consistent" | "underpowered":
+            return _nothing_found(verdict, fewest=fewest, known=known)
+        case "unexplained" if partly is not None:
+            return (
+                "Simulation and recording differ, and nothing in the catalogue accounts for all of it:"
+                f" {' and '.join(partly.effects)} would take {_percent(partly.share)} of the squared error away."
+            )
+        case "unexplained" if foil is not None:
+            return (
+                f"Simulation and recording differ, and nothing in the catalogue accounts for it: {foil.instead_of}"
+                f" explains less than this would: {foil.statement}."
+            )
+        case "unexplained":
+            return "Simulation and recording differ, and nothing in the catalogue accounts for it."
+    names = [
+        f"{f.name} ({f.statement})"
+        + (f", or {' or '.join(f.indistinguishable_from)}" if f.indistinguishable_from else "")
+        for f in findings
+    ]
+    return "What is missing: " + "; and ".join(names) + "."
+
+
+def _percent(share: float) -> str:
+    return "more than 99 %" if share > 0.99 else f"{100.0 * share:.0f} %"
