@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import dataclasses as dc
 import os
+import signal
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from multiprocessing import parent_process
+from threading import current_thread, main_thread
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -123,6 +126,9 @@ def _window_forces(motion: Motion, middles: Array) -> Array:
 
 
 def _predict_many(spec: CellSpec, thetas: ThetaMap, tasks: Sequence[Task]) -> list[Prediction | None]:
+    # Ctrl-C goes to all processes of a terminal; the one that waits for these answers it, and ends them.
+    if parent_process() is not None and current_thread() is main_thread():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     return [predict(spec, thetas, task) for task in tasks]
 
 
