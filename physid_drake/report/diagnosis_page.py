@@ -135,6 +135,7 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "frame": "" if diagnosis.location is None else _frame(diagnosis.location.frame),
         "views": views_from_above(view),
         "errors": [error_figure(view, k, diagnosis.noise) for k in order[:MOST_ERRORS]],
+        "lets_go": any(view.shown[k].released is not None for k in order[:MOST_ERRORS]),
         "arrows": arrow_figure(view),
         "strips": strips[:MOST_STRIPS],
         "more_strips": strips[MOST_STRIPS:],
