@@ -205,7 +205,7 @@ def test_missing_mujoco_is_one_line_that_says_what_to_install(tmp_path, monkeypa
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{Path(run_prove.__file__).parents[1]}")
     assert main(["prove", "--worlds", "1", "--out", str(tmp_path / "out")]) == 1
     said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "pip install 'physid_drake[proof]'" in said
+    assert said.count("\n") == 1 and "pip install '.[proof]'" in said
 
 
 def task(tmp_path, name, code):

@@ -46,7 +46,7 @@ def test_missing_mujoco_says_what_to_install(monkeypatch):
         raise ImportError(name)
 
     monkeypatch.setattr(mujoco_world.importlib, "import_module", missing)
-    with pytest.raises(ProofError, match=r"pip install 'physid_drake\[proof\]'"):
+    with pytest.raises(ProofError, match=r"pip install '\.\[proof\]'"):
         PushWorld(PLAN)
 
 
