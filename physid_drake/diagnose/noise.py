@@ -186,8 +186,8 @@ def seen_noise(pieces: Sequence[tuple[Array, Array]], finest: float) -> SeenNois
     """The noise of rests (times, values), each with its mean.
 
     Posterior means of the logarithm of the variance and of the logit of the correlation, over a grid of the latter,
-    for each point of which the variance has an inverse gamma distribution. The likeliest values would be 9 % below a
-    noise that correlates by 0.82 from sample to sample in ten rests of a quarter of a second.
+    for each point of which the variance has an inverse gamma distribution. The restricted likelihood is that with the
+    means integrated out (Harville 1974).
 
     Args:
         pieces: rests.

@@ -136,7 +136,7 @@ class Flat:
         return u
 
     def fit(self, u, **_):
-        return self.seen_from(None, u)
+        return self.seen_from(None, getattr(u, "u", u))
 
     def linearise(self, u, **_):
         return self.seen_from(None, u)
@@ -147,9 +147,9 @@ class Flat:
         return SimpleNamespace(state=SimpleNamespace(u=u), pushes=pushes, reduced_chi2=left**2, score=-(left**2))
 
 
-@pytest.mark.parametrize(("searched", "ends"), [(0.9, 0.4), (0.35, 0.35)])
-def test_far_from_an_explanation_theta_also_starts_where_people_would(monkeypatch, searched, ends):
-    nominal = SimpleNamespace(nominal=np.array([0.4]), to_unit=lambda theta: theta)
+@pytest.mark.parametrize(("searched", "by_hand", "ends"), [(0.9, 0.4, 0.4), (0.35, 0.4, 0.35), (0.9, 0.301, 0.301)])
+def test_far_from_an_explanation_theta_also_starts_where_people_would(monkeypatch, searched, by_hand, ends):
+    nominal = SimpleNamespace(nominal=np.array([by_hand]), to_unit=lambda theta: theta)
     case = SimpleNamespace(thetas=SimpleNamespace(space=nominal), problems=[None] * 4)
     monkeypatch.setattr(plain, "Fitter", Flat)
     monkeypatch.setattr(plain, "search_theta", lambda *_: np.array([searched]))
