@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell.solid import solid_of
+from physid_drake.cell.touch import Tip
 from physid_drake.errors import RecordingError
 from physid_drake.recording import Box, Cylinder, PoseStream, Push, Recording
 
@@ -30,7 +31,9 @@ BESIDE = 0.05  # m between tip and object that no error of calibration explains
 
 def refusals(recording: Recording) -> tuple[str, ...]:
     """What an identification or a diagnosis would refuse, as far as places, times and masses say so; in words."""
-    checks: list[Callable[[], None]] = [partial(check_mass, recording), partial(check_hand_near, recording)]
+    checks: list[Callable[[], None]] = [
+        partial(check, recording) for check in (check_mass, check_hand_near, check_hand_outside)
+    ]
     for push in recording.pushes:
         checks += [
             partial(check_upright, recording, push),
@@ -129,6 +132,33 @@ def check_hand_near(recording: Recording) -> None:
             f"recording '{recording.name}': the object moves, but the hand stays {1e3 * min(gaps):.0f} mm or more"
             " away from it; are both streams in the same frame, and in m?"
         )
+
+
+def check_hand_outside(recording: Recording) -> None:
+    """Refuses a tip that reaches deep into every object as it sets it moving: a radius in mm, or another frame."""
+    if recording.hand is None:
+        return
+    depths = [depth for push in recording.pushes if (depth := _depth_at_touch(recording, push)) is not None]
+    if depths and min(depths) > BESIDE:
+        raise RecordingError(
+            f"recording '{recording.name}': the hand's tip, of radius {recording.hand.radius:g} m, is"
+            f" {1e3 * min(depths):.0f} mm or more inside the object as it begins to move; is the radius in m?"
+        )
+
+
+def _depth_at_touch(recording: Recording, push: Push) -> float | None:
+    """How deep [m] the tip is in the object as that has begun to move; None where it does not, or without a hand."""
+    assert recording.hand is not None
+    poses = push.object.planar
+    moved = np.linalg.norm(poses[:, :2] - poses[0, :2], axis=1) > MOVED
+    if push.hand is None or push.endpoint_only or not moved.any():
+        return None
+    first = int(np.argmax(moved))
+    time, (x, y, yaw) = push.object.times[first], poses[first]
+    hx, hy = (float(np.interp(time, push.hand.times, column)) for column in push.hand.positions[:, :2].T)
+    tip = Tip(solid_of(recording.object.shape).outline, recording.hand.radius)
+    gap, *_ = tip.gap(float(x), float(y), float(yaw), hx, hy)
+    return -gap
 
 
 def _moves(push: Push) -> bool:

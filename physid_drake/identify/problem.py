@@ -12,7 +12,14 @@ from physid_drake.cell import CellConfig, HandPath, Start
 from physid_drake.cell.hand_fit import fit_hand_paths, stream_std
 from physid_drake.errors import RecordingError
 from physid_drake.identify.force_windows import force_windows
-from physid_drake.identify.frames import check_clocks, check_hand_near, check_mass, check_on_table, check_upright
+from physid_drake.identify.frames import (
+    check_clocks,
+    check_hand_near,
+    check_hand_outside,
+    check_mass,
+    check_on_table,
+    check_upright,
+)
 from physid_drake.identify.hand_stream import beside_object, vertical_reach
 from physid_drake.recording import Cylinder as CylinderShape
 from physid_drake.recording import (
@@ -197,11 +204,12 @@ def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[Push
         height: of the object [m].
 
     Raises:
-        RecordingError: if the hand passes above the object or never comes near it, or if an object stands beside the
-            table, tips, has an impossible mass, or cannot be compared.
+        RecordingError: if the hand passes above the object, never comes near it or is far inside it, or if an object
+            stands beside the table, tips, has an impossible mass, or cannot be compared.
     """
     check_mass(recording)
     check_hand_near(recording)
+    check_hand_outside(recording)
     hands = {k: beside_object(recording, push, height, noise.position) for k, push in enumerate(recording.pushes)}
     moving = {k: hand for k, hand in hands.items() if hand is not None}
     fitted = fit_hand_paths([(hand.times, hand.positions[:, :2]) for hand in moving.values()], noise.hand)

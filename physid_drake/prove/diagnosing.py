@@ -156,8 +156,10 @@ class _Running:
             return Attempt(seconds=seconds, error=f"stopped after {timeout:g} s (--timeout).")
         if code == 0 and (self.task.folder / RESULT).is_file():
             return Attempt(seconds=seconds, error=None)
-        ended = f"signal {-code}" if code < 0 else f"exit status {code}"
-        return Attempt(seconds=seconds, error=_last_line(self.task.folder / LOG) or f"{ended}, without a word.")
+        last = _last_line(self.task.folder / LOG)
+        if code < 0:  # killed: its last line may tell how far it was, but hardly why
+            return Attempt(seconds=seconds, error=f"signal {-code}, after '{last}'.")
+        return Attempt(seconds=seconds, error=last or f"exit status {code}, without a word.")
 
     def interrupt(self) -> None:
         self._signal(signal.SIGINT)

@@ -201,6 +201,15 @@ def test_a_hand_that_never_comes_near_what_moves_is_refused(recording):
     first(replace(recording, pushes=(away(one), *others)))  # a push that misses
 
 
+def test_a_tip_that_is_larger_than_its_distance_is_refused(recording):
+    def with_radius(radius):
+        return replace(recording, hand=replace(recording.hand, radius=radius))
+
+    with pytest.raises(RecordingError, match=r"tip, of radius 10 m, is 9[0-9]{3} mm or more inside.* in m\?"):
+        first(with_radius(1e3 * recording.hand.radius))
+    first(with_radius(recording.hand.radius + 0.02))  # a wrong radius is for the diagnosis to find
+
+
 @pytest.mark.parametrize(("said", "believed"), [(5e-5, True), (5e-6, False)])
 def test_a_hand_that_is_louder_than_it_is_said_is_not_believed(recording, said, believed):
     rng = np.random.default_rng(0)

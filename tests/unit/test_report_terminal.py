@@ -27,3 +27,12 @@ def test_a_bar_takes_any_name_for_its_stage():
 def test_a_file_has_room_for_a_table(capsys):
     terminal().print("x" * NARROWEST)
     assert capsys.readouterr().out == "x" * NARROWEST + "\n"
+
+
+def test_a_log_says_every_stage_once_and_apart_from_the_results(capsys):
+    with progress_bar(terminal()) as tick:
+        for stage, done in (("search", 1), ("search", 2), (WORDS[1], 1)):
+            tick(stage, done, 2)
+    printed = capsys.readouterr()
+    assert [line.split(" s  ")[1] for line in printed.err.splitlines()] == ["search", WORDS[1]]
+    assert printed.out == ""

@@ -1,7 +1,9 @@
 """The ``diagnose`` command's refusals, and models that cannot be read: one clear line, nothing half-written."""
 
+import re
 import shutil
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -94,6 +96,20 @@ def test_a_model_survives_its_file(model, tmp_path):
     assert loaded.intervals == model.intervals and loaded.body.support_friction[0] == 0.3
     assert loaded.build().diagram.HasSubsystemNamed("plant")
     assert loaded.plain().effects == ()
+
+
+def test_a_push_is_simulated_as_the_docs_say(model, tmp_path, monkeypatch, capsys):
+    page = (Path(__file__).parents[2] / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    folder = tmp_path / "diagnoses" / "my_recording"
+    folder.mkdir(parents=True)
+    (folder / "model.yaml").write_text(model.dump(), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    said = {}
+    exec(block, said)
+    assert capsys.readouterr().out.startswith("[[")
+    touched, stopped = said["motion"].planar_at(np.array([0.5, 1.5]))[:, 0]
+    assert 0.03 < touched < stopped + 1e-3  # the tip ends at Bo's first place and has a radius; faces are 0.03 m away
 
 
 def test_a_tip_that_was_turned_stays_turned(model, tmp_path):
