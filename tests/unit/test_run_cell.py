@@ -173,7 +173,7 @@ def test_ctrl_c_keeps_what_was_found_and_the_same_command_goes_on(
     with monkeypatch.context() as patch:
         _CtrlC(patch, trial)
         assert quick(out, recording=recording, **SEARCH) == 130
-    assert capsys.readouterr().err.startswith("interrupted")
+    assert "interrupted" in capsys.readouterr().err
     assert {path.name for path in out.iterdir()} == {"config.yaml", "belief.npz"}
     with monkeypatch.context() as patch:
         count = _CtrlC(patch, trial=-1)
