@@ -23,6 +23,7 @@ from physid_drake.recording import digest_of, read_recording
 from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
 from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
 from physid_drake.report.progress import progress_bar
+from physid_drake.report.scene_page import scene_page
 from physid_drake.report.stage import ShownMotion, Stage
 from physid_drake.report.terminal import terminal
 from physid_drake.resources import shipped
@@ -144,7 +145,8 @@ def write(
     folder.forget("diagnosis.json")  # an earlier one's belongs to another model
     folder.write(page, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches, scene=scene))
     folder.write("model.yaml", model_of(diagnosis, evidence).dump())
-    folder.write(scene, staged(diagnosis, evidence).StaticHtml())
+    stage = staged(diagnosis, evidence).StaticHtml()
+    folder.write(scene, scene_page(stage, diagnosis, evidence.wrenches, unit_force_of(evidence)))
     folder.write("diagnosis.json", diagnosis_json(diagnosis))  # last: where it is, all is
 
 
@@ -158,5 +160,10 @@ def staged(diagnosis: Diagnosis, evidence: Evidence, meshcat: Meshcat | None = N
         task = evidence.fitter.task(as_told, i)
         scenes.append(ShownMotion(push=case.recording.pushes[i], motion=simulate(case.pool.spec, case.thetas, task)))
     stage.play(scenes)
-    stage.show_missing(evidence.wrenches, unit_force=0.1 * case.around.friction * case.around.weight)
+    stage.show_missing(evidence.wrenches, unit_force_of(evidence))
     return stage.meshcat
+
+
+def unit_force_of(evidence: Evidence) -> float:
+    """The force whose arrow has unit length [N]: a tenth of the friction."""
+    return 0.1 * evidence.case.around.friction * evidence.case.around.weight
