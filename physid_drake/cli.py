@@ -135,7 +135,12 @@ def _register_prove(subparsers: Subparsers) -> None:
     parser.add_argument("--worlds", type=int, metavar="N", help="how many (default 200)")
     parser.add_argument("--quick", action="store_true", help="ten worlds")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all worlds (default 0)")
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where all goes (default: proofs/seed_N)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FOLDER",
+        help="where all goes (default: proofs/seed_N, proofs/seed_N_KIND or proofs/real)",
+    )
     parser.add_argument(
         "--kind", choices=["none", "effect", "other", "pair"], help="only such worlds (default: a mix)"
     )
@@ -220,7 +225,12 @@ def _register_experiment(subparsers: Subparsers) -> None:
     parser.add_argument("--data", type=Path, metavar="FOLDER", help="of mit_pushes: the published end points")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="repetitions at a time (default 1)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (default 0)")
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where results go (default: experiments/NAME)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FOLDER",
+        help="where results go (default: experiments/NAME, with --quick NAME_quick)",
+    )
     parser.set_defaults(run=_run_experiment)
 
 

@@ -56,7 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("error: " + " ".join(str(error).split()), file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("interrupted; what was found is kept, and the same command goes on from there", file=sys.stderr)
+        print("interrupted; the same command goes on from what is kept", file=sys.stderr)
         return 130
     return 0
 

@@ -18,7 +18,7 @@ class Scenario:
         cell: contact, solver, friction cells.
         theta: the unknowns.
         search: how theta is searched for.
-        plan: the sweep over a policy with what was identified.
+        plan: the search over a policy with what was identified.
     """
 
     recording: str = "eraser_reference"

@@ -186,7 +186,7 @@ def _add_table(plant: MultibodyPlant, edge: Array | None, hydroelastic: bool) ->
     world = plant.world_body()
     properties = contact_properties(friction=TABLE_FRICTION, stiffness=1e12)
     if hydroelastic:
-        # The modulus is written by the mass setter, which knows the weight.
+        # The modulus is written by the support's setter, which knows the weight.
         AddCompliantHydroelasticPropertiesForHalfSpace(SLAB_THICKNESS, 1e4, properties)
     if edge is None:
         return plant.RegisterCollisionGeometry(world, RigidTransform(), HalfSpace(), "table", properties)

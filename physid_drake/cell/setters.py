@@ -85,7 +85,7 @@ class ParameterSetter:
         """
         part = self.part_of(body)
         if np.array_equal(part, self.value(root)):
-            return  # replacing the properties of thirty geometries takes as long as twenty steps
+            return  # replacing the properties of all support points takes as long as twenty steps
         context = self.system.GetMyMutableContextFromRoot(root)
         self.system.get_mutable_source_value(context).SetFromVector(part)
         self.write(root, part)

@@ -25,7 +25,7 @@ class LinearPush:
         shared: (m, d) derivatives of the prediction with respect to beta.
         own: (m, k) with respect to the push's unknowns, in units of their priors.
         noise: (m, m) covariance.
-        friction: column of ``own`` that is the push's friction, in units of ``unit_scatter``.
+        friction: column of ``own`` that is the push's friction, in units of ``UNIT_SCATTER``.
     """
 
     residual: Array

@@ -65,7 +65,6 @@ class Score:
         signature: the family's.
         kept: indices of its directions that may be used (one-sided ones only if their sign is right).
         coefficients: (p,) best steps; 0 in directions not kept.
-        theta: (d,) change of theta in the unit cube that goes with it.
         gain: twice the gain in log likelihood, or what is as unlikely as the rank correlation that was found.
         log_p: of that gain, by an F distribution with the push as the unit (``log_probability``).
         others: the scores of the effect's other families.
@@ -74,7 +73,6 @@ class Score:
     signature: Signature
     kept: tuple[int, ...]
     coefficients: Array
-    theta: Array
     gain: float
     log_p: float
     others: tuple[Score, ...] = ()
@@ -210,7 +208,7 @@ def by_trend(fitted: Fitted, one: Score) -> Score:
         return dc.replace(one, log_p=min(0.0, one.log_p + two_looks))
     log_p = min(0.0, by_rank + two_looks)
     return dc.replace(
-        one, kept=(0,), coefficients=np.array([slope]), theta=np.zeros(len(fitted.state.u)), log_p=log_p,
+        one, kept=(0,), coefficients=np.array([slope]), log_p=log_p,
         gain=max(one.gain, _gain_at(log_p, 1, len(fitted.pushes), fitted.own_dimension)),
     )  # fmt: skip
 
@@ -279,19 +277,17 @@ def score(fitted: Fitted, signature: Signature) -> Score:
         mean = np.concatenate([fitted.prior_mean, np.zeros(len(kept))])
         std = np.concatenate([fitted.prior_std, np.array(signature.stds)[kept]])
         scatter, value = best_scatter(pushes, mean, std)
-        everything = solve(Whitened.of(pushes, scatter), mean, std).beta
-        theta, beta = everything[: len(fitted.state.u)], everything[len(fitted.prior_mean) :]
+        beta = solve(Whitened.of(pushes, scatter), mean, std).beta[len(fitted.prior_mean) :]
         wrong = [k for k, b in zip(kept, beta, strict=True) if signature.one_sided[k] and b < 0.0]
         if not wrong:
             coefficients[kept] = beta
             gain = max(0.0, 2.0 * (value - fitted.score))
             log_p = log_probability(gain, len(kept), len(pushes), fitted.own_dimension)
             return Score(
-                signature=signature, kept=tuple(kept), coefficients=coefficients, theta=theta, gain=gain, log_p=log_p
+                signature=signature, kept=tuple(kept), coefficients=coefficients, gain=gain, log_p=log_p
             )  # fmt: skip
         kept = [k for k in kept if k not in wrong]
-    nothing = np.zeros(len(fitted.state.u))
-    return Score(signature=signature, kept=(), coefficients=coefficients, theta=nothing, gain=0.0, log_p=0.0)
+    return Score(signature=signature, kept=(), coefficients=coefficients, gain=0.0, log_p=0.0)
 
 
 def log_probability(gain: float, directions: int, pushes: int, spent: int) -> float:

@@ -24,7 +24,7 @@ from physid_drake.recording import Box, Cylinder, MeshShape, Prism, Shape
 
 Array = NDArray[np.float64]
 GRID = 3  # weights along a side
-# Directions of the score test: more at the ends of x, more at the ends of y, more in two opposite corners.
+# Of the grid's cells along a side, from -1 to 1.
 _MIDDLES = (np.arange(GRID) - 0.5 * (GRID - 1)) / (0.5 * (GRID - 1))
 
 

@@ -157,7 +157,7 @@ class _EllipseLaw:
 class FrictionPatch(Effect):
     """A round region of the table whose friction is ``ratio`` times that of the rest; its edge is sharp.
 
-    Larger than what a support point stands for (a thirtieth of the base): that is how sharply the cell sees an edge.
+    Larger than what a support point stands for: that is how sharply the cell sees an edge.
     """
 
     name: ClassVar[str] = "friction_patch"

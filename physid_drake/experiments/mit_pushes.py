@@ -103,6 +103,7 @@ class MitPushes:
             take hours.
         budget: trials of a method, one of them a rollout of the training pushes.
         other_pushes, other_folds, other_budget: of every other table.
+        others: names of these tables.
     """
 
     seed: int

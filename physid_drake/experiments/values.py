@@ -17,8 +17,6 @@ Array = NDArray[np.float64]
 Record = dict[str, Any]
 """What one repetition found: names to numbers, texts, lists and further records, as JSON has them."""
 
-"""Told a stage, steps done and steps in all."""
-
 Entry = str | float | int | None
 
 

@@ -42,7 +42,7 @@ class Estimate:
         name, unit: which.
         value: best estimate.
         ci90: 90 % interval.
-        identifiable: whether the pushes say more than the prior did.
+        identifiable: whether the pushes leave at most half of the prior's spread (``TOLD``).
         prior: its value before.
     """
 

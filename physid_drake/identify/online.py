@@ -52,8 +52,8 @@ class OnlineBelief:
         scatter: of friction from push to push [-].
         inflation: by which the noise is widened where the pushes are not explained, at least 1.
         noise: of the recording; None before the first push.
-        search: of the newest push; its belief was begun from P_{t-1}. None before the first push.
-        foreseen: how well each push was predicted before it was learned from; None where that rollout diverged.
+        search: of the newest push, over candidates drawn from P_{t-1}. None before the first push.
+        foreseen: how well each push was predicted before it was learned from; infinite where that rollout diverged.
         fitted: how well each push was predicted right after.
         rollouts: made so far.
     """
@@ -138,9 +138,8 @@ class OnlineIdentifier:
     def learn(self, belief: OnlineBelief, push: Push) -> OnlineBelief:
         """P_{t+1} from P_t and one new push.
 
-        A small search over candidates drawn from P_t finds where the new push is explained: its Gaussian process
-        begins from P_t, as in the paper. Gauss-Newton steps on the new push and the earlier pushes' information go
-        on from the trial of least posterior cost.
+        A small search over candidates drawn from P_t finds where the new push is explained. Gauss-Newton steps on the
+        new push and the earlier pushes' information go on from the trial of least posterior cost.
 
         A push whose rollouts diverge changes nothing but is counted in ``foreseen``.
 

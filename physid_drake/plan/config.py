@@ -1,4 +1,4 @@
-"""Configuration of the sweep in the main job: plain data for Drake's typed YAML loader, no deferred annotations."""
+"""Configuration of the plan in the main job: plain data for Drake's typed YAML loader, no deferred annotations."""
 
 import dataclasses as dc
 

@@ -1,4 +1,4 @@
-"""Planning as a Drake system: it sweeps a policy under the belief once there is an identification."""
+"""Planning as a Drake system: it searches a policy under the belief once there is an identification."""
 
 from __future__ import annotations
 

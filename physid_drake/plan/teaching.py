@@ -73,7 +73,7 @@ def most_informative_push(
         scatter: of friction from push to push [-].
         inflation: by which the noise was widened where the cell does not explain the pushes.
         order: number of the push in the recording.
-        hand_height: of the tip's centre above the table [m]; None for half the object's height.
+        hand_height: of the tip's contact above the table [m]; None for half the object's height.
 
     Raises:
         ConfigError: if there is no push, the cell has no hand, or a push cannot be made.

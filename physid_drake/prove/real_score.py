@@ -66,7 +66,7 @@ class RealOutcome:
         rotation: held-out errors [rad], before and after.
         fresh: end-point errors [m, rad] of the model on pushes that the diagnosis did not get.
         published: name to end-point errors [m, rad] of the publishers' models on the diagnosed pushes.
-        pressure: the map that was found, where the points are known and a map was found.
+        pressure: the map that was found; None where none was.
         seconds: that the diagnosis took.
     """
 

@@ -18,8 +18,8 @@ FAILED = "failed"
 CLEAR = 5.0  # standard deviations of motion: an effect that must be found
 MOST_NAMES = 2  # in a class that counts as the right answer
 _NO_ERRORS = (math.nan, math.nan, math.nan)
-# Components of one vector: their errors are over its length, since one of them may be next to nothing.
 _HALF_TURN = math.pi  # rad: a grain is the same from both sides
+# Components of one vector: their errors are over its length, since one of them may be next to nothing.
 _VECTORS = (("x", "y"), ("slope_x", "slope_y"))
 
 

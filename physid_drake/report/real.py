@@ -1,4 +1,4 @@
-"""What a proof on real recordings shows: tables, ``real.json``, pressure maps from below."""
+"""What a proof on real recordings shows: tables, ``real.json``, pressure maps from above."""
 
 from __future__ import annotations
 
