@@ -22,7 +22,7 @@ from physid_drake.effects import Effect
 from physid_drake.progress import Progress
 
 MOST_EFFECTS = 3
-LONGEST = 450  # rollouts per push, after the first score tests, after which no further effect is looked for
+LONGEST = 450  # rollouts per push, after the first score tests, after which only what is near is grown further
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
 WIDE = 2.0  # times the usual scatter of friction: it may be what is missing in disguise
 HOPELESS = 6.0  # cost per degree of freedom: two effects that leave as much are not made right by a third one
@@ -108,7 +108,13 @@ class Growth:
         pool = fitter.case.pool
         longest = pool.count + LONGEST * len(fitter.case.problems)
         most = min(MOST_EFFECTS, len(self.kinds))
-        while len(steps) < most and pool.count < longest and last.p_value < self.alpha:
+
+        def may_grow(model: Fitted) -> bool:
+            # The first of two effects may take long to find its place, and the second one is easy beside it.
+            near = len(steps) > 0 and model.reduced_chi2 <= FAR_OFF
+            return len(steps) < most and (near or pool.count < longest)
+
+        while may_grow(last.fitted) and last.p_value < self.alpha:
             candidates = confirm(fitter, last.fitted, last.screening.scores, tick, most=CANDIDATES - len(steps))
             if not steps and candidates:
                 better = self.plain_from(base.fitted, candidates[0])
@@ -135,7 +141,7 @@ class Growth:
             tick(f"model with {' and '.join(step[0].name for step in steps)}", 0, 0)
             model = self._model_with(state, last.fitted)
             hopeless = len(steps) > 1 and model.reduced_chi2 > HOPELESS
-            more = not hopeless and len(steps) < MOST_EFFECTS and pool.count < longest
+            more = not hopeless and may_grow(model)
             last = self._what_is_left(model, last.signatures, self.alpha if more else 0.0)
             if hopeless or not last.leads_on:
                 break

@@ -321,3 +321,29 @@ def test_a_model_that_is_far_off_goes_to_a_better_theta_beside_its_effects(monke
     found = growth(thetas)._from_another_theta(model)
     assert (found.state.u[0], thetas.fits) == (end, fits)
     assert beside == [effects] and found.state.effects == effects
+
+
+@pytest.mark.parametrize(("left", "added"), [(2.0, 2), (4.0, 1)])
+def test_what_took_long_goes_on_only_near_an_explanation(monkeypatch, left, added):
+    pool = SimpleNamespace(count=0)
+    costs = iter([left, 1.0])
+
+    def confirm(*_, **__):
+        pool.count += 2 * grow.LONGEST * PUSHES
+        return (SimpleNamespace(name="one", fitted=SimpleNamespace(state=None)),)
+
+    def looked(cost):
+        p_value = 0.5 if cost <= 1.0 else 1e-9
+        return SimpleNamespace(
+            fitted=SimpleNamespace(reduced_chi2=cost), screening=SimpleNamespace(scores=()), signatures=(),
+            p_value=p_value, leads_on=True,
+        )  # fmt: skip
+
+    monkeypatch.setattr(grow, "confirm", confirm)
+    monkeypatch.setattr(grow, "worth_adding", lambda base, last, candidates: candidates)
+    monkeypatch.setattr(grow.Growth, "plain_from", lambda *_: None)
+    monkeypatch.setattr(grow.Growth, "_model_with", lambda *_: SimpleNamespace(reduced_chi2=next(costs)))
+    monkeypatch.setattr(grow.Growth, "_what_is_left", lambda self, model, *_: looked(model.reduced_chi2))
+    case = SimpleNamespace(pool=pool, problems=range(PUSHES))
+    growing = dc.replace(growth(SimpleNamespace(case=case)), kinds=(None,) * 3)
+    assert len(growing._added_to(looked(70.0)).steps) == added
