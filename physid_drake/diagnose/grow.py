@@ -22,7 +22,7 @@ from physid_drake.effects import Effect
 from physid_drake.progress import Progress
 
 MOST_EFFECTS = 3
-LONGEST = 450  # rollouts per push, after the first score tests, after which only what is near is grown further
+LONGEST = 450  # rollouts per push, after the first score tests, after which only an answer is grown further
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
 WIDE = 2.0  # times the usual scatter of friction: it may be what is missing in disguise
 HOPELESS = 6.0  # cost per degree of freedom: two effects that leave as much are not made right by a third one
@@ -110,9 +110,9 @@ class Growth:
         most = min(MOST_EFFECTS, len(self.kinds))
 
         def may_grow(model: Fitted) -> bool:
-            # The first of two effects may take long to find its place, and the second one is easy beside it.
-            near = len(steps) > 0 and model.reduced_chi2 <= FAR_OFF
-            return len(steps) < most and (near or pool.count < longest)
+            # The first of two effects may take long to find its place: what would be the answer is looked at again.
+            answer = len(steps) > 0 and not unexplained(base.fitted, model)
+            return len(steps) < most and (answer or pool.count < longest)
 
         while may_grow(last.fitted) and last.p_value < self.alpha:
             candidates = confirm(fitter, last.fitted, last.screening.scores, tick, most=CANDIDATES - len(steps))

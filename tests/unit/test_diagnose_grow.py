@@ -324,7 +324,7 @@ def test_a_model_that_is_far_off_goes_to_a_better_theta_beside_its_effects(monke
 
 
 @pytest.mark.parametrize(("left", "added"), [(2.0, 2), (4.0, 1)])
-def test_what_took_long_goes_on_only_near_an_explanation(monkeypatch, left, added):
+def test_what_took_long_goes_on_only_if_it_would_be_the_answer(monkeypatch, left, added):
     pool = SimpleNamespace(count=0)
     costs = iter([left, 1.0])
 
@@ -340,6 +340,7 @@ def test_what_took_long_goes_on_only_near_an_explanation(monkeypatch, left, adde
         )  # fmt: skip
 
     monkeypatch.setattr(grow, "confirm", confirm)
+    monkeypatch.setattr(grow, "unexplained", lambda base, model: model.reduced_chi2 > 3.0)
     monkeypatch.setattr(grow, "worth_adding", lambda base, last, candidates: candidates)
     monkeypatch.setattr(grow.Growth, "plain_from", lambda *_: None)
     monkeypatch.setattr(grow.Growth, "_model_with", lambda *_: SimpleNamespace(reduced_chi2=next(costs)))
