@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
 
-Show = Callable[[str, int, int], None]
+from physid_drake.progress import Progress
 
 
 @contextmanager
-def progress_bar(console: Console) -> Iterator[Show]:
+def progress_bar(console: Console) -> Iterator[Progress]:
     """Show how far it is while the block runs; the function it gives takes stage, done and total (0 if unknown)."""
     if not console.is_terminal:
         yield _in_lines()
@@ -25,16 +26,16 @@ def progress_bar(console: Console) -> Iterator[Show]:
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("starting", total=None)
+    with Bar(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("starting", total=None)
 
         def show(stage: str, done: int, total: int) -> None:
-            progress.update(task, description=stage, completed=done, total=total or None)
+            bar.update(task, description=stage, completed=done, total=total or None)
 
         yield show
 
 
-def _in_lines() -> Show:
+def _in_lines() -> Progress:
     """For a log, where a bar cannot be redrawn; results stay alone on standard output."""
     since, last = time.monotonic(), ""
 
