@@ -32,12 +32,12 @@ def scene_page(html: str, diagnosis: Diagnosis, wrenches: Sequence[MissingWrench
     """
     legend = [
         (_css(RECORDED), "object as recorded, and its paths"),
-        (_css(SIMULATED), "as the model that leaves has it"),
+        (_css(SIMULATED), "as simulated with model.yaml"),
     ]
     if any(w.stands_out for w in wrenches):
         legend.append((_css(MISSING), "force that the plain cell lacks"))
     if any(not w.stands_out for w in wrenches):
-        legend.append((_css(NOTHING), "the same, but within two standard deviations of nothing"))
+        legend.append((_css(NOTHING), "force that is within two standard deviations of nothing"))
     panel = Environment(undefined=StrictUndefined, autoescape=True).from_string(_PANEL).render(
         name=diagnosis.recording, sentence=diagnosis.sentence, legend=legend, arrow=ARROW,
         unit_force=unit_force if wrenches else None,
