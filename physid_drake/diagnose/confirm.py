@@ -57,6 +57,7 @@ def confirm(
         tick(f"fit with {one.kind.name}", k, len(worth))
         step.found.append(_candidate(fitter, one, _fit(fitter, before, one), step.plain))
     step.found = _tried_elsewhere(fitter, before, ranked(step.found), step.plain, tick)
+    step.found = _gone_on_with(fitter, before, step.found, step.plain, tick)
     for k in _once_more(step.found):
         step.fit_once_more(k)
     step.found = _tried_from_nearer_theta(fitter, before, ranked(step.found), step.plain, tick)
@@ -124,6 +125,29 @@ def _tried_elsewhere(
         better = _fit_elsewhere(fitter, before, tried[k])
         if better is not None:
             tried[k] = _candidate(fitter, tried[k].score, better, plain)
+    return ranked(tried)
+
+
+def _gone_on_with(
+    fitter: Fitter, before: Fitted, found: Sequence[Candidate], plain: Array, tick: Progress
+) -> list[Candidate]:
+    """The candidates; where none leads near an explanation, the best fits gone on with before one is chosen.
+
+    Far off, the derivatives of the model before end a fit long before its effect is where it belongs, and which got
+    further by then says little. Beside another effect only: the first is fitted from the best of a scan as well.
+    """
+    tried = list(found)
+    if any(c.fitted.reduced_chi2 <= FAR_OFF for c in found) or not before.state.effects:
+        return tried
+    rivals = [k for k, c in enumerate(found) if worthwhile(before, c)][:PERSISTENT]
+    if len(rivals) < PERSISTENT:
+        return tried
+    for k in rivals:
+        one, stopped = found[k], found[k].fitted.state
+        tick(f"fit with {one.name} gone on with", 0, 0)
+        further = fitter.fit(fitter.start(stopped.u, stopped.effects), rounds=7, careful=4, renew=True)
+        if further.score > one.fitted.score:
+            tried[k] = _candidate(fitter, one.score, further, plain)
     return ranked(tried)
 
 
