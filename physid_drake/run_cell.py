@@ -1,10 +1,11 @@
-"""The main job: build the cell, read a recording, identify, show. ``python -m physid_drake.run_cell --help``."""
+"""The main job: read a recording, identify, diagnose, plan, show. ``python -m physid_drake.run_cell --help``."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from rich.console import Console
 
-from physid_drake.diagnose import case_of
+from physid_drake.diagnose import Diagnosis, case_of, model_of
 from physid_drake.diagnose.memory import Memory
 from physid_drake.errors import ConfigError, PhysidError
 from physid_drake.identify import Identification, Identifier, OnlineIdentifier
@@ -20,7 +21,8 @@ from physid_drake.identify.nuisance import nuisance_of
 from physid_drake.identify.problem import usual_tip_height
 from physid_drake.identify.rollouts import Task, simulate
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
-from physid_drake.plan import Plan
+from physid_drake.model import Model
+from physid_drake.plan import Outcome, Plan, outcome_under
 from physid_drake.plan.system import Planner, PolicySystem, identified_model, planner_of
 from physid_drake.progress import Progress
 from physid_drake.recording import Recording, digest_of, read_recording
@@ -41,7 +43,8 @@ from physid_drake.scenario import dump_scenario, load_scenario
 from physid_drake.scenario_schema import Scenario
 
 BELIEF = "belief.npz"  # of an interrupted identification
-DIAGNOSIS = ("diagnosis.json", "diagnosis.html", "scene.html")
+DIAGNOSIS_PAGE = "diagnosis.html"
+DIAGNOSIS = ("diagnosis.json", DIAGNOSIS_PAGE, "scene.html")
 RESULTS = ("result.json", "page.html", "model.yaml", *DIAGNOSIS, *PLAN)
 SHOWN = 12  # pushes in the animation, held-out ones first
 
@@ -65,7 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m physid_drake.run_cell", description=__doc__)
     parser.add_argument(
         "config", nargs="?", metavar="CONFIG",
-        help="FILE or FILE:SCENARIO (default: the shipped eraser; with --recording, the defaults)",
+        help="FILE or FILE:SCENARIO (default: the shipped sealed; with --recording, the defaults)",
     )  # fmt: skip
     parser.add_argument("--recording", metavar="FOLDER", help="the pushes, instead of the scenario's")
     parser.add_argument(
@@ -104,8 +107,9 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     stage = stage or Stage(recording)
     marks = stage.play(_scenes(result, identifier, recording))
     note = f"{recording.description} Seed {scenario.seed}; {identifier.pool.count} rollouts."
-    page = result_page(stage.meshcat.StaticHtml(), result, name=recording.name, marks=marks, note=note, plan=plan)
-    folder.write("page.html", page)
+    html = stage.meshcat.StaticHtml()
+    page = partial(result_page, html, result, name=recording.name, marks=marks, note=note)
+    folder.write("page.html", page(plan=plan))
     folder.write("result.json", result_json(result, recording, scenario.seed, versions()))
     for stale in DIAGNOSIS:  # an earlier run's, of another model
         folder.forget(stale)
@@ -114,7 +118,13 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     console.print(f"written: result.json, page.html and model.yaml in {folder.path}")
     _keep_plan(plan, scenario, folder, console)
     if not arguments.no_diagnosis:
-        _diagnose(scenario, recording, folder, console)
+        diagnosis, found = _diagnose(scenario, recording, folder, console)
+        said, plain_push = (diagnosis.sentence, DIAGNOSIS_PAGE), None
+        if planner is not None and plan is not None and found.effects:
+            plan, plain_push = _planned_again(planner, plan, diagnosis, found, console)
+            _keep_plan(plan, scenario, folder, console, plain_push=plain_push)
+        folder.write("page.html", page(plan=plan, plain_push=plain_push, diagnosis=said))
+    folder.forget(STATE)
     folder.forget(BELIEF)
     _keep_serving(arguments.no_view, stage, console)
 
@@ -130,25 +140,40 @@ def _show(result: Identification, identifier: Identifier, recording: Recording, 
         console.print(f"{identifier.pool.diverged} of {identifier.pool.count} rollouts diverged and count as failed.")
 
 
-def _keep_plan(plan: Plan | None, scenario: Scenario, folder: RunFolder, console: Console) -> None:
-    """Show and write the plan; an earlier run's is dropped."""
+def _keep_plan(
+    plan: Plan | None, scenario: Scenario, folder: RunFolder, console: Console, *, plain_push: Outcome | None = None
+) -> None:
+    """Show and write the plan; an earlier one is dropped."""
     forget_plan(folder)
     if plan is None:
         return
-    write_plan(folder, plan, seed=scenario.seed, page=None)
-    console.print(plan_table(plan))
+    write_plan(folder, plan, seed=scenario.seed, plain_push=plain_push, page=None)
+    console.print(plan_table(plan, plain_push=plain_push))
     console.print(f"written: plan.json and {', '.join(push_files(plan))} in {folder.path}")
 
 
-def _diagnose(scenario: Scenario, recording: Recording, folder: RunFolder, console: Console) -> None:
+def _diagnose(
+    scenario: Scenario, recording: Recording, folder: RunFolder, console: Console
+) -> tuple[Diagnosis, Model]:
     """Say what physics is missing, and keep the model with it."""
     case = case_of(recording, scenario.cell, scenario.theta, jobs=scenario.search.jobs)
     memory = Memory(folder.path / STATE)
     diagnosis, evidence = run_case(case, console, seed=scenario.seed, alpha=ALPHA, memory=memory)
-    write(folder, diagnosis, evidence, page="diagnosis.html")
-    folder.forget(STATE)
+    write(folder, diagnosis, evidence, page=DIAGNOSIS_PAGE)
     show(console, diagnosis)
     console.print(f"written: diagnosis.json, diagnosis.html, scene.html and model.yaml in {folder.path}")
+    return diagnosis, model_of(diagnosis, evidence)
+
+
+def _planned_again(
+    planner: Planner, plain: Plan, diagnosis: Diagnosis, found: Model, console: Console
+) -> tuple[Plan, Outcome]:
+    """The plan with the effects that were found, and what comes of the one that was made without them."""
+    console.print(f"Planned again, with {' and '.join(e.name for e in found.effects)}:")
+    scatter, pushes = diagnosis.friction_scatter, len(diagnosis.fit.per_push)
+    with progress_bar(console) as bar:
+        again = planner.with_model(found, friction_scatter=scatter, pushes=pushes, tick=bar)
+    return again, outcome_under(plain, found)
 
 
 def _live(recording: Recording, console: Console) -> Stage:

@@ -15,11 +15,11 @@ from physid_drake.errors import ConfigError
 from physid_drake.identify.polish import scatter_freedom
 from physid_drake.model import Model
 from physid_drake.model_reading import load_model
-from physid_drake.plan import DistanceToGoal, Plan, Situation, plan
+from physid_drake.plan import DistanceToGoal, Outcome, Plan, Situation, plan
 from physid_drake.plan.draws import uncertain_names
 from physid_drake.plan.story import outcome_under
 from physid_drake.plan.task import Choices, policy_for
-from physid_drake.plan.trajectory import Trajectory, tip_height_of
+from physid_drake.plan.trajectory import tip_height_of
 from physid_drake.policies import push_csv
 from physid_drake.report.plan import plan_json, plan_table, push_files
 from physid_drake.report.plan_page import plan_page, plan_png
@@ -93,8 +93,8 @@ def _budget(settings: int) -> int:
 
 
 def write(
-    folder: RunFolder, made: Plan, *, seed: int, with_effects: tuple[Trajectory, float] | None = None,
-    page: str | None = "page.html",
+    folder: RunFolder, made: Plan, *, seed: int, with_effects: Outcome | None = None,
+    plain_push: Outcome | None = None, page: str | None = "page.html",
 ) -> None:  # fmt: skip
     """Write ``plan.json``, the hand's paths, and with ``page`` the picture and the page.
 
@@ -108,7 +108,9 @@ def write(
     if page is not None:
         folder.write_bytes("plan.png", plan_png(made))
         folder.write(page, plan_page(made, seed=seed, with_effects=with_effects))
-    folder.write("plan.json", plan_json(made, seed=seed, with_effects=with_effects))  # last: where it is, all is
+    folder.write(
+        "plan.json", plan_json(made, seed=seed, with_effects=with_effects, plain_push=plain_push)
+    )  # last: where it is, all is
 
 
 def forget(folder: RunFolder) -> None:

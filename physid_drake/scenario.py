@@ -21,7 +21,7 @@ from physid_drake.scenario_schema import Scenario
 from physid_drake.search import SEARCHES
 from physid_drake.yaml_text import parsed, read_yaml
 
-DEFAULT = "eraser.yaml"
+DEFAULT = "sealed.yaml"
 
 
 def load_scenario(

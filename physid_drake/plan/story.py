@@ -21,6 +21,7 @@ from physid_drake.progress import Progress
 from physid_drake.search import SearchResult, search_minimum, search_named
 
 Array = NDArray[np.float64]
+Outcome = tuple[Trajectory, float]  # and its cost [m]
 
 CANDIDATES = 256
 REFINE_EVERY = 6  # trials: candidates gather where the best setting may be
@@ -217,7 +218,7 @@ def spread_of(
     )
 
 
-def outcome_under(made: Plan, model: Model) -> tuple[Trajectory, float]:
+def outcome_under(made: Plan, model: Model) -> Outcome:
     """What another model says of a plan's push: its trajectory and cost [m]."""
     pushes, path = made.policy.pushes(made.settings), made.predicted.paths[0]
     trajectory = trajectory_of(model, pushes, made.situation, path=path, believed=made.model)

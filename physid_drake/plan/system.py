@@ -166,13 +166,27 @@ class Planner:
             tick: told stage, steps done and steps in all.
         """
         model = identified_model(result, self.spec, self.name, tip_height=self.tip_height)
+        polished = result.polished
+        return self.with_model(
+            model, friction_scatter=polished.friction_scatter, pushes=len(polished.residuals), tick=tick
+        )
+
+    def with_model(self, model: Model, *, friction_scatter: float, pushes: int, tick: Progress | None = None) -> Plan:
+        """Plan with a model of the object, such as the one that a diagnosis leaves.
+
+        Args:
+            model: the cell, with intervals, and with effects.
+            friction_scatter: of support friction from push to push [-].
+            pushes: that it was learnt from.
+            tick: told stage, steps done and steps in all.
+        """
         stream = np.random.SeedSequence(self.seed).spawn(_STREAM + 1)[_STREAM]
         return plan(
             model, policy_for(self.config.policy, model, self.situation.start, self.goal),
             DistanceToGoal(goal=self.goal), situation=self.situation, rng=np.random.default_rng(stream),
             budget=self.config.budget, draws=self.config.draws, sweep=self.config.sweep,
-            tolerance=self.config.tolerance_m, friction_scatter=result.polished.friction_scatter,
-            scatter_freedom=scatter_freedom(len(result.polished.residuals)), tick=tick,
+            tolerance=self.config.tolerance_m, friction_scatter=friction_scatter,
+            scatter_freedom=scatter_freedom(pushes), tick=tick,
         )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 
 from physid_drake.identify import CellsTold, Identification
-from physid_drake.plan import Plan
+from physid_drake.plan import Outcome, Plan
 from physid_drake.report.cells import cells_figure, cells_verdict, combination_text
 from physid_drake.report.panel import with_panel
 from physid_drake.report.plan import plan_rows
@@ -17,6 +17,7 @@ from physid_drake.report.tables import accuracy_cells, verdict
 _PANEL = """
 <div id="physid"><details open><summary><b>{{ name }}</b></summary>
   <p>{{ verdict }}</p>
+  {% if diagnosis %}<p><a href="{{ diagnosis.page }}">Diagnosis</a>: {{ diagnosis.sentence }}</p>{% endif %}
   <h2>theta</h2>
   <table><tr><th>parameter</th><th>estimate</th><th>90 % interval</th><th>told</th></tr>
   {% for e in estimates %}<tr><td>{{ e.name }}</td><td>{{ "%.4g" % e.value }} {{ "" if e.unit == "-" else e.unit }}</td>
@@ -56,6 +57,8 @@ def result_page(
     marks: list[tuple[str, float]],
     note: str,
     plan: Plan | None = None,
+    plain_push: Outcome | None = None,
+    diagnosis: tuple[str, str] | None = None,
 ) -> str:
     """Meshcat's static page with a panel of results.
 
@@ -65,7 +68,9 @@ def result_page(
         name: of the recording.
         marks: name and start in the animation [s] of every push shown.
         note: one line on how it was made.
-        plan: the plan made with the identified theta, whose curve is shown; None for none.
+        plan: the plan made with what was found, whose curve is shown; None for none.
+        plain_push: what comes, according to the plan's model, of the push that was planned without its effects.
+        diagnosis: its sentence, and the file of its page; None where there is none.
     """
     rows = [
         ("held out, before", result.before),
@@ -81,7 +86,8 @@ def result_page(
         accuracy=[(label, accuracy_cells(a)) for label, a in rows if a is not None],
         marks=marks,
         note=note,
-        plan=None if plan is None else _shown_plan(plan),
+        plan=None if plan is None else _shown_plan(plan, plain_push),
+        diagnosis=None if diagnosis is None else {"sentence": diagnosis[0], "page": diagnosis[1]},
         cells=None if result.cells is None else _shown_cells(result.cells),
     )
     return with_panel(html, panel)
@@ -95,10 +101,11 @@ def _shown_cells(cells: CellsTold) -> dict[str, Any]:
     return {"map": cells_figure(cells), "rows": rows, "verdict": cells_verdict(cells)}
 
 
-def _shown_plan(plan: Plan) -> dict[str, Any]:
+def _shown_plan(plan: Plan, plain_push: Outcome | None) -> dict[str, Any]:
+    known = " and ".join(e.name for e in plan.model.effects) or "the identified theta"
     return {
-        "title": f"plan: {plan.policy.name}, with the identified theta",
-        "rows": plan_rows(plan),
+        "title": f"plan: {plan.policy.name}, with {known}",
+        "rows": plan_rows(plan, plain_push=plain_push),
         "curve": curve_svg(plan) if plan.sweep else "",
         "caption": caption_of(plan) if plan.sweep else "",
     }

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from physid_drake.plan import DistanceToGoal, Ending, Plan, Spread, SweepRow, Trajectory
+from physid_drake.plan import DistanceToGoal, Ending, Outcome, Plan, Spread, SweepRow, Trajectory
 from physid_drake.plan.trajectory import tip_height_of
 
 FORMAT = "physid-plan/1"
@@ -21,7 +21,9 @@ def push_files(plan: Plan) -> list[str]:
     return ["push.csv"] if count == 1 else [f"push_{k + 1}.csv" for k in range(count)]
 
 
-def plan_json(plan: Plan, *, seed: int, with_effects: tuple[Trajectory, float] | None = None) -> str:
+def plan_json(
+    plan: Plan, *, seed: int, with_effects: Outcome | None = None, plain_push: Outcome | None = None
+) -> str:
     """The plan as JSON text; the same model, task and seed give the same bytes.
 
     Args:
@@ -29,6 +31,7 @@ def plan_json(plan: Plan, *, seed: int, with_effects: tuple[Trajectory, float] |
         seed: of the run.
         with_effects: trajectory and cost of the same push under the model with its effects, where it was planned
             without them.
+        plain_push: of the push that was planned without effects, under this model.
     """
     pushes = plan.policy.pushes(plan.settings)
     content: dict[str, Any] = {
@@ -51,6 +54,7 @@ def plan_json(plan: Plan, *, seed: int, with_effects: tuple[Trajectory, float] |
         "hand_height_m": tip_height_of(plan.model, plan.situation),
         "predicted": _outcome(plan.predicted, plan.cost),
         "predicted_with_effects": None if with_effects is None else _outcome(*with_effects),
+        "plain_push": None if plain_push is None else _outcome(*plain_push),
         "belief": None if plan.spread is None else _belief(plan.spread, plan.tolerance),
         "loss_m": plan.loss,
         "sweep": {"setting": plan.policy.swept, "rows": [_row(row) for row in plan.sweep]},
@@ -65,12 +69,12 @@ def plan_json(plan: Plan, *, seed: int, with_effects: tuple[Trajectory, float] |
     return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
 
-def plan_table(plan: Plan, *, with_effects: tuple[Trajectory, float] | None = None) -> Table:
+def plan_table(plan: Plan, *, with_effects: Outcome | None = None, plain_push: Outcome | None = None) -> Table:
     """The best push and what is expected of it."""
     table = Table(title=title_of(plan), title_justify="left", show_header=False)
     table.add_column("what")
     table.add_column("value")
-    for what, value in plan_rows(plan, with_effects=with_effects):
+    for what, value in plan_rows(plan, with_effects=with_effects, plain_push=plain_push):
         table.add_row(what, value)
     return table
 
@@ -81,7 +85,9 @@ def title_of(plan: Plan) -> str:
     return f"{plan.model.recording}: {plan.policy.name}, {'with ' + effects if effects else 'plain cell'}"
 
 
-def plan_rows(plan: Plan, *, with_effects: tuple[Trajectory, float] | None = None) -> list[tuple[str, str]]:
+def plan_rows(
+    plan: Plan, *, with_effects: Outcome | None = None, plain_push: Outcome | None = None
+) -> list[tuple[str, str]]:
     """The plan as lines of two texts."""
     x, y, yaw = plan.situation.start
     rows = [("object at", f"{1e3 * x:.0f}, {1e3 * y:.0f} mm, {math.degrees(yaw):.0f} deg")]
@@ -95,6 +101,8 @@ def plan_rows(plan: Plan, *, with_effects: tuple[Trajectory, float] | None = Non
     rows.append(("predicted end", _said(plan.predicted, plan.cost)))
     if with_effects is not None:
         rows.append(("with the effects found", _said(*with_effects)))
+    if plain_push is not None:
+        rows.append(("the push planned without effects", _said(*plain_push)))
     if plan.spread is not None:
         whose = "" if with_effects is None else ", says the plain model"
         rows += [(what + whose, value) for what, value in _belief_rows(plan.spread, plan.tolerance)]

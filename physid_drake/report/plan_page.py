@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from physid_drake.cell.outline import Disc, Outline
 from physid_drake.cell.outline import Polygon as OutlinePolygon
 from physid_drake.cell.solid import solid_of
-from physid_drake.plan import DistanceToGoal, Ending, InsideRegion, Plan, SweepRow, Trajectory
+from physid_drake.plan import DistanceToGoal, Ending, InsideRegion, Outcome, Plan, SweepRow
 from physid_drake.report.plan import plan_rows, push_files, title_of
 from physid_drake.report.svg import MUTED, drawn, svg_of
 
@@ -48,7 +48,7 @@ def plan_png(plan: Plan) -> bytes:
         return file.getvalue()
 
 
-def plan_page(plan: Plan, *, seed: int, with_effects: tuple[Trajectory, float] | None = None) -> str:
+def plan_page(plan: Plan, *, seed: int, with_effects: Outcome | None = None) -> str:
     """The page as HTML.
 
     Args:
@@ -114,7 +114,7 @@ def _curve(plan: Plan) -> list[SweepRow]:
     return sorted([*plan.sweep, chosen], key=lambda row: row.value)
 
 
-def _draw_table(axes: Axes, plan: Plan, other: tuple[Trajectory, float] | None = None) -> None:
+def _draw_table(axes: Axes, plan: Plan, other: Outcome | None = None) -> None:
     outline = _corners(solid_of(plan.model.shape).outline)
     start, poses = np.array(plan.situation.start), plan.predicted.poses
     (x0, y0), (x1, y1) = plan.model.table

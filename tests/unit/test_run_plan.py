@@ -2,16 +2,19 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
 from plans import MODEL, TILTED
 from rich.console import Console
+from runs import QUICK as RUN
 from runs import coarse_identifier, quick, shipped_pushes, write_small
 
 from physid_drake import run_cell, run_plan
 from physid_drake.cli import main
+from physid_drake.effects.fields import TableTilt
 from physid_drake.errors import ConfigError
 from physid_drake.model import Correlation
 from physid_drake.model_reading import load_model
@@ -171,6 +174,34 @@ def test_the_main_job_plans_with_what_it_identified(tmp_path):
     assert (out / "push.csv").exists() and not (out / "plan.png").exists()
     page = (out / "page.html").read_text()
     assert f"{content['settings']['speed']['value']:.4f} m/s" in page and "Cost against speed" in page
+
+
+@pytest.mark.parametrize("effects", [(), (TableTilt(x=0.04),)])
+def test_the_main_job_plans_again_with_the_effects_that_it_found(tmp_path, capsys, monkeypatch, effects):
+    """The push planned without a tilt ends elsewhere on a tilted table; the plan that is left knows the tilt."""
+
+    def diagnosed(scenario, recording, folder, console):
+        fit = SimpleNamespace(per_push=range(3))
+        found = replace(load_model(folder.path), effects=effects)
+        return SimpleNamespace(friction_scatter=0.02, fit=fit, sentence="Said & done."), found
+
+    monkeypatch.setattr(run_cell, "_diagnose", diagnosed)
+    plan = {"start_m": [0.0, 0.0], "goal_m": [0.25, 0.0], "budget": 15, "sweep": 3, "draws": 0}
+    override = json.dumps({**RUN, "plan": {"policy": "push_speed", **plan}})
+    recording = write_small(tmp_path / "small")
+    flags = ["--recording", str(recording), "--out", str(tmp_path / "out"), "--set", override, "--no-view"]
+    assert run_cell.main(flags) == 0
+    content = json.loads((tmp_path / "out" / "plan.json").read_text())
+    shown, page = capsys.readouterr().out, (tmp_path / "out" / "page.html").read_text()
+    assert content["effects"] == [e.name for e in effects]
+    assert '<a href="diagnosis.html">Diagnosis</a>: Said &amp; done.' in page
+    assert ("Planned again, with table_tilt" in shown) == ("with table_tilt" in page) == bool(effects)
+    plain = "the push planned without effects"
+    assert (plain in shown) == (plain in page) == bool(effects)
+    if effects:
+        assert content["plain_push"]["cost_m"] > content["predicted"]["cost_m"] + 0.005
+    else:
+        assert content["plain_push"] is None
 
 
 def test_the_main_job_refuses_a_goal_off_the_table_before_it_writes(tmp_path, capsys):

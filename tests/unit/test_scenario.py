@@ -32,8 +32,8 @@ def test_every_shipped_scenario_loads(file):
         assert scenario.recording == content[name]["recording"]
 
 
-def test_without_a_config_the_shipped_eraser_is_read():
-    assert load_scenario(None, None) == load_scenario("eraser.yaml:eraser", None)
+def test_without_a_config_the_shipped_sealed_world_is_read():
+    assert load_scenario(None, None) == load_scenario("sealed.yaml:sealed", None)
     assert load_scenario("eraser", None) == load_scenario("eraser.yaml", None)
 
 
