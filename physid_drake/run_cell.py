@@ -68,7 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m physid_drake.run_cell", description=__doc__)
     parser.add_argument(
         "config", nargs="?", metavar="CONFIG",
-        help="FILE or FILE:SCENARIO (default: the shipped sealed; with --recording, the defaults)",
+        help="FILE or FILE:SCENARIO (default: sealed, which ships with the project; with --recording, the defaults)",
     )  # fmt: skip
     parser.add_argument("--recording", metavar="FOLDER", help="the pushes, instead of the scenario's")
     parser.add_argument(
