@@ -22,7 +22,7 @@ from physid_drake.identify.problem import usual_tip_height
 from physid_drake.identify.rollouts import Task, simulate
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
 from physid_drake.model import Model
-from physid_drake.plan import Outcome, Plan, outcome_under
+from physid_drake.plan import Hindsight, Plan, outcome_under
 from physid_drake.plan.system import Planner, PolicySystem, identified_model, planner_of
 from physid_drake.progress import Progress
 from physid_drake.recording import Recording, digest_of, read_recording
@@ -77,8 +77,8 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument("--seed", type=int, metavar="N", help="of everything random, instead of the scenario's")
     parser.add_argument("--set", dest="override", metavar="YAML", help="such as '{search: {budget: 20}}'")
-    parser.add_argument("--no-diagnosis", action="store_true", help="identify only")
-    parser.add_argument("--no-plan", action="store_true", help="plan no push with what was identified")
+    parser.add_argument("--no-diagnosis", action="store_true", help="identify and plan with the plain cell only")
+    parser.add_argument("--no-plan", action="store_true", help="plan no push")
     parser.add_argument("--no-view", action="store_true", help="serve no live Meshcat while working")
     return parser
 
@@ -119,12 +119,13 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     _keep_plan(plan, scenario, folder, console)
     if not arguments.no_diagnosis:
         diagnosis, found = _diagnose(scenario, recording, folder, console)
-        said, plain_push = (diagnosis.sentence, DIAGNOSIS_PAGE), None
-        if planner is not None and plan is not None and found.effects:
-            plan, plain_push = _planned_again(planner, plan, diagnosis, found, console)
-            _keep_plan(plan, scenario, folder, console, plain_push=plain_push)
-        folder.write("page.html", page(plan=plan, plain_push=plain_push, diagnosis=said))
-    folder.forget(STATE)
+        page = partial(page, diagnosis=(diagnosis.verdict, diagnosis.sentence))
+        folder.write("page.html", page(plan=plan))
+        if planner is not None and plan is not None and (found.effects or _caveat(diagnosis)):
+            plan, hindsight = _planned_again(planner, plan, diagnosis, found, console)
+            _keep_plan(plan, scenario, folder, console, hindsight=hindsight)
+            folder.write("page.html", page(plan=plan, hindsight=hindsight))
+        folder.forget(STATE)
     folder.forget(BELIEF)
     _keep_serving(arguments.no_view, stage, console)
 
@@ -141,14 +142,14 @@ def _show(result: Identification, identifier: Identifier, recording: Recording, 
 
 
 def _keep_plan(
-    plan: Plan | None, scenario: Scenario, folder: RunFolder, console: Console, *, plain_push: Outcome | None = None
+    plan: Plan | None, scenario: Scenario, folder: RunFolder, console: Console, *, hindsight: Hindsight | None = None
 ) -> None:
     """Show and write the plan; an earlier one is dropped."""
     forget_plan(folder)
     if plan is None:
         return
-    write_plan(folder, plan, seed=scenario.seed, plain_push=plain_push, page=None)
-    console.print(plan_table(plan, plain_push=plain_push))
+    write_plan(folder, plan, seed=scenario.seed, hindsight=hindsight, page=None)
+    console.print(plan_table(plan, hindsight=hindsight))
     console.print(f"written: plan.json and {', '.join(push_files(plan))} in {folder.path}")
 
 
@@ -156,6 +157,7 @@ def _diagnose(
     scenario: Scenario, recording: Recording, folder: RunFolder, console: Console
 ) -> tuple[Diagnosis, Model]:
     """Say what physics is missing, and keep the model with it."""
+    console.print("\nDiagnosing: what these pushes say beyond the plain cell")
     case = case_of(recording, scenario.cell, scenario.theta, jobs=scenario.search.jobs)
     memory = Memory(folder.path / STATE)
     diagnosis, evidence = run_case(case, console, seed=scenario.seed, alpha=ALPHA, memory=memory)
@@ -167,13 +169,27 @@ def _diagnose(
 
 def _planned_again(
     planner: Planner, plain: Plan, diagnosis: Diagnosis, found: Model, console: Console
-) -> tuple[Plan, Outcome]:
-    """The plan with the effects that were found, and what comes of the one that was made without them."""
+) -> tuple[Plan, Hindsight]:
+    """The plan with the effects that were found, or the same plan where none was, and what is to be said of it."""
+    caveat = _caveat(diagnosis)
+    if not found.effects:
+        return plain, Hindsight(caveat=caveat)
     console.print(f"Planned again, with {' and '.join(e.name for e in found.effects)}:")
     scatter, pushes = diagnosis.friction_scatter, len(diagnosis.fit.per_push)
     with progress_bar(console) as bar:
         again = planner.with_model(found, friction_scatter=scatter, pushes=pushes, tick=bar)
-    return again, outcome_under(plain, found)
+    return again, Hindsight(plain=plain, outcome=outcome_under(plain, found), caveat=caveat)
+
+
+def _caveat(diagnosis: Diagnosis) -> str:
+    """What a diagnosis leaves open that may change what comes of a plan; empty if nothing."""
+    rivals = {e.name: e.indistinguishable_from for e in diagnosis.effects if e.indistinguishable_from}
+    if rivals:
+        unsure = "; nor ".join(f"{name} from {' or '.join(others)}" for name, others in rivals.items())
+        return f"these pushes cannot tell {unsure}, which may move the object elsewhere"
+    if diagnosis.verdict == "unexplained":
+        return "the plain cell does not account for the recorded pushes, and this is its plan: it may not hold"
+    return ""
 
 
 def _live(recording: Recording, console: Console) -> Stage:

@@ -15,7 +15,7 @@ from physid_drake.errors import ConfigError
 from physid_drake.identify.polish import scatter_freedom
 from physid_drake.model import Model
 from physid_drake.model_reading import load_model
-from physid_drake.plan import DistanceToGoal, Outcome, Plan, Situation, plan
+from physid_drake.plan import DistanceToGoal, Hindsight, Outcome, Plan, Situation, plan
 from physid_drake.plan.draws import uncertain_names
 from physid_drake.plan.story import outcome_under
 from physid_drake.plan.task import Choices, policy_for
@@ -94,7 +94,7 @@ def _budget(settings: int) -> int:
 
 def write(
     folder: RunFolder, made: Plan, *, seed: int, with_effects: Outcome | None = None,
-    plain_push: Outcome | None = None, page: str | None = "page.html",
+    hindsight: Hindsight | None = None, page: str | None = "page.html",
 ) -> None:  # fmt: skip
     """Write ``plan.json``, the hand's paths, and with ``page`` the picture and the page.
 
@@ -109,7 +109,7 @@ def write(
         folder.write_bytes("plan.png", plan_png(made))
         folder.write(page, plan_page(made, seed=seed, with_effects=with_effects))
     folder.write(
-        "plan.json", plan_json(made, seed=seed, with_effects=with_effects, plain_push=plain_push)
+        "plan.json", plan_json(made, seed=seed, with_effects=with_effects, hindsight=hindsight)
     )  # last: where it is, all is
 
 

@@ -6,6 +6,7 @@ from physid_drake.plan.costs import DistanceToGoal as DistanceToGoal
 from physid_drake.plan.costs import InsideRegion as InsideRegion
 from physid_drake.plan.robot import Robot as Robot
 from physid_drake.plan.robot import SimulatedRobot as SimulatedRobot
+from physid_drake.plan.story import Hindsight as Hindsight
 from physid_drake.plan.story import Outcome as Outcome
 from physid_drake.plan.story import Plan as Plan
 from physid_drake.plan.story import Spread as Spread

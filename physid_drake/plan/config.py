@@ -5,7 +5,7 @@ import dataclasses as dc
 
 @dc.dataclass
 class PlanConfig:
-    """The plan that the main job makes with what it identified.
+    """The plan that the main job makes with what it identified, and again with what its diagnosis finds.
 
     Attributes:
         policy: a name in ``policies.POLICIES``.

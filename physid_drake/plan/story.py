@@ -218,6 +218,21 @@ def spread_of(
     )
 
 
+@dc.dataclass(frozen=True, kw_only=True, eq=False)
+class Hindsight:
+    """What a diagnosis says of the plan that was made before it.
+
+    Attributes:
+        plain: the plan that was made before, without effects; None where this one is that plan.
+        outcome: what comes of the plain plan's push with the effects: its trajectory and cost [m].
+        caveat: what the diagnosis leaves open; empty if nothing.
+    """
+
+    plain: Plan | None = None
+    outcome: Outcome | None = None
+    caveat: str = ""
+
+
 def outcome_under(made: Plan, model: Model) -> Outcome:
     """What another model says of a plan's push: its trajectory and cost [m]."""
     pushes, path = made.policy.pushes(made.settings), made.predicted.paths[0]

@@ -133,7 +133,7 @@ class RobotSystem(LeafSystem):
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Planner:
-    """What the main job plans once it knows theta.
+    """What the main job plans once it knows theta, and again once it knows what else acts.
 
     Attributes:
         config: of the plan.

@@ -7,7 +7,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 
 from physid_drake.identify import CellsTold, Identification
-from physid_drake.plan import Outcome, Plan
+from physid_drake.plan import Hindsight, Plan
 from physid_drake.report.cells import cells_figure, cells_verdict, combination_text
 from physid_drake.report.panel import with_panel
 from physid_drake.report.plan import plan_rows
@@ -17,8 +17,9 @@ from physid_drake.report.tables import accuracy_cells, verdict
 _PANEL = """
 <div id="physid"><details open><summary><b>{{ name }}</b></summary>
   <p>{{ verdict }}</p>
-  {% if diagnosis %}<p><a href="{{ diagnosis.page }}">Diagnosis</a>: {{ diagnosis.sentence }}</p>{% endif %}
-  <h2>theta</h2>
+  {% if diagnosis %}<p><a href="diagnosis.html">Diagnosis</a>, by a fit of its own: <b>{{ diagnosis[0] }}</b>. {{ diagnosis[1] }}
+    <a href="scene.html">With model.yaml in Meshcat</a>.</p>{% endif %}
+  <h2>theta, plain cell</h2>
   <table><tr><th>parameter</th><th>estimate</th><th>90 % interval</th><th>told</th></tr>
   {% for e in estimates %}<tr><td>{{ e.name }}</td><td>{{ "%.4g" % e.value }} {{ "" if e.unit == "-" else e.unit }}</td>
     <td>{{ "%.4g" % e.ci90[0] }} to {{ "%.4g" % e.ci90[1] }}</td>
@@ -29,7 +30,7 @@ _PANEL = """
   <table><tr><th>combination of ln frictions</th><th>singular value</th><th>left</th><th>told</th></tr>
   {% for row in cells.rows %}<tr>{% for c in row %}<td>{{ c }}</td>{% endfor %}</tr>{% endfor %}</table>
   <p>{{ cells.verdict }}</p>{% endif %}
-  <h2>error of prediction (root mean square)</h2>
+  <h2>error of prediction (root mean square), plain cell</h2>
   <table><tr><th></th><th>mm</th><th>deg</th><th>end mm</th><th>end deg</th><th>N</th><th>std</th></tr>
   {% for label, cells in accuracy %}<tr><td>{{ label }}</td>{% for c in cells %}<td>{{ c }}</td>{% endfor %}</tr>{% endfor %}
   </table>
@@ -37,7 +38,7 @@ _PANEL = """
   <table>{% for what, value in plan.rows %}<tr><td>{{ what }}</td><td>{{ value }}</td></tr>{% endfor %}</table>
   {{ plan.curve }}<p>{{ plan.caption }} Green: the plan; dashed: the tolerance.</p>{% endif %}
   <p><span class="dot" style="background:#f28c26"></span>recorded<span class="dot" style="background:#3373cc"></span>
-    simulated &nbsp; push: <select id="physid-push">{% for push, start in marks %}
+    simulated, plain cell &nbsp; push: <select id="physid-push">{% for push, start in marks %}
     <option value="{{ start }}">{{ push }}</option>{% endfor %}</select></p>
   <p>{{ note }}</p>
 </details></div>
@@ -57,7 +58,7 @@ def result_page(
     marks: list[tuple[str, float]],
     note: str,
     plan: Plan | None = None,
-    plain_push: Outcome | None = None,
+    hindsight: Hindsight | None = None,
     diagnosis: tuple[str, str] | None = None,
 ) -> str:
     """Meshcat's static page with a panel of results.
@@ -69,8 +70,8 @@ def result_page(
         marks: name and start in the animation [s] of every push shown.
         note: one line on how it was made.
         plan: the plan made with what was found, whose curve is shown; None for none.
-        plain_push: what comes, according to the plan's model, of the push that was planned without its effects.
-        diagnosis: its sentence, and the file of its page; None where there is none.
+        hindsight: what a diagnosis says of the plan that was made before it.
+        diagnosis: its verdict and sentence; None where there is none.
     """
     rows = [
         ("held out, before", result.before),
@@ -86,8 +87,8 @@ def result_page(
         accuracy=[(label, accuracy_cells(a)) for label, a in rows if a is not None],
         marks=marks,
         note=note,
-        plan=None if plan is None else _shown_plan(plan, plain_push),
-        diagnosis=None if diagnosis is None else {"sentence": diagnosis[0], "page": diagnosis[1]},
+        plan=None if plan is None else _shown_plan(plan, hindsight),
+        diagnosis=diagnosis,
         cells=None if result.cells is None else _shown_cells(result.cells),
     )
     return with_panel(html, panel)
@@ -101,11 +102,11 @@ def _shown_cells(cells: CellsTold) -> dict[str, Any]:
     return {"map": cells_figure(cells), "rows": rows, "verdict": cells_verdict(cells)}
 
 
-def _shown_plan(plan: Plan, plain_push: Outcome | None) -> dict[str, Any]:
+def _shown_plan(plan: Plan, hindsight: Hindsight | None) -> dict[str, Any]:
     known = " and ".join(e.name for e in plan.model.effects) or "the identified theta"
     return {
         "title": f"plan: {plan.policy.name}, with {known}",
-        "rows": plan_rows(plan, plain_push=plain_push),
+        "rows": plan_rows(plan, hindsight=hindsight),
         "curve": curve_svg(plan) if plan.sweep else "",
         "caption": caption_of(plan) if plan.sweep else "",
     }

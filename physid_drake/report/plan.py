@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from physid_drake.plan import DistanceToGoal, Ending, Outcome, Plan, Spread, SweepRow, Trajectory
+from physid_drake.plan import DistanceToGoal, Ending, Hindsight, Outcome, Plan, Spread, SweepRow, Trajectory
 from physid_drake.plan.trajectory import tip_height_of
 
 FORMAT = "physid-plan/1"
@@ -22,7 +22,7 @@ def push_files(plan: Plan) -> list[str]:
 
 
 def plan_json(
-    plan: Plan, *, seed: int, with_effects: Outcome | None = None, plain_push: Outcome | None = None
+    plan: Plan, *, seed: int, with_effects: Outcome | None = None, hindsight: Hindsight | None = None
 ) -> str:
     """The plan as JSON text; the same model, task and seed give the same bytes.
 
@@ -31,7 +31,7 @@ def plan_json(
         seed: of the run.
         with_effects: trajectory and cost of the same push under the model with its effects, where it was planned
             without them.
-        plain_push: of the push that was planned without effects, under this model.
+        hindsight: the plan that was made before a diagnosis, and what that leaves open.
     """
     pushes = plan.policy.pushes(plan.settings)
     content: dict[str, Any] = {
@@ -42,10 +42,7 @@ def plan_json(
         "goal_m": list(plan.cost_function.goal) if isinstance(plan.cost_function, DistanceToGoal) else None,
         "tolerance_m": plan.tolerance,
         "start": _pose(plan.situation.start),
-        "settings": {
-            p.name: {"value": float(v), "unit": p.unit}
-            for p, v in zip(plan.policy.space.parameters, plan.settings, strict=True)
-        },
+        "settings": _settings(plan),
         "pushes": [
             {"file": file, "direction_rad": p.direction, "speed_mps": p.speed, "travel_m": p.travel,
              "contact_offset_m": p.contact_offset}
@@ -54,7 +51,8 @@ def plan_json(
         "hand_height_m": tip_height_of(plan.model, plan.situation),
         "predicted": _outcome(plan.predicted, plan.cost),
         "predicted_with_effects": None if with_effects is None else _outcome(*with_effects),
-        "plain_push": None if plain_push is None else _outcome(*plain_push),
+        "plain_push": None if hindsight is None else _plain_push(hindsight),
+        "caveat": hindsight.caveat if hindsight is not None and hindsight.caveat else None,
         "belief": None if plan.spread is None else _belief(plan.spread, plan.tolerance),
         "loss_m": plan.loss,
         "sweep": {"setting": plan.policy.swept, "rows": [_row(row) for row in plan.sweep]},
@@ -69,12 +67,12 @@ def plan_json(
     return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
 
-def plan_table(plan: Plan, *, with_effects: Outcome | None = None, plain_push: Outcome | None = None) -> Table:
+def plan_table(plan: Plan, *, with_effects: Outcome | None = None, hindsight: Hindsight | None = None) -> Table:
     """The best push and what is expected of it."""
     table = Table(title=title_of(plan), title_justify="left", show_header=False)
     table.add_column("what")
     table.add_column("value")
-    for what, value in plan_rows(plan, with_effects=with_effects, plain_push=plain_push):
+    for what, value in plan_rows(plan, with_effects=with_effects, hindsight=hindsight):
         table.add_row(what, value)
     return table
 
@@ -86,7 +84,7 @@ def title_of(plan: Plan) -> str:
 
 
 def plan_rows(
-    plan: Plan, *, with_effects: Outcome | None = None, plain_push: Outcome | None = None
+    plan: Plan, *, with_effects: Outcome | None = None, hindsight: Hindsight | None = None
 ) -> list[tuple[str, str]]:
     """The plan as lines of two texts."""
     x, y, yaw = plan.situation.start
@@ -94,19 +92,49 @@ def plan_rows(
     if isinstance(plan.cost_function, DistanceToGoal):
         gx, gy = plan.cost_function.goal
         rows.append(("goal", f"{1e3 * gx:.0f}, {1e3 * gy:.0f} mm"))
-    rows += [
-        (p.name, _setting(float(v), p.unit))
-        for p, v in zip(plan.policy.space.parameters, plan.settings, strict=True)
-    ]  # fmt: skip
+    rows += _settings_rows(plan)
     rows.append(("predicted end", _said(plan.predicted, plan.cost)))
     if with_effects is not None:
         rows.append(("with the effects found", _said(*with_effects)))
-    if plain_push is not None:
-        rows.append(("the push planned without effects", _said(*plain_push)))
     if plan.spread is not None:
         whose = "" if with_effects is None else ", says the plain model"
         rows += [(what + whose, value) for what, value in _belief_rows(plan.spread, plan.tolerance)]
+    if hindsight is not None and hindsight.plain is not None and hindsight.outcome is not None:
+        settings = ", ".join(value for _, value in _settings_rows(hindsight.plain))
+        rows += [
+            ("planned without effects", f"{settings}; thought to be off by {1e3 * hindsight.plain.cost:.1f} mm"),
+            ("that push with them", _said(*hindsight.outcome)),
+        ]
+    if hindsight is not None and hindsight.caveat:
+        rows.append(("beware", hindsight.caveat))
     return rows
+
+
+def _settings_rows(plan: Plan) -> list[tuple[str, str]]:
+    return [
+        (p.name, _setting(float(v), p.unit))
+        for p, v in zip(plan.policy.space.parameters, plan.settings, strict=True)
+    ]  # fmt: skip
+
+
+def _plain_push(hindsight: Hindsight) -> dict[str, Any] | None:
+    """The push that was planned without effects: what was thought of it, and what comes of it with them."""
+    plain, outcome = hindsight.plain, hindsight.outcome
+    if plain is None or outcome is None:
+        return None
+    return {
+        **_outcome(*outcome),
+        "settings": _settings(plain),
+        "predicted": _outcome(plain.predicted, plain.cost),
+        "belief": None if plain.spread is None else _belief(plain.spread, plain.tolerance),
+    }
+
+
+def _settings(plan: Plan) -> dict[str, Any]:
+    return {
+        p.name: {"value": float(v), "unit": p.unit}
+        for p, v in zip(plan.policy.space.parameters, plan.settings, strict=True)
+    }
 
 
 def _belief_rows(spread: Spread, tolerance: float) -> list[tuple[str, str]]:

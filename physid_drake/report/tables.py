@@ -17,7 +17,7 @@ def estimates_table(result: Identification, title: str) -> Table:
         table.add_column(header, justify=justify)  # type: ignore[arg-type]
     for e in result.estimates:
         unit = "" if e.unit == "-" else f" {e.unit}"
-        told = "yes" if e.identifiable else "no: it keeps its prior"
+        told = "yes" if e.identifiable else "no: anything in this interval"
         table.add_row(
             e.name, f"{e.value:.4g}{unit}", f"{e.ci90[0]:.4g} to {e.ci90[1]:.4g}", told, f"{e.prior:.4g}{unit}"
         )

@@ -176,14 +176,29 @@ def test_the_main_job_plans_with_what_it_identified(tmp_path):
     assert f"{content['settings']['speed']['value']:.4f} m/s" in page and "Cost against speed" in page
 
 
-@pytest.mark.parametrize("effects", [(), (TableTilt(x=0.04),)])
-def test_the_main_job_plans_again_with_the_effects_that_it_found(tmp_path, capsys, monkeypatch, effects):
+TILT = (TableTilt(x=0.04),)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "effects", "rivals", "caveat"),
+    [
+        ("consistent", (), (), None),
+        ("explained", TILT, (), None),
+        ("ambiguous", TILT, ("tether", "magnet"), "cannot tell table_tilt from tether or magnet"),
+        ("unexplained", (), (), "it may not hold"),
+    ],
+)
+def test_the_main_job_plans_again_with_what_its_diagnosis_found(
+    tmp_path, capsys, monkeypatch, verdict, effects, rivals, caveat
+):
     """The push planned without a tilt ends elsewhere on a tilted table; the plan that is left knows the tilt."""
 
     def diagnosed(scenario, recording, folder, console):
+        named = [SimpleNamespace(name=e.name, indistinguishable_from=rivals) for e in effects]
         fit = SimpleNamespace(per_push=range(3))
+        said = {"verdict": verdict, "sentence": "Said & done.", "effects": named}
         found = replace(load_model(folder.path), effects=effects)
-        return SimpleNamespace(friction_scatter=0.02, fit=fit, sentence="Said & done."), found
+        return SimpleNamespace(friction_scatter=0.02, fit=fit, **said), found
 
     monkeypatch.setattr(run_cell, "_diagnose", diagnosed)
     plan = {"start_m": [0.0, 0.0], "goal_m": [0.25, 0.0], "budget": 15, "sweep": 3, "draws": 0}
@@ -192,16 +207,17 @@ def test_the_main_job_plans_again_with_the_effects_that_it_found(tmp_path, capsy
     flags = ["--recording", str(recording), "--out", str(tmp_path / "out"), "--set", override, "--no-view"]
     assert run_cell.main(flags) == 0
     content = json.loads((tmp_path / "out" / "plan.json").read_text())
-    shown, page = capsys.readouterr().out, (tmp_path / "out" / "page.html").read_text()
+    shown, page = " ".join(capsys.readouterr().out.split()), (tmp_path / "out" / "page.html").read_text()
+    assert f"<b>{verdict}</b>. Said &amp; done." in page
     assert content["effects"] == [e.name for e in effects]
-    assert '<a href="diagnosis.html">Diagnosis</a>: Said &amp; done.' in page
     assert ("Planned again, with table_tilt" in shown) == ("with table_tilt" in page) == bool(effects)
-    plain = "the push planned without effects"
-    assert (plain in shown) == (plain in page) == bool(effects)
+    assert ("planned without effects" in shown) == ("planned without effects" in page) == bool(effects)
+    assert (content["caveat"] or "").count(caveat or "-") == page.count(caveat or "<td>beware") == bool(caveat)
+    plain = content["plain_push"]
+    assert (plain is None) == (not effects)
     if effects:
-        assert content["plain_push"]["cost_m"] > content["predicted"]["cost_m"] + 0.005
-    else:
-        assert content["plain_push"] is None
+        assert plain["cost_m"] > content["predicted"]["cost_m"] + 0.005 > plain["predicted"]["cost_m"]
+        assert plain["settings"]["speed"]["value"] != content["settings"]["speed"]["value"]
 
 
 def test_the_main_job_refuses_a_goal_off_the_table_before_it_writes(tmp_path, capsys):
