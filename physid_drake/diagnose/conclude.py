@@ -341,24 +341,32 @@ def _left(evidence: Evidence, verdict: str, after: Fitted, partly: Partly | None
     if verdict == "unexplained" and evidence.foil is not None:
         foil = evidence.foil
         return f"what {foil.instead_of} stands in for; left-out pushes are likelier if {foil.statement}"
-    named = verdict in ("explained", "ambiguous")
-    hidden = verdict == "unexplained" or (named and scatter_p_value(after) < TOO_SCATTERED)
-    if after.reduced_chi2 <= EXPLAINED and hidden:
-        return f"what a friction would hide that {_scatters(evidence.case, after)}"
-    if after.reduced_chi2 <= EXPLAINED:
-        nothing = "nothing beyond noise, scatter and the simulator's own error"
-        unusual = verdict == "consistent" and UNIT_SCATTER * after.state.scatter > MOST_SCATTER
-        return (
-            f"{nothing}; but friction {_scatters(evidence.case, after)}, which may hide an effect"
-            if unusual
-            else nothing
-        )
+    hardly = _hardly_left(evidence, verdict, after) if after.reduced_chi2 <= EXPLAINED else None
+    if hardly is not None:
+        return hardly
     much = f"{math.sqrt(after.reduced_chi2):.1f} times what noise and the simulator's own error would leave"
     if partly is not None:
         return f"{much}; with {' and '.join(partly.effects)} {math.sqrt(partly.reduced_chi2):.1f} times"
     scores = (evidence.screening if after is evidence.plain else evidence.remaining).scores
     nearest = scores[0].kind.name if scores else "none"
     return f"{much}; the nearest of the catalogue is {nearest}, which does not account for it"
+
+
+def _hardly_left(evidence: Evidence, verdict: str, after: Fitted) -> str | None:
+    """What a model leaves that explains the pushes, but perhaps by frictions; None if it is in the pushes' motion."""
+    wide = UNIT_SCATTER * after.state.scatter > MOST_SCATTER
+    if verdict == "unexplained" and not wide:
+        return None
+    scatters = _scatters(evidence.case, after)
+    too_wide = verdict in ("explained", "ambiguous") and scatter_p_value(after) < TOO_SCATTERED
+    if verdict == "unexplained" or too_wide:
+        return f"what a friction would hide that {scatters}"
+    nothing = "nothing beyond noise, scatter and the simulator's own error"
+    return (
+        f"{nothing}; but friction {scatters}, which may hide an effect"
+        if verdict == "consistent" and wide
+        else nothing
+    )
 
 
 def _scatters(case: Case, fitted: Fitted) -> str:

@@ -160,7 +160,9 @@ def _tried_from_nearer_theta(
     table that is tilted.
     """
     tried = list(found)
-    nearest = min((c.fitted for c in found), key=lambda fitted: fitted.reduced_chi2, default=before)
+    if not found:
+        return tried
+    nearest = min((c.fitted for c in found), key=lambda fitted: fitted.reduced_chi2)
     if _explained([c for c in found if c.accepted]) or nearest.reduced_chi2 > FAR_OFF:
         return tried
     promised = max(c.score.gain for c in found)

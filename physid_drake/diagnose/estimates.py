@@ -204,7 +204,9 @@ def smallest(evidence: Evidence, alpha: float) -> tuple[Detectable, ...]:
             coordinate = signature.kind.chart(case.around)[j]
             point = np.array(signature.family.point)
             point[j] += steps * signature.family.size * coordinate.step
-            moved = steps * rms(np.concatenate([c[:, d] for c in signature.columns]))
+            # Poses only: forces may follow them.
+            poses = [c[: 3 * len(f.middles), d] for c, f in zip(signature.columns, case.features, strict=True)]
+            moved = steps * rms(np.concatenate(poses))
             one = _detectable(case, signature.kind, point, j, moved)
             if one.name not in best or moved < best[one.name].sigmas:
                 best[one.name] = one

@@ -109,12 +109,17 @@ def mismatch(fitted: Fitted, screening: Screening | None) -> float:
 
 
 def _cost_p_value(fitted: Fitted) -> float:
-    """Of "noise and the cell's own error leave as much"; by Snedecor's F where rests had to tell the noise."""
+    """Of "noise and the cell's own error leave as much"; by Snedecor's F where rests had to tell the noise.
+
+    Pushes with no more numbers than the model has say nothing.
+    """
     cost, degrees = fitted.solution.chi2 / SLACK, fitted.degrees
+    if degrees < 1:
+        return 1.0
     if fitted.doubt == 0.0:
         return float(stats.chi2.sf(cost, degrees))
     # A variance seen with n degrees of freedom has a logarithm that is sqrt(2 / n) off.
-    return float(stats.f.sf(cost / max(1, degrees), degrees, 2.0 / fitted.doubt**2))
+    return float(stats.f.sf(cost / degrees, degrees, 2.0 / fitted.doubt**2))
 
 
 def scatter_p_value(fitted: Fitted) -> float:
@@ -148,6 +153,7 @@ def unexplained(plain: Fitted, final: Fitted) -> bool:
     Or frictions that differ from push to push by more than scatter.
     """
     before, left = plain.reduced_chi2 - 1.0, final.reduced_chi2 - 1.0
-    most = min(MOST_LEFT + LAW_ERROR**2 * max(0.0, before), EVER_LEFT)
-    noise_like = max(NOISE_LIKE, DOUBTS * final.doubt)
-    return left > most or left > max(noise_like, MOST_SHARE * before) or scatter_p_value(final) < TOO_SCATTERED
+    unsure = DOUBTS * final.doubt
+    most = min(max(MOST_LEFT + LAW_ERROR**2 * max(0.0, before), unsure), EVER_LEFT)
+    too_much = left > most or left > max(NOISE_LIKE, unsure, MOST_SHARE * before)
+    return too_much or scatter_p_value(final) < TOO_SCATTERED

@@ -21,7 +21,7 @@ LOGITS = np.linspace(-5.0, 5.5, 43)
 LOGIT_PRIOR = -0.5 * ((LOGITS + 1.5) / 2.0) ** 2
 LONGEST = 60  # samples of a rest that are looked at together
 UNCORRELATED = 0.02  # from sample to sample
-FEWEST = 40  # samples at rest, in all, that tell a noise
+FEWEST = 10  # samples at rest, in all, that tell a noise, if with much doubt
 FORCE_SCATTER = 0.03
 UNKNOWN = "neither stated nor seen at rest"
 UNUSUAL = 3.0  # times the median scatter of rests: one of more is none
@@ -154,7 +154,8 @@ def _usual(pieces: Sequence[tuple[Array, Array]]) -> list[tuple[Array, Array]]:
 
 
 def _known(plain: Noise, what: str, seen: SeenNoise | None) -> bool:
-    return seen is not None or plain.source[what] != "assumed"
+    # A figure of samples too few to tell how well they tell it is no more than a first guess.
+    return seen is not None or plain.source[what] == "stated"
 
 
 def _of_hand_and_force(recording: Recording, plain: Noise) -> list[str]:

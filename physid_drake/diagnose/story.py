@@ -125,11 +125,15 @@ def _better_foil(growth: Growth, grown: Grown) -> Foil | None:
     return None
 
 
+def _names(grown: Grown) -> set[str]:
+    return {step[0].name for step in grown.steps}
+
+
 def _in_question(grown: Grown) -> list[type[Effect]]:
     """The effects that were found, and those whose score tests came near enough to be tried."""
     scores = grown.base.screening.scores
     least = WORTH_A_TRY * max(s.gain for s in scores)
-    found = {step[0].name for step in grown.steps}
+    found = _names(grown)
     return [s.kind for s in scores if s.gain >= least or s.kind.name in found]
 
 
@@ -159,15 +163,22 @@ class _Search:
         loud = self.answer(*as_loud_as_left(case, rough, first), memory)
         if not loud.grown.steps:
             return loud
-        model = Fitter(rough).linearise(loud.grown.last.fitted.state)
-        quiet, rough, _ = as_loud_as_left(case, rough, model)
-        share, detected = quieter(loud.case, quiet), loud.grown.base.p_value
+
+        def left_by(model: Fitted) -> tuple[Case, Case, float]:
+            """Both cases with the noise that a model leaves, and its share of what the plain cell leaves."""
+            quiet, quiet_rough, _ = as_loud_as_left(case, rough, Fitter(rough).linearise(model.state))
+            return quiet, quiet_rough, quieter(loud.case, quiet)
+
+        quiet, quiet_rough, share = left_by(loud.grown.last.fitted)
+        detected = loud.grown.base.p_value
         if share > MOST_OF_UNKNOWN:
             return dc.replace(loud, noise_share=share, detected=detected)
         # What was noise so far was missing physics: with less noise the pushes tell more.
         self.tick("plain fit with less noise", 0, 0)
-        first = Fitter(rough).fit(loud.grown.base.fitted.state, renew=True)
-        again = dc.replace(self, kinds=_in_question(loud.grown)).answer(quiet, rough, first, Memory())
+        first = Fitter(quiet_rough).fit(loud.grown.base.fitted.state, renew=True)
+        again = dc.replace(self, kinds=_in_question(loud.grown)).answer(quiet, quiet_rough, first, Memory())
+        if again.grown.steps and _names(again.grown) != _names(loud.grown):
+            share = left_by(again.grown.last.fitted)[2]
         return dc.replace(again, noise_share=share, detected=detected)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from physid_drake.diagnose.case import UNIT_SCATTER
-from physid_drake.diagnose.evidence import MOST_SCATTER, mismatch, scatter_p_value
+from physid_drake.diagnose.evidence import MOST_SCATTER, mismatch, scatter_p_value, unexplained
 from physid_drake.diagnose.frictions import friction_trend
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve
 from physid_drake.diagnose.model import Fitted, State
@@ -65,6 +65,21 @@ def test_noise_that_was_seen_at_rest_is_called_a_mismatch_as_seldom_as_is_said(d
     stds = np.sqrt(seen_with / rng.chisquare(seen_with, 400))  # true over seen
     worlds = [dc.replace(fitted_to_noise(std * rng.standard_normal(100)), doubt=doubt) for std in stds]
     assert np.mean([mismatch(world, None) < 0.05 for world in worlds]) <= 0.05
+
+
+def test_pushes_with_no_more_numbers_than_the_model_say_nothing():
+    one = fitted_to_noise(np.array([30.0]))
+    nothing_left = dc.replace(one, state=dc.replace(one.state, u=np.full(3, 0.5)))
+    assert mismatch(one, None) < 1e-9 and mismatch(nothing_left, None) == 1.0
+    assert mismatch(dc.replace(nothing_left, doubt=0.3), None) == 1.0
+
+
+@pytest.mark.parametrize(("doubt", "withheld"), [(0.0, True), (0.29, True), (0.35, False)])
+def test_a_model_may_leave_what_noise_that_is_hardly_known_may_be(doubt, withheld):
+    plain, final = (SimpleNamespace(reduced_chi2=chi2) for chi2 in (5.0, 1.6))
+    final.doubt = doubt
+    final.state, final.pushes = SimpleNamespace(scatter=0.5), ()
+    assert unexplained(plain, final) is withheld
 
 
 def fitted_to_noise(left):

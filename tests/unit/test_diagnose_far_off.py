@@ -97,7 +97,8 @@ def test_only_what_takes_most_away_and_does_not_explain_all_is_tried_elsewhere(m
         ({}, False, []),
     ],
 )
-def test_what_ended_far_off_is_tried_from_the_theta_of_what_came_near(monkeypatch, left, degenerate, fits):
+@pytest.mark.parametrize("plain", [139.0, 2.0])
+def test_what_ended_far_off_is_tried_from_the_theta_of_what_came_near(monkeypatch, left, degenerate, fits, plain):
     """A spring that ran to its weakest stands for a tilt, whose own fit was lost from the theta of the plain cell."""
     made = []
 
@@ -123,7 +124,7 @@ def test_what_ended_far_off_is_tried_from_the_theta_of_what_came_near(monkeypatc
         for name, chi2 in left.items()
     ]  # fmt: skip
     fitter = SimpleNamespace(start=lambda u, effects: SimpleNamespace(u=u, effects=effects), fit=fit)
-    before = SimpleNamespace(reduced_chi2=139.0, state=SimpleNamespace(effects=()))
+    before = SimpleNamespace(reduced_chi2=plain, state=SimpleNamespace(effects=()))
     again = confirm._tried_from_nearer_theta(fitter, before, found, np.zeros(8), lambda *said: None)
     assert made == fits
     assert len(again) == len(found) and (not fits or again[0].name == fits[0])

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from recovery.worlds import POSITION_STD, endpoints, pushes_of, recorded
 from reference.scenes import OBJECTS, Theta
+from scipy import stats
 
 from physid_drake.diagnose import noise as noise_module
+from physid_drake.diagnose.evidence import SLACK
 from physid_drake.diagnose.features import features_of
 from physid_drake.diagnose.noise import SeenNoise, _jitter, _roughness, seen_noise, tracker_noise
 from physid_drake.identify.problem import problems_of
@@ -47,6 +49,17 @@ def test_how_large_a_noise_is_is_known_as_well_as_is_said(rho):
     assert abs(off.mean()) < 0.08  # of the variance
     assert np.mean((off / doubts) ** 2) == pytest.approx(1.0, abs=0.4)
     assert doubts.mean() == pytest.approx({0.0: 0.06, 0.5: 0.09, 0.82: 0.2}[rho], rel=0.2)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.8])
+def test_noise_that_one_short_rest_tells_is_called_a_mismatch_as_seldom_as_is_said(rho):
+    """Fourteen samples of x and y; what is judged has 88 numbers of the same noise."""
+    rng, called = np.random.default_rng(4), []
+    for _ in range(300):
+        seen = seen_noise([*rests(rng, 2, 14, rho)], 1e-3)
+        cost = float(np.sum((2.0 / seen.std * rng.standard_normal(88)) ** 2)) / 88.0 / SLACK
+        called.append(stats.f.sf(cost, 88, 2.0 / seen.doubt**2) < 0.01)
+    assert np.mean(called) <= 0.02
 
 
 def test_a_stream_that_stands_still_at_rest_tells_no_noise():

@@ -39,3 +39,31 @@ def test_lengths_times_and_pressures_have_tolerances():
         "actuator_lag", "com_offset", "hand_offset", "rotational_inertia", "size_error", "tracker_latency",
         "uneven_support",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(("quiet_finds", "share"), [({"tether"}, 0.9), ({"tether", "magnet"}, 0.2), (set(), 0.2)])
+def test_an_unknown_noise_is_what_the_model_at_the_end_leaves(monkeypatch, quiet_finds, share):
+    """A tether and a magnet make the noise a fifth; if the tether alone is left, it does not."""
+    left = {frozenset(): 1.0, frozenset({"tether"}): 0.9, frozenset({"tether", "magnet"}): 0.2}
+
+    def grown(names):
+        model = SimpleNamespace(state=frozenset(names))
+        steps = tuple((SimpleNamespace(name=name),) for name in names)
+        last = SimpleNamespace(fitted=model)
+        base = SimpleNamespace(fitted=SimpleNamespace(state=frozenset()), p_value=1e-9, screening=None)
+        return SimpleNamespace(steps=steps, last=last, base=base)
+
+    class Search(story._Search):
+        def answer(self, case, rough, first, memory):
+            found = {"tether", "magnet"} if case == left[frozenset()] else quiet_finds
+            return story._Answer(case=case, fitter=None, grown=grown(found))
+
+    fitter = SimpleNamespace(linearise=lambda state: state, fit=lambda state, renew: state)
+    monkeypatch.setattr(story, "Fitter", lambda case: fitter)
+    monkeypatch.setattr(story, "as_loud_as_left", lambda case, rough, model: (left[model], left[model], model))
+    monkeypatch.setattr(story, "quieter", lambda before, after: after / before)
+    monkeypatch.setattr(story, "_in_question", lambda grown: [])
+    search = Search(kinds=[], alpha=0.01, rng=np.random.default_rng(0), tick=lambda *_: None)
+    answer = search.answer_by_ratios("case", "rough", frozenset(), None)
+    assert answer.noise_share == share
+    assert {step[0].name for step in answer.grown.steps} == quiet_finds
