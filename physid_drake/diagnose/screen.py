@@ -68,6 +68,7 @@ class Score:
         gain: twice the gain in log likelihood, or what is as unlikely as the rank correlation that was found.
         log_p: of that gain, by an F distribution with the push as the unit (``log_probability``).
         others: the scores of the effect's other families.
+        log_p_of_order: of the rank correlation of the pushes' frictions with the effect, in the right direction.
     """
 
     signature: Signature
@@ -76,6 +77,7 @@ class Score:
     gain: float
     log_p: float
     others: tuple[Score, ...] = ()
+    log_p_of_order: float = 0.0
 
     @property
     def kind(self) -> type[Effect]:
@@ -85,7 +87,7 @@ class Score:
     @property
     def in_order(self) -> bool:
         """Whether the frictions of whole pushes follow the effect, which is all that it changes, beyond chance."""
-        return bool(self.signature.friction_changes) and self.log_p < math.log(IN_ORDER)
+        return self.log_p_of_order < math.log(IN_ORDER)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -204,11 +206,13 @@ def by_trend(fitted: Fitted, one: Score) -> Score:
     by_rank = math.log(max(1e-300, float(stats.kendalltau(frictions, changes).pvalue)))
     slope = float(stats.theilslopes(frictions, changes).slope)
     two_looks = math.log(2.0)
-    if by_rank >= one.log_p or (one.signature.one_sided[0] and slope < 0.0):
+    if one.signature.one_sided[0] and slope < 0.0:
         return dc.replace(one, log_p=min(0.0, one.log_p + two_looks))
     log_p = min(0.0, by_rank + two_looks)
+    if by_rank >= one.log_p:
+        return dc.replace(one, log_p=min(0.0, one.log_p + two_looks), log_p_of_order=log_p)
     return dc.replace(
-        one, kept=(0,), coefficients=np.array([slope]), log_p=log_p,
+        one, kept=(0,), coefficients=np.array([slope]), log_p=log_p, log_p_of_order=log_p,
         gain=max(one.gain, _gain_at(log_p, 1, len(fitted.pushes), fitted.own_dimension)),
     )  # fmt: skip
 

@@ -139,3 +139,15 @@ def test_frictions_in_no_order_are_not_seen(columns):
     plain, trend = drift_score(np.random.default_rng(3).permutation(-3.0 + 0.5 * ORDER), columns)
     assert trend.gain == plain.gain
     assert trend.log_p == pytest.approx(min(0.0, plain.log_p + np.log(2.0)))
+
+
+@pytest.mark.parametrize(("frictions", "in_order"), [([3, 0, 5, 1, 4, 2] * 3, False), (range(18), True)])
+def test_no_score_test_however_sure_puts_frictions_in_order(columns, frictions, in_order):
+    """Far from an explanation a linearised effect may gain much where the pushes' own frictions follow nothing."""
+    wide = np.array(frictions, dtype=float)[:PUSHES] - 3.0
+    fitted = fitted_to(wide[:, None] * columns["own"] + columns["noise"], columns["own"])
+    silent = signature_of("friction_drift", 1e-6 * columns["own"], friction_changes=0.001 * np.arange(PUSHES))
+    sure = replace(score(fitted, silent), log_p=-50.0)
+    seen = by_trend(fitted, sure)
+    assert seen.log_p == pytest.approx(-50.0 + np.log(2.0))
+    assert seen.in_order is in_order and not sure.in_order
