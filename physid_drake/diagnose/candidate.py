@@ -102,7 +102,9 @@ def push_scores(fitted: Fitted, folds: Sequence[Sequence[int]] | None = None) ->
     push that is left out with that very error, at no cost: a centre of mass off by ten tolerances would be predicted
     as well as by the effect.
     """
-    scores, _ = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std, folds)
+    scores, _ = left_out_scores(
+        fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std, folds, fitted.bounds
+    )
     return scores - fitted.tolerance_cost / len(scores)
 
 

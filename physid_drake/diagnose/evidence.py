@@ -142,7 +142,8 @@ def scatter_p_value(fitted: Fitted) -> float:
 def _more_likely(fitted: Fitted, pushes: Sequence[LinearPush], seen: float, most: float) -> float:
     """By how many nats one scatter of friction makes pushes likelier than another."""
     free, held = (
-        solve(Whitened.of(pushes, s), fitted.prior_mean, fitted.prior_std).log_likelihood for s in (seen, most)
+        solve(Whitened.of(pushes, s), fitted.prior_mean, fitted.prior_std, fitted.bounds).log_likelihood
+        for s in (seen, most)
     )
     return float(free - held)
 

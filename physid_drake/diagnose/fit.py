@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.linear import (
+    Bounds,
     LinearPush,
     Whitened,
     best_scatter,
@@ -34,6 +35,7 @@ FAST, MORE = 0.3, 2  # while steps gain as much, a fit goes on, to so many times
 REFINEMENTS = 3  # steps on short ticks
 RENEWED = 5.0  # of the cost, per push: a step that gained as much has left the place of its derivatives
 MOST_THETA_MOVE = 0.25  # of the unit cube in one iteration
+THETA_WITHIN = (1e-3, 1.0 - 1e-3)  # of the unit cube
 Say = Callable[[str], None]
 
 
@@ -195,16 +197,26 @@ class Fitter:
         count = 0 if self.tolerances is None else self.tolerances[0].shape[1]
         return np.array([*means, *([0.0] * count)]), np.array([*stds, *([1.0] * count)])
 
+    def bounds(self, state: State) -> Bounds:
+        """Least and greatest change (d,) of theta and the effects' coordinates from a state."""
+        least, most = list(THETA_WITHIN[0] - state.u), list(THETA_WITHIN[1] - state.u)
+        for e in state.effects:
+            chart = e.chart(self.case)
+            least += [chart[j].lower - float(e.point[j]) for j in e.free]
+            most += [chart[j].upper - float(e.point[j]) for j in e.free]
+        return np.array(least), np.array(most)
+
     def _fitted(
         self, state: State, pushes: tuple[LinearPush, ...], predicted: tuple[Array, ...], learn_scatter: bool
     ) -> Fitted:
         mean, std = self.priors(state)
-        scatter, score = best_scatter(pushes, mean, std, () if learn_scatter else (state.scatter,))
+        bounds = self.bounds(state)
+        scatter, score = best_scatter(pushes, mean, std, () if learn_scatter else (state.scatter,), bounds)
         state = dc.replace(state, scatter=scatter)
-        solution = solve(Whitened.of(pushes, scatter), mean, std)
+        solution = solve(Whitened.of(pushes, scatter), mean, std, bounds)
         return Fitted(
             state=state, pushes=pushes, prior_mean=mean, prior_std=std, solution=solution, predicted=predicted,
-            score=score, doubt=self.case.noise.doubt,
+            score=score, doubt=self.case.noise.doubt, bounds=bounds,
         )  # fmt: skip
 
     def guard(self, fitted: Fitted) -> Fitted:
@@ -251,6 +263,8 @@ class Fitter:
             if say is not None:
                 say(f"round {k + 1}")
             held, released = k + 1 < careful, k + 1 >= careful
+            if k + 1 == careful:  # the scatter is learnt from here on, so that costs compare
+                best = self._fitted(best.state, best.pushes, best.predicted, learn_scatter=True)
             trial = self._tried(best, cautious=k < careful, released=released)
             gained, far = best.cost_here - trial.cost_here, max(0.0, best.excess_here - best.degrees)
             fast, worth = k >= careful and 0.0 < FAST * far < gained, SLOW * far
@@ -259,6 +273,8 @@ class Fitter:
                 continue
             if k >= careful and gained < max(SETTLED, worth):
                 return trial if gained > 0.0 else best
+            if gained <= 0.0:  # the pushes' unknowns are released where it is
+                trial = best
             anew = renew and (k + 1 < rounds or fast) and gained > RENEWED * len(best.pushes)
             # Unknowns that are held only weigh what is left: their derivatives may be those of nearby.
             stale, whole = (stale or anew) and held, (stale or anew) and released
@@ -275,7 +291,7 @@ class Fitter:
         Args:
             best: where it starts.
             cautious: keep the pushes' unknowns at zero.
-            released: learn the scatter; in the step that is both, the cost changes its meaning and is not compared.
+            released: learn the scatter.
         """
         trial = best
         for share in (1.0, 0.4, 0.15):
@@ -283,7 +299,7 @@ class Fitter:
             if cautious:
                 step = dc.replace(step, own=tuple(np.zeros_like(o) for o in step.own))
             trial = self.seen_from(best, step, learn_scatter=released)
-            if trial.cost_here < best.cost_here or (cautious and released):
+            if trial.cost_here < best.cost_here:
                 break
         return trial
 
@@ -308,7 +324,9 @@ class Fitter:
         Nothing of the push itself is known to the prediction but the start of the object and the hand's path. A push
         whose rollout diverges is predicted by the model's derivatives.
         """
-        _, betas = left_out_scores(fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std)
+        _, betas = left_out_scores(
+            fitted.pushes, fitted.state.scatter, fitted.prior_mean, fitted.prior_std, bounds=fitted.bounds
+        )
         states = [self.start(*self._moved(fitted.state, beta)) for beta in betas]
         predicted = self.vectors([self.task(state, i) for i, state in enumerate(states)])
         known = fitted.own_dimension
@@ -320,7 +338,7 @@ class Fitter:
     def _moved(self, state: State, beta: Array) -> tuple[Array, tuple[EffectPoint, ...]]:
         """Theta (d,) and the effects of a state, moved by beta, no further than a step goes."""
         d = len(state.u)
-        u = np.clip(state.u + np.clip(beta[:d], -MOST_THETA_MOVE, MOST_THETA_MOVE), 1e-3, 1.0 - 1e-3)
+        u = np.clip(state.u + np.clip(beta[:d], -MOST_THETA_MOVE, MOST_THETA_MOVE), *THETA_WITHIN)
         effects, at = [], d
         for e in state.effects:
             # Coordinates of shape (a place, a speed) go no further in a step than their prior says they are unsure.

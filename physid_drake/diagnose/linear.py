@@ -12,8 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.optimize import lsq_linear
 
 Array = NDArray[np.float64]
+Bounds = tuple[Array, Array]
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -96,23 +98,44 @@ class Solution:
     log_likelihood: float
 
 
-def solve(white: Whitened, prior_mean: Array, prior_std: Array) -> Solution:
+def solve(white: Whitened, prior_mean: Array, prior_std: Array, bounds: Bounds | None = None) -> Solution:
     """Fit beta.
 
     Args:
         white: the pushes.
         prior_mean: (d,) of beta.
         prior_std: (d,), inf where nothing is known.
+        bounds: least and greatest beta, of as many coordinates as it has, the first; the others have none.
     """
     weight = 1.0 / prior_std**2
     precision = white.x.T @ white.x + np.diag(weight)
     right = white.x.T @ white.y + weight * prior_mean
-    beta = (
-        np.linalg.solve(precision + 1e-12 * np.trace(precision) * np.eye(len(right)), right) if len(right) else right
-    )
+    beta = bounded(precision + 1e-12 * np.trace(precision) * np.eye(len(right)), right, bounds)
     left = white.y - white.x @ beta
     chi2 = float(left @ left) + float(weight @ (beta - prior_mean) ** 2)
     return Solution(beta=beta, precision=precision, chi2=chi2, log_likelihood=-0.5 * (chi2 + white.log_determinant))
+
+
+def bounded(precision: Array, right: Array, bounds: Bounds | None) -> Array:
+    """The beta (d,) that is likeliest within bounds: no rollout can be made beyond.
+
+    Args:
+        precision: (d, d).
+        right: (d,) precision times the estimate.
+        bounds: as in ``solve``.
+    """
+    beta = np.asarray(np.linalg.solve(precision, right), dtype=np.float64) if len(right) else np.zeros(0)
+    if bounds is None:
+        return beta
+    free = len(right) - len(bounds[0])
+    least, most = np.append(bounds[0], [-np.inf] * free), np.append(bounds[1], [np.inf] * free)
+    if np.all((least <= beta) & (beta <= most)):
+        return beta
+    values, vectors = np.linalg.eigh(precision)
+    roots = np.sqrt(np.maximum(values, 1e-14 * values[-1]))
+    root = roots[:, None] * vectors.T
+    within: Array = lsq_linear(root, (vectors.T @ right) / roots, (least, most), method="bvls").x
+    return within
 
 
 SCATTERS = tuple(np.geomspace(0.15, 8.0, 16).tolist())  # times the unit scatter
@@ -120,12 +143,16 @@ SCATTER_PRIOR = (1.0, 0.6)  # median, in units of it, and standard deviation of 
 
 
 def best_scatter(
-    pushes: Sequence[LinearPush], prior_mean: Array, prior_std: Array, among: Sequence[float] = ()
+    pushes: Sequence[LinearPush],
+    prior_mean: Array,
+    prior_std: Array,
+    among: Sequence[float] = (),
+    bounds: Bounds | None = None,
 ) -> tuple[float, float]:
     """The friction's scatter from push to push, in units of the columns', and its log posterior."""
     best = (1.0, -np.inf)
     for scatter in among or SCATTERS:
-        value = solve(Whitened.of(pushes, float(scatter)), prior_mean, prior_std).log_likelihood
+        value = solve(Whitened.of(pushes, float(scatter)), prior_mean, prior_std, bounds).log_likelihood
         value -= 0.5 * (np.log(scatter / SCATTER_PRIOR[0]) / SCATTER_PRIOR[1]) ** 2
         if value > best[1]:
             best = (float(scatter), float(value))
@@ -168,6 +195,7 @@ def left_out_scores(
     prior_mean: Array,
     prior_std: Array,
     folds: Sequence[Sequence[int]] | None = None,
+    bounds: Bounds | None = None,
 ) -> tuple[Array, Array]:
     """Predict pushes by a fit to those of the other folds.
 
@@ -177,6 +205,7 @@ def left_out_scores(
         prior_mean: (d,) of beta.
         prior_std: (d,).
         folds: indices of pushes that are left out together; None leaves out one at a time.
+        bounds: as in ``solve``.
 
     Returns:
         (n,) log predictive densities, and (n, d) the beta by which each push was predicted.
@@ -189,7 +218,7 @@ def left_out_scores(
     betas = np.zeros((len(pushes), len(right)))
     for fold in folds or [(i,) for i in range(len(pushes))]:
         others = information - sum(pieces[i][0] for i in fold) + ridge
-        beta = np.linalg.solve(others, right - sum(pieces[i][1] for i in fold))
+        beta = bounded(others, right - sum(pieces[i][1] for i in fold), bounds)
         for i in fold:
             scores[i] = _log_density(pushes[i], scatter, beta, others)
             betas[i] = beta

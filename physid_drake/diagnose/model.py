@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.linear import LinearPush, Solution, Whitened
+from physid_drake.diagnose.linear import Bounds, LinearPush, Solution, Whitened
 from physid_drake.effects import Coordinate, Effect
 
 Array = NDArray[np.float64]
@@ -93,6 +93,7 @@ class Fitted:
         predicted: per push (m,), features at the state, unknowns included.
         score: log likelihood with the scatter's prior.
         doubt: standard deviation of the logarithm of the noise's variance [-].
+        bounds: least and greatest change of theta and the effects' coordinates; None for none.
     """
 
     state: State
@@ -103,6 +104,7 @@ class Fitted:
     predicted: tuple[Array, ...]
     score: float
     doubt: float = 0.0
+    bounds: Bounds | None = None
 
     @property
     def own_dimension(self) -> int:

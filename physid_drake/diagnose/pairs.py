@@ -134,8 +134,8 @@ def _together(plain: Fitted, pair: Pair) -> tuple[float, Pair] | None:
     stds = np.concatenate([np.array(one.signature.stds)[list(one.kept)] for one in pair])
     pushes = extended(plain.pushes, columns)
     mean, std = np.append(plain.prior_mean, np.zeros(len(stds))), np.append(plain.prior_std, stds)
-    scatter, value = best_scatter(pushes, mean, std)
-    beta = solve(Whitened.of(pushes, scatter), mean, std).beta[len(plain.prior_mean) :]
+    scatter, value = best_scatter(pushes, mean, std, bounds=plain.bounds)
+    beta = solve(Whitened.of(pushes, scatter), mean, std, plain.bounds).beta[len(plain.prior_mean) :]
     parts = np.split(beta, [len(pair[0].kept)])
     if any(_backwards(one, part.tolist()) for one, part in zip(pair, parts, strict=True)):
         return None

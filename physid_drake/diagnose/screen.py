@@ -280,8 +280,8 @@ def score(fitted: Fitted, signature: Signature) -> Score:
         pushes = extended(fitted.pushes, [c[:, kept] for c in signature.columns])
         mean = np.concatenate([fitted.prior_mean, np.zeros(len(kept))])
         std = np.concatenate([fitted.prior_std, np.array(signature.stds)[kept]])
-        scatter, value = best_scatter(pushes, mean, std)
-        beta = solve(Whitened.of(pushes, scatter), mean, std).beta[len(fitted.prior_mean) :]
+        scatter, value = best_scatter(pushes, mean, std, bounds=fitted.bounds)
+        beta = solve(Whitened.of(pushes, scatter), mean, std, fitted.bounds).beta[len(fitted.prior_mean) :]
         wrong = [k for k, b in zip(kept, beta, strict=True) if signature.one_sided[k] and b < 0.0]
         if not wrong:
             coefficients[kept] = beta

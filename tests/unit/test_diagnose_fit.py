@@ -181,3 +181,17 @@ def test_a_fit_goes_on_as_long_as_that_leads_somewhere(monkeypatch, costs, steps
     monkeypatch.setattr(one, "_tried", tried)
     one.fit(0, rounds=3)
     assert taken == list(range(steps))
+
+
+def test_the_step_that_releases_the_pushes_unknowns_leads_to_no_worse_place(monkeypatch):
+    costs = [1610.0, 2620.0, 2500.0]
+    models = [
+        SimpleNamespace(state=k, cost_here=cost, excess_here=cost, degrees=500, pushes=(), predicted=(), score=-cost)
+        for k, cost in enumerate(costs)
+    ]
+    one = Fitter.__new__(Fitter)
+    monkeypatch.setattr(one, "linearise", lambda state, **how: models[state])
+    monkeypatch.setattr(one, "_fitted", lambda state, *_, learn_scatter: models[state])
+    monkeypatch.setattr(one, "_tried", lambda best, *, cautious, released: models[best.state + 1])
+    for careful in (1, 2, 3):
+        assert one.fit(0, rounds=3, careful=careful).state == 0

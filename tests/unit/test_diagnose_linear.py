@@ -112,3 +112,25 @@ def _left(design, y):
 def test_more_gain_is_less_probable_and_more_directions_need_more_of_it():
     assert log_probability(30.0, 1, 10, 3) < log_probability(10.0, 1, 10, 3) < 0.0
     assert log_probability(30.0, 3, 10, 3) > log_probability(30.0, 1, 10, 3)
+
+
+def test_what_would_leave_its_bounds_is_held_there_and_the_others_make_up_for_it():
+    rng = np.random.default_rng(12)
+    pushes = made(rng, beta=np.array([2.0, -1.0, 0.5]))
+    for push in pushes:
+        push.shared[:, 1] += 0.7 * push.shared[:, 0]  # what one may not do, the other does in part
+    white, std = Whitened.of(pushes, 1.0), np.full(3, 10.0)
+    bounds = np.array([-5.0, -5.0]), np.array([0.8, 5.0])  # of the first two; the third has none
+    free, held = solve(white, np.zeros(3), std), solve(white, np.zeros(3), std, bounds)
+    assert free.beta[0] > 1.0 and held.beta[0] == pytest.approx(0.8)
+    assert held.beta[1] > free.beta[1] + 0.3
+    y, x = white.y - 0.8 * white.x[:, 0], white.x[:, 1:]
+    rest = np.linalg.solve(x.T @ x + np.eye(2) / 100.0, x.T @ y)
+    assert held.beta[1:] == pytest.approx(rest, rel=1e-6)
+    left = white.y - white.x @ held.beta
+    assert held.chi2 == pytest.approx(left @ left + np.sum(held.beta**2) / 100.0) and held.chi2 > free.chi2 + 10.0
+    np.testing.assert_array_equal(held.precision, free.precision)
+    wide = solve(white, np.zeros(3), std, (np.full(3, -9.0), np.full(3, 9.0)))
+    np.testing.assert_array_equal(wide.beta, free.beta)
+    _, betas = left_out_scores(pushes, 1.0, np.zeros(3), std, bounds=bounds)
+    assert betas[:, 0].max() <= 0.8 + 1e-12
