@@ -303,11 +303,13 @@ def worth_adding(base: Fitted, last: Fitted, candidates: Sequence[Candidate]) ->
     gains less: one push may make the most of an effect that the others deny.
 
     What is a hundredth of what the effects before it explain may be no more than the error of their laws, unless they
-    leave more than such an error.
+    leave more than such an error. What a tracker does to poses has no such error: nothing of it is simulated.
     """
     if not candidates:
         return ()
-    least = 0.0 if unexplained(base, last) else A_LAW * float((push_scores(last) - push_scores(base)).sum())
+    exact = all(e.kind.element == "sensor" for e in last.state.effects)
+    bare = exact or unexplained(base, last)
+    least = 0.0 if bare else A_LAW * float((push_scores(last) - push_scores(base)).sum())
     best = max((c for c in candidates if not c.degenerate), key=lambda c: c.gain, default=candidates[0])
     answers = [c for c in candidates if c.accepted and not unexplained(base, c.fitted)]
     surest = max(answers, key=lambda c: c.gain, default=best)

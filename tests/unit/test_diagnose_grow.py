@@ -68,7 +68,11 @@ def tried(name, gains, *, coordinates=1, chi2=1.0, degenerate=False):
 def before(monkeypatch):
     monkeypatch.setattr(grow, "push_scores", lambda one: one.scores)
     monkeypatch.setattr(grow, "unexplained", lambda base, last: last.reduced_chi2 > 2.0)
-    return SimpleNamespace(reduced_chi2=6.0, scores=np.zeros(8))
+    return SimpleNamespace(reduced_chi2=6.0, scores=np.zeros(8), state=with_effects_of("table"))
+
+
+def with_effects_of(*elements):
+    return SimpleNamespace(effects=tuple(SimpleNamespace(kind=SimpleNamespace(element=e)) for e in elements))
 
 
 def test_the_best_is_added_where_the_simpler_one_leaves_too_much(before):
@@ -101,6 +105,11 @@ def test_what_the_law_of_a_large_effect_may_be_wrong_by_is_no_second_one(before,
     base = SimpleNamespace(reduced_chi2=60.0, scores=np.full(8, -explained / 8.0))
     before.reduced_chi2 = left
     small = tried("magnet", [10.0] * 8)
+    assert bool(grow.worth_adding(base, before, (small,))) == added
+    # What a tracker does to poses is not simulated, so that no law of it is wrong.
+    before.state = with_effects_of("sensor", "sensor")
+    assert grow.worth_adding(base, before, (small,))
+    before.state = with_effects_of("sensor", "object")
     assert bool(grow.worth_adding(base, before, (small,))) == added
 
 
