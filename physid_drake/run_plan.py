@@ -108,9 +108,8 @@ def write(
     if page is not None:
         folder.write_bytes("plan.png", plan_png(made))
         folder.write(page, plan_page(made, seed=seed, with_effects=with_effects))
-    folder.write(
-        "plan.json", plan_json(made, seed=seed, with_effects=with_effects, hindsight=hindsight)
-    )  # last: where it is, all is
+    # Last: where it is, all is.
+    folder.write("plan.json", plan_json(made, seed=seed, with_effects=with_effects, hindsight=hindsight))
 
 
 def forget(folder: RunFolder) -> None:
