@@ -132,13 +132,13 @@ def _p_value(evidence: Evidence) -> float:
     """Of "the plain cell explains these pushes".
 
     A simulation without noise shows how two honest simulators differ: all of that has structure, and is no physics.
+    Where the noise is not known, it is as loud as what the plain cell leaves: what was found made it quieter.
     """
     if _is_own_error(evidence):
         return 1.0
-    if evidence.detected is not None:
-        return evidence.detected
+    plain, screening = evidence.loud or (evidence.plain, evidence.screening)
     confirmed_by_pushes = bool(evidence.steps) and _predicts(evidence)
-    return mismatch(evidence.plain, evidence.screening if confirmed_by_pushes else None)
+    return mismatch(plain, screening if confirmed_by_pushes else None)
 
 
 def _is_own_error(evidence: Evidence) -> bool:

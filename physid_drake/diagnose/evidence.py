@@ -57,7 +57,7 @@ class Evidence:
         next_push: that would tell the rivals apart.
         noise_share: where the noise is not known, the share of its variance that the last model needs of what the
             plain cell needs; 1 where it is known.
-        detected: p-value of the plain cell where the noise was as loud as what it leaves; None where it is known.
+        loud: the plain cell and the screening where the noise was as loud as what it leaves; None where it is known.
         foil: a law beside the catalogue that does better than an effect that was found, if there is one.
     """
 
@@ -77,7 +77,7 @@ class Evidence:
     next_push: NextPush | None = None
     superfluous: tuple[tuple[Candidate, ...], ...] = ()
     noise_share: float = 1.0
-    detected: float | None = None
+    loud: tuple[Fitted, Screening] | None = None
     foil: Foil | None = None
 
 

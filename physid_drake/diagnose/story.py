@@ -22,6 +22,7 @@ from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.next_push import next_push
 from physid_drake.diagnose.plain import coarse, fit_plain, nearest, numerics
 from physid_drake.diagnose.screen import (
+    Screening,
     Signature,
     empty_signatures,
     signatures,
@@ -94,7 +95,7 @@ def _on_short_ticks(answer: _Answer, tick: Progress) -> Evidence:
         case=case, fitter=fine, plain=refined, nearest=closest or refined, errors_before=before, errors_after=after,
         screening=grown.base.screening, signatures=grown.base.signatures,
         steps=grown.steps, rejected=grown.rejected, superfluous=grown.superfluous, final=final,
-        remaining=grown.last.screening, noise_share=answer.noise_share, detected=answer.detected, foil=answer.foil,
+        remaining=grown.last.screening, noise_share=answer.noise_share, loud=answer.loud, foil=answer.foil,
     )  # fmt: skip
 
 
@@ -106,7 +107,7 @@ class _Answer:
     fitter: Fitter
     grown: Grown
     noise_share: float = 1.0
-    detected: float | None = None
+    loud: tuple[Fitted, Screening] | None = None
     foil: Foil | None = None
 
 
@@ -170,16 +171,16 @@ class _Search:
             return quiet, quiet_rough, quieter(loud.case, quiet)
 
         quiet, quiet_rough, share = left_by(loud.grown.last.fitted)
-        detected = loud.grown.base.p_value
+        base = (loud.grown.base.fitted, loud.grown.base.screening)
         if share > MOST_OF_UNKNOWN:
-            return dc.replace(loud, noise_share=share, detected=detected)
+            return dc.replace(loud, noise_share=share, loud=base)
         # What was noise so far was missing physics: with less noise the pushes tell more.
         self.tick("plain fit with less noise", 0, 0)
         first = Fitter(quiet_rough).fit(loud.grown.base.fitted.state, renew=True)
         again = dc.replace(self, kinds=_in_question(loud.grown)).answer(quiet, quiet_rough, first, Memory())
         if again.grown.steps and _names(again.grown) != _names(loud.grown):
             share = left_by(again.grown.last.fitted)[2]
-        return dc.replace(again, noise_share=share, detected=detected)
+        return dc.replace(again, noise_share=share, loud=base)
 
 
 def _first(case: Case, rng: np.random.Generator, tick: Progress, memory: Memory) -> Fitted:

@@ -137,10 +137,13 @@ def test_a_model_that_predicts_left_out_pushes_worse_explains_nothing(monkeypatc
 
 
 @pytest.mark.parametrize(("after", "predicts"), [(8.0, True), (8.5, False)])
-def test_an_effect_that_shows_in_no_simulated_push_is_neither_named_nor_a_mismatch(monkeypatch, after, predicts):
+@pytest.mark.parametrize("loud", [None, ("as loud as it leaves", "screened there")], ids=["known noise", "unknown"])
+def test_an_effect_that_shows_in_no_simulated_push_is_neither_named_nor_a_mismatch(
+    monkeypatch, loud, after, predicts
+):
     """A likelihood may rise by what an effect takes of the cell's own error; the fit does not visibly improve."""
     told = evidence(steps=((tried("friction_patch", 50.0, model_that_leaves(1.0)),),), after=after)
-    told.detected = None
+    told.loud = loud
     monkeypatch.setattr(conclude, "mismatch", lambda plain, screening: 0.5 if screening is None else 1e-9)
     assert conclude._predicts(told) is predicts
     assert conclude._p_value(told) == (1e-9 if predicts else 0.5)
@@ -200,7 +203,7 @@ def test_what_a_simulation_without_noise_differs_by_is_no_physics(monkeypatch, n
     monkeypatch.setattr(conclude, "mismatch", lambda plain, screening: 1e-9)
     clean = evidence()
     clean.case.noise = SimpleNamespace(position=noise)
-    clean.errors_before, clean.detected = errors(times), None  # times 1 mm and 10 mrad
+    clean.errors_before, clean.loud = errors(times), None  # times 1 mm and 10 mrad
     assert conclude._p_value(clean) == want
 
 
