@@ -1,7 +1,6 @@
 """The named unknowns: parameters with unit, bounds, scale and prior, and the space they span."""
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, final
@@ -235,42 +234,6 @@ class ParameterSpace:
         u: Array = sobol.random_base2(int(np.ceil(np.log2(n))))[:n]
         return self._from_scale(self._inverse_prior_cdf(u)) if from_prior else self.from_unit(u)
 
-    def subspace(self, names: Sequence[str]) -> "ParameterSpace":
-        """The space of the named parameters only, in the order of `names`.
-
-        Raises:
-            ParameterError: When a name is unknown or given twice, or none is given.
-        """
-        places = [self.index(name) for name in names]
-        rows = tuple(tuple(self.correlation[i][j] for j in places) for i in places) if self.correlation else ()
-        return ParameterSpace(parameters=tuple(self.parameters[i] for i in places), correlation=rows)
-
-    def log_prior(self, theta: npt.ArrayLike) -> Array:
-        """Log density of the prior with respect to the unit cube: 0 for a uniform prior.
-
-        Taken in unit-cube coordinates it does not depend on units, its maximum is where `prior_whitened`
-        is least, and it equals -0.5 |prior_whitened|^2 up to a constant. Where priors are correlated it is not
-        normalised over the box.
-
-        Args:
-            theta: Points (..., d), each entry in its unit.
-
-        Returns:
-            Log densities (...), dimensionless.
-
-        Raises:
-            ParameterError: As `check`.
-        """
-        self.check(theta)
-        if self.correlation:
-            return np.asarray(-0.5 * np.sum(self.prior_whitened(theta) ** 2, axis=-1))
-        x = self._to_scale(self._shaped(theta))
-        total = np.zeros(x.shape[:-1])
-        for i, p in enumerate(self.parameters):
-            if p.prior_std is not None:
-                total = total + self._truncated(i).logpdf(x[..., i]) + np.log(self._scale_width[i])
-        return np.asarray(total)
-
     def prior_whitened(self, theta: npt.ArrayLike) -> Array:
         """Residuals of the prior for least squares: (x - mean) / std on the scale, 0 where uniform.
 
@@ -306,21 +269,6 @@ class ParameterSpace:
         if point.ndim != 1:
             raise ParameterError(f"as_dict: takes one point ({self.dimension},), but got {point.shape}.")
         return {name: float(value) for name, value in zip(self.names, point, strict=True)}
-
-    def from_dict(self, mapping: Mapping[str, float]) -> Array:
-        """Mapping from name to value in its unit as a point (d,); every name exactly once.
-
-        Raises:
-            ParameterError: When a name is missing or unknown, or a value is outside its bounds.
-        """
-        missing = [name for name in self.names if name not in mapping]
-        if missing:
-            raise ParameterError(f"parameter '{missing[0]}' is missing; give {', '.join(self.names)}.")
-        for name in mapping:
-            self.index(name)
-        theta = np.array([float(mapping[name]) for name in self.names])
-        self.check(theta)
-        return theta
 
     def _shaped(self, values: npt.ArrayLike) -> Array:
         array = np.asarray(values, dtype=np.float64)

@@ -97,19 +97,6 @@ def test_the_same_seed_samples_the_same_points_and_a_second_call_others():
     assert not np.any(first == second)
 
 
-def test_prior_density_integrates_to_one_over_the_unit_cube():
-    space = pushed_box()
-    thetas = space.sample(np.random.default_rng(3), 2**14, from_prior=False)
-    assert np.exp(space.log_prior(thetas)).mean() == pytest.approx(1.0, abs=0.01)
-
-
-def test_log_prior_is_half_the_squared_whitened_residuals_up_to_a_constant():
-    space = pushed_box()
-    thetas = space.sample(np.random.default_rng(4), 16, from_prior=False)
-    sums = space.log_prior(thetas) + 0.5 * np.sum(space.prior_whitened(thetas) ** 2, axis=1)
-    np.testing.assert_allclose(sums, sums[0])
-
-
 def test_whitened_prior_counts_standard_deviations_and_leaves_uniform_parameters_alone():
     theta = [0.5 * np.exp(0.8), 0.2, 0.03]
     np.testing.assert_allclose(pushed_box().prior_whitened(theta), [2.0, -1.0, 0.0], atol=1e-12)
@@ -129,27 +116,8 @@ def test_a_prior_deviation_moves_the_unit_cube_by_its_deviation_there():
     assert told and flat
 
 
-def test_a_uniform_space_has_log_prior_zero():
-    space = pushed_box().subspace(["com_offset"])
-    assert space.log_prior([0.01]) == 0.0
-
-
-def test_dict_there_and_back_and_missing_or_unknown_names_are_refused():
-    space = pushed_box()
-    mapping = {"com_offset": 0.01, "mass": 1.0, "support_friction": 0.4}
-    np.testing.assert_array_equal(space.from_dict(mapping), [1.0, 0.4, 0.01])
-    assert space.as_dict(space.from_dict(mapping)) == mapping
-    with pytest.raises(ParameterError, match="missing"):
-        space.from_dict({"mass": 1.0})
-    with pytest.raises(ParameterError, match="unknown"):
-        space.from_dict({**mapping, "colour": 1.0})
-
-
-def test_a_subspace_keeps_the_order_asked_for():
-    space = pushed_box().subspace(["com_offset", "mass"])
-    assert space.names == ("com_offset", "mass")
-    assert space.index("mass") == 1
-    np.testing.assert_array_equal(space.nominal, [0.0, 0.5])
+def test_a_point_becomes_a_mapping_by_name():
+    assert pushed_box().as_dict([1.0, 0.4, 0.01]) == {"mass": 1.0, "support_friction": 0.4, "com_offset": 0.01}
 
 
 def test_the_nominal_point_cannot_be_written_to():
