@@ -152,11 +152,17 @@ def _verdict(evidence: Evidence, p_value: float, alpha: float, detectable: Seque
     if len(evidence.case.problems) < FEWEST_PUSHES:
         return "underpowered"  # nothing can be confirmed on pushes that were left out
     if p_value >= alpha:
-        blind = float(np.median([d.sigmas for d in detectable])) > VISIBLE if detectable else True
-        return "underpowered" if blind else "consistent"
+        return "underpowered" if _blind(evidence, detectable) else "consistent"
     if not evidence.steps or not _explained(evidence):
         return "unexplained"
     return "ambiguous" if any(_class_beside(evidence, k) for k in range(len(evidence.steps))) else "explained"
+
+
+def _blind(evidence: Evidence, detectable: Sequence[Detectable]) -> bool:
+    """Whether most effects could be large and not show; one that these pushes do not feel at all never shows."""
+    unfelt = {signature.kind.name for signature in evidence.signatures} - {one.name for one in detectable}
+    sizes = [one.sigmas for one in detectable] + [math.inf] * len(unfelt)
+    return not sizes or float(np.median(sizes)) > VISIBLE
 
 
 def _predicts(evidence: Evidence) -> bool:

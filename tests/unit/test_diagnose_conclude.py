@@ -207,6 +207,24 @@ def test_what_a_simulation_without_noise_differs_by_is_no_physics(monkeypatch, n
     assert conclude._p_value(clean) == want
 
 
+@pytest.mark.parametrize(
+    ("sigmas", "unfelt", "blind"),
+    [
+        ((3.0, 4.0, 50.0), 0, False),
+        ((3.0, 4.0, 50.0), 2, True),
+        ((30.0, 4.0, 50.0), 0, True),
+        ((), 0, True),
+        ((), 3, True),
+    ],
+)
+def test_pushes_that_would_not_show_most_effects_show_nothing(sigmas, unfelt, blind):
+    """One that no push feels at all counts as not shown."""
+    detectable = [SimpleNamespace(name=f"shown_{i}", sigmas=s) for i, s in enumerate(sigmas)]
+    names = [*(d.name for d in detectable), *(f"unfelt_{i}" for i in range(unfelt))]
+    told = SimpleNamespace(signatures=[SimpleNamespace(kind=SimpleNamespace(name=name)) for name in names])
+    assert conclude._blind(told, detectable) is blind
+
+
 def test_pushes_that_the_model_cannot_simulate_are_said():
     case = SimpleNamespace(problems=[SimpleNamespace(name=name) for name in ("001", "002", "003")])
     simulated, fallen = np.zeros(4), np.full(4, FAILED)
