@@ -40,10 +40,7 @@ GRAVITY = 9.81  # m/s^2, as Drake's default gravity field
 TABLE_FRICTION = 1e6  # so rough that each pair's friction is set by the other side alone (see `paired_friction`)
 SLENDER = 2.5  # height over radius above which an object leans notably under load transfer
 FOOT_RADIUS = 3e-3  # m, of a support sphere; only its lowest point matters
-# kg. Within a tick the contact slows the hand by its force times the tick over this mass, which lets a contact that
-# sticks creep: with 100 kg, ticks of 10 ms and a hand of 2 mm/s, forces turned by 5 deg. With this, by 0.02 deg;
-# and the solvers' tolerances stand it.
-HAND_MASS = 1e5
+HAND_MASS = 1e5  # kg, at most: see ``Stepper``, which chooses it for each push
 SLAB_THICKNESS = 0.01  # m of the compliant table; only modulus / thickness matters
 FACET_SHARE = 0.2  # of its cell's width: a facet's side, so small that its pressure is that of one point
 

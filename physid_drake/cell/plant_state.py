@@ -146,6 +146,13 @@ class PlantState:
 
     # Changes.
 
+    def weigh_hand(self, mass: float) -> None:
+        """Give each of the hand's links a mass [kg]."""
+        for joint in self._scene.joints:
+            link = joint.child_body()
+            if link.get_mass(self._context) != mass:
+                link.SetMass(self._context, mass)
+
     def set_hand(self, place: list[float], height: float, velocity: tuple[float, float]) -> None:
         """Put the hand's tip at a place (2,) and a height [m], with a velocity [m/s] along x and y."""
         x, (qx, qy, qz), (vx, vy, vz) = self._x, self._hand_q, self._hand_v

@@ -28,10 +28,13 @@ Array = NDArray[np.float64]
 REST_SPEED = 2e-4  # m/s of any point: Drake's regularised friction lets a stopped object creep below this
 NEAR = 3  # ticks: the hand is near when it could arrive within so many
 SMALLEST_STEP = 1e-7  # s
+SLOWEST_HAND = 1e-6  # m/s: no path moves slower
 FALLEN = 0.05  # m below the table top: it does not come back
 FASTEST = 50.0  # m/s: beyond it a rollout has diverged
-# Serial prismatic joints: the x joint carries three links, z one.
-HAND_MASSES = (3.0 * HAND_MASS, 2.0 * HAND_MASS, HAND_MASS)
+# Of the hand's speed: what friction with the table takes of it in a tick. A contact that sticks creeps by as much:
+# with 100 kg, ticks of 10 ms and a hand of 2 mm/s, forces turned by 5 deg. A hand far heavier than this one hides the
+# contact, as solvers' tolerances are relative to all momenta: 1e5 kg at 0.4 m/s hid three quarters of a push's force.
+SLOWED = 1e-6
 
 
 class Stepper:
@@ -53,7 +56,7 @@ class Stepper:
         self._tip = Tip(scene.solid.outline, hand_radius or 0.0)
         self._drift = ContactDrift(self._tip)
         self._slide = FreeSlide(scene.support, trapezoid=solver.trapezoid_slide, tilt_depth=tilt_depth)
-        self._rolls = scene.solid.rolling_radius is not None
+        self._rolls, self._gravity = scene.solid.rolling_radius is not None, scene.gravity
         self._discrete = solver.scheme != "cenic"
         self._slide_ticks = 1 if self._discrete else max(1, round(solver.slide_time_step_s / solver.time_step_s))
 
@@ -91,6 +94,7 @@ class Stepper:
         self._laws, self._mount, self._log = AppliedLaws(laws, frictions), mount, Log()
         times = np.asarray(begin + dt * np.arange(count + 1), dtype=np.float64)
         self._hand = None if path is None else path.positions(times).tolist()
+        self._hand_mass = HAND_MASS if path is None else self._mass_of_hand(body, path)
         k = 0
         try:
             self._begin_at(start, rest)
@@ -103,6 +107,12 @@ class Stepper:
             return self._log.motion(Outcome.DIVERGED)
         return self._log.motion(Outcome.COMPLETED)
 
+    def _mass_of_hand(self, body: Body, path: HandPath) -> float:
+        """What contact hardly slows, and what does not hide the contact [kg]."""
+        friction = float(body.support_friction.min()) * body.mass * self._gravity
+        fastest = float(np.linalg.norm(path.velocities, axis=1).max())
+        return min(HAND_MASS, friction * self._solver.time_step_s / (SLOWED * max(fastest, SLOWEST_HAND)))
+
     def _begin_at(self, start: Start, rest: Array) -> None:
         """Place object and hand; a sprung tip is no body of Drake's, whose hand stays parked then."""
         self._drift.forget()
@@ -112,6 +122,7 @@ class Stepper:
         elif self._mount is None:
             pose = self._clear_of_hand(start.pose, self._hand[0])
             state.begin(self._body, dc.replace(start, pose=pose), rest)
+            state.weigh_hand(self._hand_mass)
             state.set_hand(self._hand[0], self._height, (0.0, 0.0))
         else:
             state.begin(self._body, start, rest)
@@ -327,5 +338,6 @@ class Stepper:
 
     def _hand_force(self, command: tuple[float, float], span: float) -> Planar:
         """What slowed the hand pushed the object [N]."""
-        (mx, my, mz), (vx, vy, vz) = HAND_MASSES, self._state.hand_velocity()
-        return mx * (command[0] - vx) / span, my * (command[1] - vy) / span, mz * (0.0 - vz) / span
+        rate, (vx, vy, vz) = self._hand_mass / span, self._state.hand_velocity()
+        # Serial prismatic joints: the x joint carries three links, z one.
+        return 3.0 * rate * (command[0] - vx), 2.0 * rate * (command[1] - vy), rate * (0.0 - vz)
