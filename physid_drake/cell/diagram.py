@@ -176,7 +176,8 @@ def _axis_support(support: Support) -> Support:
     shares = np.array([support.weights[np.isclose(support.points[:, 1], y)].sum() for y in ys])
     cells = np.array([support.cells[np.isclose(support.points[:, 1], y)][0] for y in ys])
     points = np.column_stack([np.zeros_like(ys), ys])
-    return Support(points=points, weights=shares, cells=cells, radii=np.zeros_like(ys))
+    polar = float(shares @ ys**2)
+    return Support(points=points, weights=shares, cells=cells, radii=np.zeros_like(ys), polar=polar)
 
 
 def _add_table(plant: MultibodyPlant, edge: Array | None, hydroelastic: bool) -> GeometryId:

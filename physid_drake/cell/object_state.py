@@ -75,6 +75,7 @@ class ObjectState:
         stiffness: of the whole support [N/m], from which the contact takes what friction bears; None where the loads
             together carry the weight, however deep the object is.
         v_rolling: of the underside against Bo, in an object that rolls, x + iy [m/s].
+        lead: how far ahead a force by the object's place is taken, in ticks [-].
         edge: lower and upper corner of a table that ends, x + iy [m]; None where it does not.
     """
 
@@ -93,6 +94,7 @@ class ObjectState:
     lean: tuple[float, float, float]
     stiffness: float | None = None
     v_rolling: complex = 0j
+    lead: float = 0.5
     edge: tuple[complex, complex] | None = None
 
     @cached_property
@@ -108,14 +110,15 @@ class ObjectState:
         return np.array([v.real, v.imag])
 
     @property
-    def p_WBcm_midway(self) -> Array:
-        """Centre of mass (2,) half a tick later, if it goes on as it moves [m].
+    def p_WBcm_held(self) -> Array:
+        """Centre of mass (2,) where a force by its place is taken, that is held over the tick [m].
 
-        A force by where the object is, taken where a tick begins, feeds energy in: a slide's position is that of the
-        mean velocity, and the map of an oscillator over a tick then has the determinant 1 + (w dt)^2 / 2; half a tick
-        later it is 1.
+        A rollout's slide moves by the mean velocity. With the force of where a tick begins, the map of an oscillator
+        over a tick has the determinant 1 + (w dt)^2 / 2, and energy is fed in; half a tick later it is 1. Drake's own
+        step moves by the velocity at its end: there it is 1 with the force of where the tick begins, and half a tick
+        later 1 - (w dt)^2 / 2.
         """
-        return np.asarray(self.p_WBcm + 0.5 * self.span * self.v_WBcm)
+        return np.asarray(self.p_WBcm + self.lead * self.span * self.v_WBcm)
 
     @cached_property
     def arms(self) -> Complex:
@@ -238,6 +241,7 @@ class StateReader:
         stiffness: of the whole support [N/m].
         rolling_radius: of a lying cylinder [m]; None of what does not roll.
         edge: lower and upper corner of a table that ends, x + iy [m]; None where it does not.
+        lead: how far ahead a force by the object's place is taken, in ticks [-]: half of one in a rollout.
     """
 
     underside: Underside
@@ -249,6 +253,7 @@ class StateReader:
     stiffness: float
     rolling_radius: float | None = None
     edge: tuple[complex, complex] | None = None
+    lead: float = 0.5
 
     def at(
         self, time: float, span: float, X_WB: Sequence[float], V_WB: Sequence[float], *, settled: bool = False
@@ -280,6 +285,7 @@ class StateReader:
             stiffness=None if settled else self.stiffness,
             v_rolling=0j if self.rolling_radius is None else self.rolling_radius * complex(-V_WB[1], V_WB[0]),
             edge=self.edge,
+            lead=self.lead,
         )
 
     def lean(self, X_WB: Sequence[float]) -> tuple[float, float, float]:

@@ -76,12 +76,14 @@ class Support:
         weights: (n,) shares of the load, summing to 1.
         cells: (n,) index of the friction cell of each point.
         radii: (n,) of a disc as large as the part of the underside that each point stands for [m].
+        polar: mean square distance from Bo, of the whole underside, whatever presses where [m^2].
     """
 
     points: Array
     weights: Array
     cells: NDArray[np.intp]
     radii: Array
+    polar: float
 
 
 def support_of(
@@ -116,11 +118,12 @@ def support_of(
             raise TypeError(f"no quadrature for an outline of type {type(outline).__name__}")
     cells = grid.cell_of(places, outline)
     radii = np.sqrt(weights / weights.sum() * _area(_as_polygon(outline)) / math.pi)
+    polar = float(weights @ (places**2).sum(axis=1) / weights.sum())
     if pressure is not None:
         weights = weights * pressure.factors(places, outline)
         bears = weights > 0.0  # nothing stands where nothing presses
         places, weights, cells, radii = places[bears], weights[bears], cells[bears], radii[bears]
-    return Support(points=places, weights=weights / weights.sum(), cells=cells, radii=radii)
+    return Support(points=places, weights=weights / weights.sum(), cells=cells, radii=radii, polar=polar)
 
 
 def _common(first: FrictionGrid, second: FrictionGrid) -> FrictionGrid:

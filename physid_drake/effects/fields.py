@@ -124,7 +124,7 @@ class _SpringLaw:
     rest_length: float
 
     def wrench(self, state: ObjectState) -> Wrench:
-        px, py = state.p_WBcm_midway.tolist()
+        px, py = state.p_WBcm_held.tolist()
         dx, dy = self.x - px, self.y - py
         if self.rest_length == 0.0:
             return Wrench(fx=self.stiffness * dx, fy=self.stiffness * dy, torque=0.0)
@@ -195,7 +195,7 @@ class _MagnetLaw:
     core: float
 
     def wrench(self, state: ObjectState) -> Wrench:
-        px, py = state.p_WBcm_midway.tolist()
+        px, py = state.p_WBcm_held.tolist()
         dx, dy = self.x - px, self.y - py
         square = dx * dx + dy * dy
         pull = self.strength / (square + self.core**2) / max(math.sqrt(square), 1e-6)

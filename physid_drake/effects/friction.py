@@ -215,9 +215,10 @@ class FrictionPatch(Effect):
         return bool(away.min() < WIDER * self.radius + 0.5 * float(np.hypot(*around.size)) + NEARBY)
 
     def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:
-        """The law."""
-        del facts
-        return (_PatchLaw(self.ratio, self.x, self.y, self.radius),)
+        """The law; none of a patch that the push does not reach: the contact holds no more friction than it must."""
+        place = np.array([self.x, self.y])
+        away = float(np.hypot(*(place - np.clip(place, *facts.region))))
+        return (_PatchLaw(self.ratio, self.x, self.y, self.radius),) if away <= self.radius else ()
 
 
 def _patch_family(place: tuple[float, float], radius: float, shares: tuple[float, ...] = ()) -> Family:
@@ -246,19 +247,25 @@ class _PatchLaw:
     def ratio(self, state: ObjectState) -> Array | Complex:
         away = np.abs(state.places - complex(self.x, self.y))
         radii = np.maximum(state.underside.radii, POINT)
-        return 1.0 + (self.inside - 1.0) * share_inside((away - self.radius) / radii)
+        return 1.0 + (self.inside - 1.0) * share_inside(away, self.radius, radii)
 
 
-def share_inside(beyond: Array) -> Array:
-    """Shares (n,) of discs that are on this side of a straight edge: areas of circular segments.
+def share_inside(away: Array, radius: float, radii: Array) -> Array:
+    """Shares (n,) of discs that lie in a circle: areas of lenses, which two circular segments make.
 
     An edge of the table is sharp, and crosses the disc that a support point stands for little by little.
 
     Args:
-        beyond: (n,) how far their centres are beyond the edge, in radii of the discs.
+        away: (n,) from the circle's middle to those of the discs [m].
+        radius: of the circle [m].
+        radii: (n,) of the discs [m].
     """
-    s = np.clip(beyond, -1.0, 1.0)
-    inside: Array = (np.arccos(s) - s * np.sqrt(1.0 - s * s)) / math.pi
+    d = np.maximum(away, 1e-9)
+    of_disc = np.clip((d**2 + radii**2 - radius**2) / (2.0 * d * radii), -1.0, 1.0)
+    of_circle = np.clip((d**2 + radius**2 - radii**2) / (2.0 * d * radius), -1.0, 1.0)
+    kite = (radii + radius - d) * (d + radii - radius) * (d - radii + radius) * (d + radii + radius)
+    lens = radii**2 * np.arccos(of_disc) + radius**2 * np.arccos(of_circle) - 0.5 * np.sqrt(np.maximum(kite, 0.0))
+    inside: Array = lens / (math.pi * radii**2)
     return inside
 
 

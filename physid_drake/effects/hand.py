@@ -61,6 +61,11 @@ class HandCompliance(_HandEffect):
     damping: float = parameter(0.5, "-")
 
     @classmethod
+    def applies(cls, around: Surroundings) -> bool:
+        """With a hand, unless the face slips past the tip up or down, as a rolling one does: the tip is planar."""
+        return around.has_hand and not around.rolls
+
+    @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """Compliance, log damping."""
         force = around.friction * around.weight

@@ -132,7 +132,7 @@ def _true_start(effects: Sequence[Effect], start: Start) -> Start:
 def facts_of(cell: Cell, body: Body, region: Array, order: int, hand_axes: Array | None = None) -> PushFacts:
     """What effects may know of a push that comes within a region (2, 2) [m]; without ``hand_axes`` P is as W."""
     return PushFacts(
-        order=order, mass=body.mass, polar=float(sum(_second_moments(cell))),
+        order=order, mass=body.mass, polar=cell.scene.support.polar,
         rolling_radius=cell.solid.rolling_radius, region=region,
         hand_axes=np.eye(2) if hand_axes is None else hand_axes,
     )  # fmt: skip
@@ -177,10 +177,3 @@ def _region(cell: Cell, body: Body, push: Rollout) -> Array:
     x0, y0, x1, y1 = cell.solid.underside.extent()
     margin = math.hypot(x1 - x0, y1 - y0) + min(slide, 1.0)
     return np.array([places.min(axis=0) - margin, places.max(axis=0) + margin])
-
-
-def _second_moments(cell: Cell) -> tuple[float, float]:
-    """Mean x^2 and y^2 of the points that carry the object [m^2]."""
-    support = cell.scene.support
-    xx, yy = (support.weights @ support.points**2).tolist()
-    return xx, yy

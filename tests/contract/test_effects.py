@@ -320,7 +320,8 @@ def test_an_effect_that_says_it_only_scales_friction_does_what_it_says(kind):
 def test_effects_apply_where_they_can():
     flat, round_ = applicable(around(False)), applicable(around(True))
     assert {kind.name for kind in CATALOGUE} - {kind.name for kind in flat} == {"rolling_resistance"}
-    assert {kind.name for kind in CATALOGUE} - {kind.name for kind in round_} == {"com_offset", "uneven_support"}
+    no_roll = {"com_offset", "uneven_support", "hand_compliance"}
+    assert {kind.name for kind in CATALOGUE} - {kind.name for kind in round_} == no_roll
     free = dc.replace(around(False), has_hand=False)
     gone = {kind.name for kind in flat} - {kind.name for kind in applicable(free)}
     assert gone == {"restitution", "hand_compliance", "actuator_lag", "hand_offset", "tracker_latency"}

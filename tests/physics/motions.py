@@ -26,7 +26,7 @@ SLOW = {"speed": 0.02, "until": 1.0, "rise": 0.2, "brake": 0.2}  # a push along 
 @cache
 def built(geometry, hand, model="point", points=30, tick=2e-3):
     config = config_of(model)
-    config.solver.slide_time_step_s = tick
+    config.solver.time_step_s, config.solver.slide_time_step_s = min(config.solver.time_step_s, tick), tick
     config.contact.support_points = points
     return Cell(
         geometry.shape, hand_radius=TIP if hand else None, config=config, pressure=geometry.pressure,

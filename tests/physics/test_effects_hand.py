@@ -1,17 +1,18 @@
 """Effects of the hand against closed forms and small integrations. Measured errors stand beside the tolerances."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from motions import BOX, MASS, MU, POLAR, SIZE, SLOW, TIP, G, at, built, end, make, push_along_x, velocities
-from twin import body_of
+from twin import body_of, config_of
 
-from physid_drake.cell import Body, HandPath, Outcome, Start
+from physid_drake.cell import Body, Cell, HandPath, Outcome, Start
 from physid_drake.cell.outline import rectangle
 from physid_drake.cell.soft_tip import Mount, SoftTip
 from physid_drake.cell.touch import Tip as ContactTip
-from physid_drake.effects import PushFacts
+from physid_drake.effects import PushFacts, Surroundings, effect_named
 from physid_drake.effects.hand import TIP_SHARE
 from physid_drake.effects.rollout import Rollout, roll
 
@@ -161,13 +162,44 @@ def test_a_hand_offset_along_the_push_brings_the_object_as_much_further():
 
 def test_a_hand_offset_is_along_the_tips_own_axes():
     _, path = push_along_x()
-    turned = np.array([[0.0, 1.0], [1.0, 0.0]])  # P's x along y of W: a tip that points down, turned by 90 degrees
+    turned = np.array([[0.0, -1.0], [1.0, 0.0]])  # P's x along y of W, P's y against x of W
     facts = PushFacts(order=0, mass=MASS, polar=1e-3, hand_axes=turned)
     moved = make("hand_offset", x=0.003, y=0.001).hand(path, facts)
-    np.testing.assert_allclose(moved.start - path.start, [0.001, 0.003], atol=1e-15)
+    np.testing.assert_allclose(moved.start - path.start, [-0.001, 0.003], atol=1e-15)
 
 
 def test_a_hand_offset_across_the_push_is_a_push_beside_the_middle():
     shifted, _ = push_along_x(make("hand_offset", y=0.01))
     beside, _ = push_along_x(side=0.01)
     np.testing.assert_allclose(end(shifted), end(beside), atol=1e-9)
+
+
+@pytest.mark.parametrize("tick", [1e-2, 2e-2])
+def test_a_soft_tip_is_no_less_stable_in_the_long_ticks_of_a_slow_hand(tick):
+    """Beside the middle, at 5 mm/s; in ticks as long as these the tip's own were 17 mrad off."""
+    path = HandPath(
+        times=np.array([0.0, 0.02, 8.0]), velocities=np.outer([0.0, 0.005, 0.005], [1.0, 0.0]),
+        start=np.array([-0.5 * SIZE[0] - TIP - 5e-4, 0.01]),
+    )  # fmt: skip
+    push = Rollout(start=Start(pose=(0.0, 0.0, 0.0)), path=path, begin=0.0, end=8.1, hand_height=None)
+    body, soft = body_of(MASS, MU, hand_friction=0.3), (make("hand_compliance", compliance=1e-5),)
+    long, short = (end(roll(lambda g, t=t: ticking(g, t), BOX, body, push, soft)) for t in (tick, 2e-3))
+    np.testing.assert_allclose(long[:2], short[:2], atol=3e-5)  # measured 2e-6 m
+    assert long[2] == pytest.approx(short[2], abs=5e-4)  # measured 4e-5 rad
+
+
+def ticking(geometry, tick):
+    """A cell with a hand and long ticks."""
+    config = config_of("point", time_step_s=tick, slide_time_step_s=tick)
+    return Cell(geometry.shape, hand_radius=TIP, config=config)
+
+
+def test_a_soft_tip_is_not_looked_for_where_the_object_rolls():
+    """Its face slips past the tip up or down, and the tip is planar: with no compliance it is 8 sigma off."""
+    kind = effect_named("hand_compliance")
+    around = Surroundings(
+        mass=0.3, friction=0.3, size=np.array([0.066, 0.1]), height=0.066,
+        region=np.array([[-0.1, -0.1], [0.1, 0.1]]), top_speed=0.3, pushes=8, has_hand=True, rolls=True,
+    )  # fmt: skip
+    assert not kind.applies(around) and kind.applies(replace(around, rolls=False))
+    assert not kind.applies(replace(around, rolls=False, has_hand=False))

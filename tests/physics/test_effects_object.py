@@ -11,7 +11,7 @@ from physid_drake.cell import Start
 from physid_drake.cell.forces import Wrench
 from physid_drake.cell.support import PressureGrid
 from physid_drake.effects.rollout import Geometry
-from physid_drake.recording import Cylinder
+from physid_drake.recording import Box, Cylinder, Prism
 
 LYING = Geometry(shape=Cylinder(radius=0.033, length=0.1, axis="y"))
 
@@ -40,6 +40,19 @@ def test_rolling_resistance_slows_a_rolling_cylinder_by_two_thirds_g_b_over_r():
     want = 2.0 / 3.0 * G * b / r
     rate = np.polyfit(motion.times[5:200], np.gradient(at(motion, motion.times)[5:200, 0], 2e-3), 1)[0]
     assert -rate == pytest.approx(want, rel=1e-3)  # measured 2.4e-4
+
+
+@pytest.mark.parametrize("yaw", [0.8, 2.5])
+def test_a_cylinder_rolls_alike_whichever_way_it_lies(yaw):
+    c, s = math.cos(yaw), math.sin(yaw)
+    effects = (make("rolling_resistance", coefficient=1e-3), make("viscous_drag", coefficient=0.1))
+    straight = end(slide(*effects, velocity=(0.2, 0.05, 0.0), geometry=LYING))
+    turned = end(
+        slide(*effects, velocity=(0.2 * c - 0.05 * s, 0.2 * s + 0.05 * c, 0.0), pose=(0, 0, yaw), geometry=LYING)
+    )
+    R = np.array([[c, -s], [s, c]])
+    np.testing.assert_allclose(turned[:2], R @ straight[:2], atol=1e-6)
+    assert turned[2] - yaw == pytest.approx(straight[2], abs=1e-6)
 
 
 def test_a_rolling_cylinder_stops_and_stays():
@@ -118,3 +131,37 @@ def test_a_larger_object_is_touched_earlier_by_half_its_growth():
     larger, _ = push_along_x(make("size_error", ratio=1.04))
     earlier = path.positions(np.array([plain.impacts[0]])) - path.positions(np.array([larger.impacts[0]]))
     assert earlier[0, 0] == pytest.approx(0.5 * 0.04 * SIZE[0], abs=1e-6)  # measured 3e-7 m
+
+
+@pytest.mark.parametrize(
+    ("shape", "wanted"),
+    [
+        (Box(size=(0.1, 0.08, 0.06)), Box(size=(0.11, 0.088, 0.066))),
+        (Cylinder(radius=0.03, length=0.1, axis="z"), Cylinder(radius=0.033, length=0.11, axis="z")),
+        (
+            Prism(polygon=((-0.03, -0.02), (0.06, -0.02), (-0.03, 0.04)), height=0.06),
+            Prism(polygon=((-0.033, -0.022), (0.066, -0.022), (-0.033, 0.044)), height=0.066),
+        ),
+    ],
+    ids=lambda shape: type(shape).__name__,
+)
+def test_an_object_is_larger_in_all_directions(shape, wanted):
+    got = make("size_error", ratio=1.1).reshaped(shape)
+    assert type(got) is type(wanted)
+    for name, value in vars(wanted).items():
+        if not isinstance(value, str | None):
+            np.testing.assert_allclose(getattr(got, name), value, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "grid", [((5.0, 1.0, 5.0), (1.0, 1.0, 1.0), (5.0, 1.0, 5.0)), ((1, 1, 1), (1, 9, 1), (1, 1, 1))]
+)
+def test_a_film_is_under_the_whole_base_wherever_it_presses(grid):
+    """Without friction, a spin under a drag -c k^2 w decays alike, whatever carries the weight."""
+    drag, uneven = make("viscous_drag", coefficient=0.4), make("uneven_support", weights=grid)
+    even = spun(drag, friction=1e-6, seconds=0.5)
+    np.testing.assert_allclose(
+        end(spun(drag, uneven, friction=1e-6, seconds=0.5)), end(even), atol=1e-4
+    )  # measured 3e-5
+    want = 10.0 * (1.0 - math.exp(-0.4 * 0.5 / MASS)) * MASS / 0.4  # the inertia is m k^2, too
+    assert end(even)[2] == pytest.approx(want, rel=2e-3)
