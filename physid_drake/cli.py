@@ -67,6 +67,7 @@ def _register_inspect(subparsers: Subparsers) -> None:
 
 def _run_inspect(arguments: argparse.Namespace) -> int:
     # Matplotlib takes half a second to import and Drake a second, which the other commands need not wait for.
+    from physid_drake.identify.doubts import doubts  # noqa: PLC0415
     from physid_drake.identify.frames import refusals  # noqa: PLC0415
     from physid_drake.report.inspection import draw_pushes, inspection_table, warning_lines  # noqa: PLC0415
     from physid_drake.report.terminal import terminal  # noqa: PLC0415
@@ -75,7 +76,8 @@ def _run_inspect(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"--out must name a picture, such as pushes.png, but is '{arguments.out}'.")
     recording = read_recording(arguments.folder)
     terminal().print(inspection_table(recording))
-    for line in (*warning_lines(recording), *(f"would be refused: {said}" for said in refusals(recording))):
+    refused = (f"would be refused: {said}" for said in refusals(recording))
+    for line in (*warning_lines(recording), *doubts(recording), *refused):
         warnings.warn(line, UserWarning, stacklevel=1)
     if arguments.out is not None:
         out: Path = arguments.out

@@ -111,6 +111,7 @@ class Model:
         hand_axes: (2, 2) the axes of P, as columns, along x and y of W, if all pushes had about the same.
         hand_turns: whether the hand turns with its pushes: then ``hand_axes`` are along and across a push's heading.
         tip_height: of P above the table in what it was learnt from [m]; None where nobody knows.
+        contact_height: of where the tip touched the object [m]; None where nobody knows.
     """
 
     recording: str
@@ -125,6 +126,7 @@ class Model:
     hand_axes: Axes = AS_W
     hand_turns: bool = False
     tip_height: float | None = None
+    contact_height: float | None = None
 
     def axes_on(self, path: HandPath | None) -> Array:
         """The axes (2, 2) of P, as columns, along x and y of W, in a push along a path."""
@@ -162,6 +164,8 @@ class Model:
             content["hand_turns"] = True
         if self.tip_height is not None:
             content["tip_height_m"] = self.tip_height
+        if self.contact_height is not None:
+            content["contact_height_m"] = self.contact_height
         return str(yaml.safe_dump(content, sort_keys=False))
 
 

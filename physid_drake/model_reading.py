@@ -61,7 +61,11 @@ def _model(content: dict[str, Any], file: Path) -> Model:
     if len(set(names)) < len(names):
         raise ConfigError(f"key 'effects': none may be there twice, but they are {', '.join(names)}.")
     intervals = _intervals(content.get("intervals", {}), effects)
-    radius, height = content["hand_radius_m"], content.get("tip_height_m")
+    radius = content["hand_radius_m"]
+    heights = {
+        name: None if (value := content.get(f"{name}_m")) is None else _number(f"{name}_m", value)
+        for name in ("tip_height", "contact_height")
+    }
     (x0, y0), (x1, y1) = _rows("table_m", content["table_m"])
     return Model(
         recording=str(content["recording"]),
@@ -78,7 +82,7 @@ def _model(content: dict[str, Any], file: Path) -> Model:
         correlation=_correlation(content, intervals),
         hand_axes=_axes(content.get("hand_axes")),
         hand_turns=bool(content.get("hand_turns", False)),
-        tip_height=None if height is None else _number("tip_height_m", height),
+        **heights,
     )
 
 

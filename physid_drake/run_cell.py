@@ -17,8 +17,9 @@ from physid_drake.diagnose import Diagnosis, case_of, model_of
 from physid_drake.diagnose.memory import Memory
 from physid_drake.errors import ConfigError, PhysidError
 from physid_drake.identify import Identification, Identifier, OnlineIdentifier
+from physid_drake.identify.doubts import doubts
 from physid_drake.identify.nuisance import nuisance_of
-from physid_drake.identify.problem import usual_tip_height
+from physid_drake.identify.problem import usual_heights
 from physid_drake.identify.rollouts import Task, simulate
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
 from physid_drake.model import Model
@@ -27,6 +28,7 @@ from physid_drake.plan.system import Planner, PolicySystem, identified_model, pl
 from physid_drake.progress import Progress
 from physid_drake.recording import Recording, digest_of, read_recording
 from physid_drake.report.cells import cells_table
+from physid_drake.report.inspection import warning_lines
 from physid_drake.report.page import result_page
 from physid_drake.report.plan import plan_table, push_files
 from physid_drake.report.progress import progress_bar
@@ -46,6 +48,7 @@ BELIEF = "belief.npz"  # of an interrupted identification
 DIAGNOSIS_PAGE = "diagnosis.html"
 DIAGNOSIS = ("diagnosis.json", DIAGNOSIS_PAGE, "scene.html")
 RESULTS = ("result.json", "page.html", "model.yaml", *DIAGNOSIS, *PLAN)
+MOST_WARNINGS = 5  # printed
 SHOWN = 12  # pushes in the animation, held-out ones first
 
 
@@ -102,8 +105,8 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     folder = RunFolder.open(out, made_by, files=(BELIEF, STATE, *RESULTS))
     stage = None if arguments.no_view else _live(recording, console)
     result, plan = _identify(identifier, planner, scenario, recording, console)
-    tip_height = usual_tip_height(identifier.problems)
-    model = identified_model(result, identifier.pool.spec, recording.name, tip_height=tip_height)
+    heights = usual_heights(identifier.problems)
+    model = identified_model(result, identifier.pool.spec, recording.name, heights=heights)
     stage = stage or Stage(recording)
     marks = stage.play(_scenes(result, identifier, recording))
     note = f"{recording.description} Seed {scenario.seed}; {identifier.pool.count} rollouts."
@@ -137,6 +140,11 @@ def _show(result: Identification, identifier: Identifier, recording: Recording, 
         console.print(cells_table(result.cells))
     console.print(accuracy_table(result))
     console.print(verdict(result))
+    odd = (*doubts(recording), *warning_lines(recording))
+    for line in odd[:MOST_WARNINGS]:
+        console.print(f"Note: {line}", markup=False)
+    if len(odd) > MOST_WARNINGS:
+        console.print(f"and {len(odd) - MOST_WARNINGS} notes more: python -m physid_drake inspect")
     if identifier.pool.diverged:
         console.print(f"{identifier.pool.diverged} of {identifier.pool.count} rollouts diverged and count as failed.")
 

@@ -15,6 +15,7 @@ from physid_drake.diagnose.noise import ForceNoise, TrackerNoise, tracker_noise
 from physid_drake.effects import Surroundings
 from physid_drake.errors import RecordingError
 from physid_drake.identify.config import ThetaConfig
+from physid_drake.identify.doubts import doubts
 from physid_drake.identify.force_windows import WINDOW
 from physid_drake.identify.frames import unseen_motion
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
@@ -80,7 +81,7 @@ class Case:
         )
         unseen = unseen_motion(self.recording, self.noise.position)
         few = (thinned,) if some < self.pushes else ()
-        return (*few, *self.noise.warnings, *unseen, *self._unused_forces())
+        return (*few, *doubts(self.recording), *self.noise.warnings, *unseen, *self._unused_forces())
 
     def _unused_forces(self) -> tuple[str, ...]:
         """That forces were recorded of which nothing could be compared."""

@@ -24,7 +24,6 @@ from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.estimates import parameters_of, smallest, theta_of
 from physid_drake.diagnose.evidence import (
     MOST_OF_UNKNOWN,
-    MOST_SCATTER,
     TOO_SCATTERED,
     Evidence,
     confirmed,
@@ -48,6 +47,7 @@ from physid_drake.diagnose.values import (
     Partly,
     Ranked,
 )
+from physid_drake.identify.identify import MOST_SCATTER
 from physid_drake.identify.misfit import diverged
 
 Array = NDArray[np.float64]

@@ -18,6 +18,7 @@ from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.screen import Screening, Signature
 from physid_drake.diagnose.values import NextPush
+from physid_drake.identify.identify import MOST_SCATTER
 
 Array = NDArray[np.float64]
 
@@ -31,7 +32,6 @@ MOST_LEFT = 0.5  # beside what two laws of one effect differ by
 EVER_LEFT = 2.0  # in all
 LAW_ERROR = 0.1  # of an effect's motion: two honest implementations of a spring or a liquid differ by that much
 MOST_OF_UNKNOWN = 0.5  # of the noise's variance, where it is not known
-MOST_SCATTER = 0.08  # of friction from push to push: what differs by more is no scatter, but something left out
 TOO_SCATTERED = 0.01  # p-value below which a model with effects leaves frictions that differ by more
 
 

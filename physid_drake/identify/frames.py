@@ -26,13 +26,15 @@ FEWEST = 4  # samples
 STILL_FAST = 0.5  # of a hand's speed: faster, it has not come to a stop
 LIGHTEST, HEAVIEST = 1.0, 23000.0  # kg/m^3, of the box around an object: lighter than air, denser than osmium
 SLOWEST = 1.0  # s between samples: slower, it is no stream of a push
+FEWEST_FORCES = 3  # pushes
 BESIDE = 0.05  # m between tip and object that no error of calibration explains
 
 
 def refusals(recording: Recording) -> tuple[str, ...]:
     """What an identification or a diagnosis would refuse, as far as places, times and masses say so; in words."""
     checks: list[Callable[[], None]] = [
-        partial(check, recording) for check in (check_mass, check_hand_near, check_hand_outside)
+        partial(check, recording)
+        for check in (check_mass, check_hand_near, check_hand_outside, check_force_direction)
     ]
     for push in recording.pushes:
         checks += [
@@ -138,12 +140,38 @@ def check_hand_outside(recording: Recording) -> None:
     """Refuses a tip that reaches deep into every object as it sets it moving: a radius in mm, or another frame."""
     if recording.hand is None:
         return
-    depths = [depth for push in recording.pushes if (depth := _depth_at_touch(recording, push)) is not None]
+    depths = depths_at_touch(recording)
     if depths and min(depths) > BESIDE:
         raise RecordingError(
             f"recording '{recording.name}': the hand's tip, of radius {recording.hand.radius:g} m, is"
             f" {1e3 * min(depths):.0f} mm or more inside the object as it begins to move; is the radius in m?"
         )
+
+
+def depths_at_touch(recording: Recording) -> list[float]:
+    """How deep [m] the tip is in the object as that has begun to move, of each push in which it does."""
+    if recording.hand is None:
+        return []
+    depths = (_depth_at_touch(recording, push) for push in recording.pushes)
+    return [depth for depth in depths if depth is not None]
+
+
+def check_force_direction(recording: Recording) -> None:
+    """Refuses forces that brake the objects which the hand sets moving: those of the object on the hand."""
+    works = [_work(push) for push in recording.pushes if push.force is not None and _moves(push)]
+    if len(works) >= FEWEST_FORCES and sum(work < 0.0 for work in works) > 0.5 * len(works):
+        raise RecordingError(
+            f"recording '{recording.name}': the hand's force points against the object's motion in most pushes; it"
+            " has to be the force of the hand on the object, in W."
+        )
+
+
+def _work(push: Push) -> float:
+    """Of the hand on the object, in the plane [J]."""
+    assert push.force is not None
+    times, forces = push.force.times, push.force.forces[:, :2]
+    places = np.column_stack([np.interp(times, push.object.times, c) for c in push.object.positions[:, :2].T])
+    return float((0.5 * (forces[1:] + forces[:-1]) * np.diff(places, axis=0)).sum())
 
 
 def _depth_at_touch(recording: Recording, push: Push) -> float | None:

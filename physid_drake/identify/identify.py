@@ -32,6 +32,8 @@ Array = NDArray[np.float64]
 
 DIVERGED = 3.0  # nats of a theta's cost for each push whose rollout diverges
 EXPLAINED = 1.5  # reduced chi-square below which the plain cell leaves no more than noise and its own error
+MOST_SCATTER = 0.08  # of friction from push to push: pushes that differ by more differ in something that is left out
+AT_BOUND = 1e-3  # of the unit cube
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -44,6 +46,7 @@ class Estimate:
         ci90: 90 % interval.
         identifiable: whether the pushes leave at most half of the prior's spread (``TOLD``).
         prior: its value before.
+        at_bound: whether it ran into a bound that is none of physics: the truth may lie beyond.
     """
 
     name: str
@@ -52,6 +55,7 @@ class Estimate:
     ci90: tuple[float, float]
     identifiable: bool
     prior: float
+    at_bound: bool = False
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -112,8 +116,13 @@ class Identification:
 
     @property
     def explains(self) -> bool:
-        """Whether the plain cell explains the pushes to their noise."""
-        return self.reduced_chi2 < EXPLAINED
+        """Whether the plain cell explains the pushes to their noise, with frictions that hardly differ."""
+        return self.reduced_chi2 < EXPLAINED and not self.by_frictions
+
+    @property
+    def by_frictions(self) -> bool:
+        """Whether frictions that differ from push to push took up what the plain cell leaves."""
+        return self.polished.friction_scatter > MOST_SCATTER
 
 
 def split_pushes(count: int, share: float, rng: np.random.Generator) -> tuple[list[int], list[int]]:
@@ -313,6 +322,8 @@ def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
                 ci90=(_moved(space, u, j, low), _moved(space, u, j, high)),
                 identifiable=told,
                 prior=parameter.prior_mean,
+                # That nothing is below zero is physics, and no choice of the search's.
+                at_bound=bool(u[j] > 1.0 - AT_BOUND or (u[j] < AT_BOUND and parameter.lower != 0.0)),
             )
         )
     return tuple(result)

@@ -14,6 +14,7 @@ from physid_drake.errors import RecordingError
 from physid_drake.identify.force_windows import force_windows
 from physid_drake.identify.frames import (
     check_clocks,
+    check_force_direction,
     check_hand_near,
     check_hand_outside,
     check_mass,
@@ -210,6 +211,7 @@ def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[Push
     check_mass(recording)
     check_hand_near(recording)
     check_hand_outside(recording)
+    check_force_direction(recording)
     hands = {k: beside_object(recording, push, height, noise.position) for k, push in enumerate(recording.pushes)}
     moving = {k: hand for k, hand in hands.items() if hand is not None}
     fitted = fit_hand_paths([(hand.times, hand.positions[:, :2]) for hand in moving.values()], noise.hand)
@@ -248,10 +250,13 @@ def _problem(
     )
 
 
-def usual_tip_height(problems: Sequence[PushProblem]) -> float | None:
-    """Median height of P above the table over pushes [m]; None where there is no hand."""
-    heights = [problem.tip_height for problem in problems if problem.tip_height is not None]
-    return float(np.median(heights)) if heights else None
+def usual_heights(problems: Sequence[PushProblem]) -> tuple[float | None, float | None]:
+    """Medians over pushes of the heights of P and of its contact above the table [m]; None without a hand."""
+    pairs = [(problem.tip_height, problem.hand_height) for problem in problems if problem.tip_height is not None]
+    if not pairs:
+        return None, None
+    tip, contact = np.median(pairs, axis=0).tolist()
+    return tip, contact
 
 
 def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[Start, Array]:

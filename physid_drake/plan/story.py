@@ -26,6 +26,9 @@ Outcome = tuple[Trajectory, float]  # and its cost [m]
 CANDIDATES = 256
 REFINE_EVERY = 6  # trials: candidates gather where the best setting may be
 TOLERANCE = 0.01  # m
+# m: the search minimises the logarithm of cost and this. A lost object costs a metre and more; beside such a cliff a
+# Gaussian process of the cost itself does not see the millimetres before it.
+CLOSE = 1e-3
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
@@ -106,7 +109,7 @@ class Plan:
         loss: the cost of an object that is lost or does not stop [m].
         spread: under the belief, or None if nothing was drawn.
         sweep: cost along the policy's swept setting, the others as the search found them best.
-        search: what the search found; with ``risk`` its errors are mean costs under the belief.
+        search: what the search found; its errors are log(cost + ``CLOSE``), with ``risk`` of the mean cost.
         risk: whether the mean over the belief was made small instead of the likely theta's cost.
     """
 
@@ -171,11 +174,14 @@ def plan(
     """
     _check(budget, draws, sweep, tolerance, search)
     hand_radius_of(model)
-    streams = [np.random.default_rng(s) for s in rng.integers(2**63, size=3)]
-    drawn: tuple[Draw, ...] = ()
+    streams = [np.random.default_rng(s) for s in rng.integers(2**63, size=4)]
+    drawn, fresh = tuple[Draw, ...](), tuple[Draw, ...]()
     if uncertain_names(model) or friction_scatter > 0.0 or any(situation.start_std):
-        drawn = draws_of(
-            model, situation, draws, streams[0], friction_scatter=friction_scatter, scatter_freedom=scatter_freedom
+        drawn, fresh = (
+            draws_of(
+                model, situation, draws, stream, friction_scatter=friction_scatter, scatter_freedom=scatter_freedom
+            )
+            for stream in (streams[0], streams[3])
         )
     if risk and not drawn:
         raise ConfigError("plan: the mean over the belief needs draws, and a model with intervals to draw from.")
@@ -189,10 +195,13 @@ def plan(
     rows = story.sweep(found.theta_best, sweep)
     best = _better(policy, found, rows, risk=risk)
     predicted = story.trajectory(model, best)
+    pushes = policy.pushes(best)
+    # What was made small on its own draws looks better there than it is.
+    told = spread_of(fresh if risk else drawn, pushes, cost, model=model, situation=situation) if drawn else None
     return Plan(
         model=model, policy=policy, cost_function=cost, situation=situation, tolerance=tolerance, settings=best,
         predicted=predicted, cost=cost_of(cost, predicted, model.table), loss=story.loss,
-        spread=story.spread(best) if drawn else None, sweep=rows, search=found, risk=risk,
+        spread=told, sweep=rows, search=found, risk=risk,
     )  # fmt: skip
 
 
@@ -242,7 +251,7 @@ def outcome_under(made: Plan, model: Model) -> Outcome:
 
 def _better(policy: Policy, found: SearchResult, rows: Sequence[SweepRow], *, risk: bool) -> Array:
     """The best setting (d,) of the search, or of the sweep along the swept one where that is better."""
-    best, least = np.array(found.theta_best), found.error_best
+    best, least = np.array(found.theta_best), math.exp(found.error_best) - CLOSE
     index = policy.space.index(policy.swept)
     for row in rows:
         cost = row.spread.mean if risk and row.spread is not None else row.cost
@@ -274,12 +283,13 @@ class _Story:
         return trajectory_of(model, self._policy.pushes(settings), self._situation)
 
     def likely_costs(self, settings: Array) -> Array:
-        """Costs (k,) of settings (k, d) under the likely theta."""
-        return np.array([cost_of(self._cost, self.trajectory(self._model, s), self._model.table) for s in settings])
+        """Costs (k,) of settings (k, d) under the likely theta, on the search's scale."""
+        costs = [cost_of(self._cost, self.trajectory(self._model, s), self._model.table) for s in settings]
+        return np.log(np.array(costs) + CLOSE)
 
     def mean_costs(self, settings: Array) -> Array:
-        """Mean costs (k,) of settings (k, d) under the belief."""
-        return np.array([self.spread(s).mean for s in settings])
+        """Mean costs (k,) of settings (k, d) under the belief, on the search's scale."""
+        return np.log(np.array([self.spread(s).mean for s in settings]) + CLOSE)
 
     def spread(self, settings: Array) -> Spread:
         pushes = self._policy.pushes(settings)

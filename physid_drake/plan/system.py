@@ -13,7 +13,7 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 
 from physid_drake.identify import Identification
 from physid_drake.identify.polish import scatter_freedom
-from physid_drake.identify.problem import CellSpec, PushProblem, usual_tip_height
+from physid_drake.identify.problem import CellSpec, PushProblem, usual_heights
 from physid_drake.identify.system import PUSH_PERIOD
 from physid_drake.model import Correlation, Model
 from physid_drake.plan.config import PlanConfig
@@ -142,7 +142,7 @@ class Planner:
         goal: x, y [m].
         name: of the recording.
         seed: of the run.
-        tip_height: of the recorded tip's centre above the table [m].
+        heights: of the recorded tip's centre and of its contact above the table [m]; None where nobody knows.
     """
 
     config: PlanConfig
@@ -151,7 +151,7 @@ class Planner:
     goal: tuple[float, float]
     name: str
     seed: int
-    tip_height: float | None = None
+    heights: tuple[float | None, float | None] = (None, None)
 
     @property
     def dimension(self) -> int:
@@ -165,7 +165,7 @@ class Planner:
             result: the identification.
             tick: told stage, steps done and steps in all.
         """
-        model = identified_model(result, self.spec, self.name, tip_height=self.tip_height)
+        model = identified_model(result, self.spec, self.name, heights=self.heights)
         polished = result.polished
         return self.with_model(
             model, friction_scatter=polished.friction_scatter, pushes=len(polished.residuals), tick=tick
@@ -215,22 +215,25 @@ def planner_of(config: PlanConfig, spec: CellSpec, problems: Sequence[PushProble
     )  # fmt: skip
     return Planner(
         config=config, spec=spec, situation=situation, goal=goal, name=name, seed=seed,
-        tip_height=usual_tip_height(problems),
+        heights=usual_heights(problems),
     )  # fmt: skip
 
 
-def identified_model(result: Identification, spec: CellSpec, name: str, *, tip_height: float | None = None) -> Model:
+def identified_model(
+    result: Identification, spec: CellSpec, name: str, *, heights: tuple[float | None, float | None] = (None, None)
+) -> Model:
     """The plain cell with the identified theta, its intervals and how they vary together.
 
     Args:
         result: the identification.
         spec: of the cell it was made with.
         name: of the recording.
-        tip_height: of the recorded tip's centre above the table [m].
+        heights: of the recorded tip's centre and of its contact above the table [m]; None where nobody knows.
     """
     intervals = {f"theta.{e.name}": list(e.ci90) for e in result.estimates}
     return Model(
         recording=name, shape=spec.shape, hand_radius=spec.hand_radius, table=spec.table, config=spec.config,
         body=result.thetas.body(result.theta), intervals=intervals,
-        correlation=Correlation.of(tuple(intervals), result.polished.correlation), tip_height=tip_height,
+        correlation=Correlation.of(tuple(intervals), result.polished.correlation),
+        tip_height=heights[0], contact_height=heights[1],
     )  # fmt: skip

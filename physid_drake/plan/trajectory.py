@@ -76,7 +76,7 @@ class Situation:
     Attributes:
         start: x, y [m], yaw [rad] of the object, as the tracker reports it.
         order: number of the next push since the recording began, for physics that changes from push to push.
-        hand_height: of the tip's contact above the table [m]; None for half the object's height.
+        hand_height: of the tip's contact above the table [m]; None for the model's, or half the object's height.
         start_std: standard deviation of where the object stands about ``start`` [m, m, rad].
     """
 
@@ -98,7 +98,8 @@ def _true_solid(model: Model) -> Solid:
 
 def contact_height_of(model: Model, situation: Situation) -> float:
     """Height of the tip's contact above the table [m]."""
-    return 0.5 * _true_solid(model).height if situation.hand_height is None else situation.hand_height
+    known = model.contact_height if situation.hand_height is None else situation.hand_height
+    return 0.5 * _true_solid(model).height if known is None else known
 
 
 def tip_height_of(model: Model, situation: Situation) -> float:
@@ -189,7 +190,7 @@ def _roll(model: Model, push: PlannedPush, path: HandPath, situation: Situation)
     spec = CellSpec(shape=model.shape, hand_radius=model.hand_radius, config=config, table=model.table)
     rollout = Rollout(
         start=Start(pose=situation.start), path=path, begin=0.0, end=float(path.times[-1]) + HORIZON,
-        hand_height=situation.hand_height, order=situation.order, hand_axes=model.axes_on(path),
+        hand_height=contact_height_of(model, situation), order=situation.order, hand_axes=model.axes_on(path),
     )  # fmt: skip
     return roll(lambda g: cell_of(spec, g), Geometry(shape=model.shape), model.body, rollout, model.effects)
 

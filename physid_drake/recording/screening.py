@@ -1,7 +1,7 @@
 """Finds where a tracked stream lost track, jumped, stalled or paused; leaves out only what cannot be a pose.
 
-Left out: rows that are all zeros (a tracker's way of saying "lost"), a single sample that leaps away and comes
-straight back, and the repeats of a tracker that is slower than the log. Kept and reported: gaps, stalls that the
+Left out: rows whose place is all zeros (a tracker's way of saying "lost"), samples that leap away and come straight
+back, and the repeats of a tracker that is slower than the log. Kept and reported: gaps, stalls that the
 tracker caught up from, lone leaps that stay.
 """
 
@@ -31,6 +31,9 @@ HELD: Final = 1.5
 
 FEWEST_HELD: Final = 10
 """Poses of such a tracker: what rests without noise has fewer."""
+
+LONGEST_LEAP: Final = 0.1
+"""From before a leap to after it [s]: what is away for longer may have been there."""
 
 SHORTEST_SCREENED: Final = 25
 """Streams shorter than this have too few steps to tell a leap from motion."""
@@ -76,18 +79,20 @@ def screen_poses(
     Args:
         times: (n,) in s, increasing.
         positions: (n, 3) in m.
-        quaternions: (n, 4), w first; all zeros where the tracker lost the body.
+        quaternions: (n, 4), w first; a lost body's may be all zeros.
         rows: n row numbers for the messages.
         what: "object" or "hand", for the messages.
-        turned: whether the quaternions were recorded; if not, a lost body is one at the origin that is elsewhere
-            at another height.
+        turned: whether the quaternions were recorded. A lost body is at the origin: with a quaternion of zeros, or at
+            another height than elsewhere.
 
     Returns:
         Which of the n samples to keep, and the warnings.
     """
     warnings: list[str] = []
     at_origin = (positions == 0.0).all(axis=1)
-    lost = at_origin & ((quaternions == 0.0).all(axis=1) if turned else bool((positions[:, 2] != 0.0).any()))
+    lost = at_origin & bool((positions[:, 2] != 0.0).any())
+    if turned:
+        lost |= at_origin & (quaternions == 0.0).all(axis=1)
     if lost.any():
         lost_rows = [rows[k] for k in np.flatnonzero(lost).tolist()]
         warnings.append(f"{what}: {describe_rows(lost_rows)}: track lost (all zeros), left out.")
@@ -101,13 +106,13 @@ def screen_poses(
     tracked = tracked[~repeats]
     times, positions, quaternions = times[tracked], positions[tracked], quaternions[tracked]
     leaps, lone = _find_leaps(times, positions, quaternions)
-    for k in leaps:
-        distance = np.linalg.norm(positions[k] - positions[k - 1])
-        row = rows[tracked[k]]
-        warnings.append(f"{what}: row {row}: jumps {distance:.3g} m away and comes straight back, left out.")
     keep = np.zeros(len(lost), dtype=np.bool_)
     keep[tracked] = True
-    keep[tracked[leaps]] = False
+    for first, last in leaps:
+        distance = np.linalg.norm(positions[first] - positions[first - 1])
+        there = describe_rows([rows[k] for k in tracked[first : last + 1].tolist()])
+        warnings.append(f"{what}: {there}: jumps {distance:.3g} m away and comes straight back, left out.")
+        keep[tracked[first : last + 1]] = False
     stalls = _find_stalls(positions, quaternions)
     for first, last in stalls:
         span = f"rows {rows[tracked[first]]}-{rows[tracked[last]]}"
@@ -137,23 +142,28 @@ def _distances(positions: Array, quaternions: Array, first: slice, second: slice
     return distances
 
 
-def _find_leaps(times: Array, positions: Array, quaternions: Array) -> tuple[list[int], list[int]]:
-    """Samples that leap away and back, and samples before a lone leap that stays."""
+def _find_leaps(times: Array, positions: Array, quaternions: Array) -> tuple[list[tuple[int, int]], list[int]]:
+    """First and last samples of leaps away and back, and samples before a lone leap that stays."""
     if len(times) < SHORTEST_SCREENED:
         return [], []
     steps = _distances(positions, quaternions, slice(None, -1), slice(1, None))
-    intervals = np.diff(times)
-    steps = steps / np.maximum(1.0, intervals / np.median(intervals))
-    across = _distances(positions, quaternions, slice(None, -2), slice(2, None))
+    steps = steps / np.maximum(1.0, np.diff(times) / np.median(np.diff(times)))
     floor = max(LEAP_FACTOR * float(np.quantile(steps, 0.9)), _SMALLEST_LEAP)
     padded = np.concatenate([[0.0], steps, [0.0]])
-    leaps = [
-        k
-        for k in range(1, len(times) - 1)
-        if min(steps[k - 1], steps[k]) > max(floor, LEAP_FACTOR * max(padded[k - 1], padded[k + 2]))
-        and across[k - 1] < 0.3 * min(steps[k - 1], steps[k])
-    ]
-    beside = {k for leap in leaps for k in (leap - 1, leap)}
+    leaps: list[tuple[int, int]] = []
+    for first in (np.flatnonzero(steps[:-1] > floor) + 1).tolist():
+        if leaps and first <= leaps[-1][1] + 1:  # the way back of the one before
+            continue
+        for last in range(first, len(times) - 1):
+            if last > first and times[last + 1] - times[first - 1] > LONGEST_LEAP:
+                break
+            both = min(steps[first - 1], steps[last])
+            sudden = both > max(floor, LEAP_FACTOR * max(padded[first - 1], padded[last + 2]))
+            ends = slice(first - 1, first), slice(last + 1, last + 2)
+            if sudden and float(_distances(positions, quaternions, *ends)[0]) < 0.3 * both:
+                leaps.append((first, last))
+                break
+    beside = {k for first, last in leaps for k in range(first - 1, last + 1)}
     lone = [
         k
         for k in range(1, len(steps) - 1)

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from physid_drake.identify import Accuracy, CellsTold, Identification
+from physid_drake.identify.doubts import doubts
 from physid_drake.recording import Recording
+from physid_drake.report.inspection import warning_lines
 
 FORMAT = "physid-result/1"
 
@@ -35,6 +37,7 @@ def result_json(result: Identification, recording: Recording, seed: int, version
                 "ci90": list(e.ci90),
                 "identifiable": e.identifiable,
                 "prior": e.prior,
+                "at_bound": e.at_bound,
             }
             for e in result.estimates
         },
@@ -59,6 +62,7 @@ def result_json(result: Identification, recording: Recording, seed: int, version
             "p_min": float(result.search.belief.p_min[best]),
         },
         "rollouts": result.polished.rollouts,
+        "warnings": [*doubts(recording), *warning_lines(recording)],
         "seed": seed,
         "versions": versions,
     }

@@ -7,6 +7,7 @@ import math
 from rich.table import Table
 
 from physid_drake.identify import Accuracy, Identification
+from physid_drake.identify.identify import EXPLAINED
 
 
 def estimates_table(result: Identification, title: str) -> Table:
@@ -18,6 +19,8 @@ def estimates_table(result: Identification, title: str) -> Table:
     for e in result.estimates:
         unit = "" if e.unit == "-" else f" {e.unit}"
         told = "yes" if e.identifiable else "no: anything in this interval"
+        if e.at_bound:
+            told = "at its bound: it may lie beyond (theta.bounds)"
         table.add_row(
             e.name, f"{e.value:.4g}{unit}", f"{e.ci90[0]:.4g} to {e.ci90[1]:.4g}", told, f"{e.prior:.4g}{unit}"
         )
@@ -66,6 +69,12 @@ def verdict(result: Identification) -> str:
     chi2 = result.reduced_chi2
     if result.explains:
         return f"The plain cell explains these pushes to their noise (reduced chi-square {chi2:.2f})."
+    if result.reduced_chi2 < EXPLAINED:
+        scatter = 100.0 * result.polished.friction_scatter
+        return (
+            f"The plain cell does not explain these pushes: it leaves no more than their noise (reduced chi-square"
+            f" {chi2:.2f}), but with frictions that differ by {scatter:.0f} % from push to push."
+        )
     return (
         f"The plain cell does not explain these pushes to their noise (reduced chi-square {chi2:.2f}, 1 expected): "
         "the intervals are widened for it, and some physics or a sensor's figure is missing."

@@ -64,3 +64,11 @@ def test_an_object_that_rolls_on_has_no_end_to_be_near_the_goal():
     cost = DistanceToGoal(goal=(float(trajectory.end[0]), float(trajectory.end[1])))
     assert trajectory.ending is Ending.MOVING and not trajectory.lost
     assert cost_of(cost, trajectory, rolling.table) == loss_of(cost, rolling.table)
+
+
+@pytest.mark.parametrize(("height", "ending"), [(None, Ending.TOPPLED), (0.02, Ending.AT_REST)])
+def test_a_push_touches_where_the_recorded_ones_did(height, ending):
+    """A box of 0.15 m topples where friction times the height of the push is more than half its depth."""
+    tall = replace(MODEL, shape=Box(size=(0.05, 0.1, 0.15)), body=body_of(0.3, 0.4), contact_height=height)
+    push = PlannedPush(direction=0.0, speed=0.05, travel=0.1)
+    assert trajectory_of(tall, (push,), Situation(start=START)).ending is ending

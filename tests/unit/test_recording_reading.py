@@ -265,6 +265,18 @@ def lose(poses):
     return poses
 
 
+def lose_with_a_quaternion(poses):
+    poses[:, 3] += 0.02
+    poses[[30, 31, 50], 1:4] = 0.0
+    poses[[30, 31, 50], 4:] = [1.0, 0.0, 0.0, 0.0]
+    return poses
+
+
+def jump_for_two(poses):
+    poses[40:42, 2] += 0.05
+    return poses
+
+
 def jump(poses):
     poses[40, 2] += 0.05
     return poses
@@ -316,6 +328,8 @@ def test_rounded_poses_are_not_taken_for_those_of_a_slow_tracker(written, step):
     ("change", "expected", "left"),
     [
         (lose, "object: rows 32-33, 52: track lost (all zeros), left out.", 77),
+        (lose_with_a_quaternion, "object: rows 32-33, 52: track lost (all zeros), left out.", 77),
+        (jump_for_two, "object: rows 42-43: jumps 0.05 m away and comes straight back, left out.", 78),
         (jump, "object: row 42: jumps 0.05 m away and comes straight back, left out.", 79),
         (jump_in_yaw, "object: row 42: jumps", 79),
         (leap_and_stay, "object: row 42: jumps 0.05 m and stays there, kept.", 80),

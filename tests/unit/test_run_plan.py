@@ -249,7 +249,7 @@ def test_the_planner_starts_where_the_recording_began():
     assert planner.goal == pytest.approx((planner.situation.start[0] + 0.3, planner.situation.start[1]))
     assert planner.dimension == 3
     z = float(np.median(shipped_pushes(1).pushes[0].hand.positions[:, 2]))
-    assert planner.tip_height == pytest.approx(z)
+    assert planner.heights[0] == pytest.approx(z)
 
 
 def test_no_goal_that_fits_is_no_reason_to_stop_but_a_wrong_one_is(capsys):

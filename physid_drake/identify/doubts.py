@@ -1,0 +1,50 @@
+"""What of a recording hardly fits its description: no reason to refuse it, but one to look again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from physid_drake.identify.frames import depths_at_touch
+from physid_drake.recording import Cylinder, Push, Recording
+
+LEANS = 8.0  # degrees by which an object's lean changes: on a table it stands on its face
+BESIDE = 3e-3  # m between tip and face as objects begin to move: 1 mm at most where description and frames agree
+
+
+def doubts(recording: Recording) -> tuple[str, ...]:
+    """What to look at again, in words."""
+    return (*_leaning(recording), *_beside_the_tip(recording))
+
+
+def _leaning(recording: Recording) -> tuple[str, ...]:
+    """Objects that lean this way and that: a quaternion whose w comes last turns a heading into a lean."""
+    shape = recording.object.shape
+    if isinstance(shape, Cylinder) and shape.axis == "y":
+        return ()
+    names = [push.name for push in recording.pushes if _lean_changes(push) > LEANS]
+    if not names:
+        return ()
+    return (
+        f"the object's lean changes by more than {LEANS:.0f} degrees while it is on the table; are its quaternions in"
+        f" the order w, x, y, z? {', '.join(names)}",
+    )
+
+
+def _lean_changes(push: Push) -> float:
+    """By how many degrees the object's lean changes, but for a few samples."""
+    _, x, y, _ = push.object.quaternions.T
+    leans = np.degrees(np.arccos(np.clip(np.abs(1.0 - 2.0 * (x * x + y * y)), 0.0, 1.0)))
+    low, high = np.quantile(leans, [0.05, 0.95]).tolist()
+    return float(high - low)
+
+
+def _beside_the_tip(recording: Recording) -> tuple[str, ...]:
+    """A tip that is not at the face of the objects that it sets moving, by as much in most pushes."""
+    depths = np.array(depths_at_touch(recording))
+    if not len(depths) or abs(float(np.median(depths))) <= BESIDE:
+        return ()
+    where = "inside the object" if np.median(depths) > 0.0 else "away from the object"
+    return (
+        f"as objects begin to move, the hand's tip is {1e3 * abs(float(np.median(depths))):.0f} mm {where} (median);"
+        " its radius, the object's size or a frame is not what is said, or it lags or gives way",
+    )
