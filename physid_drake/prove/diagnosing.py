@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import signal
@@ -120,8 +121,17 @@ def _is_open(task: Task, again: bool) -> bool:
     return attempt is None or (again and attempt.error is not None)
 
 
+def code_digest() -> str:
+    """SHA-256 over the package's Python files: which revision answered, that anyone may compare with a checkout."""
+    total = hashlib.sha256()
+    root = Path(__file__).parents[1]
+    for file in sorted(root.rglob("*.py")):
+        total.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
+    return total.hexdigest()
+
+
 def _note(folder: Path, attempt: Attempt) -> None:
-    content = {"seconds": round(attempt.seconds, 3), "error": attempt.error}
+    content = {"seconds": round(attempt.seconds, 3), "error": attempt.error, "code": code_digest()}
     RunFolder(path=folder).write(ATTEMPT, json.dumps(content, indent=2) + "\n")
 
 

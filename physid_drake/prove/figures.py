@@ -126,7 +126,8 @@ class Figures:
         others_named: a name where the effect is not in the catalogue.
         pairs: of two effects: ``both``, ``one``, ``wrong``.
         parameter_error: relative, of clear effects that were named rightly.
-        coverage: 90 % intervals that hold the truth.
+        coverage, others_coverage: 90 % intervals that hold the truth, of amplitudes, and of places, angles and the
+            like, of every effect that was named rightly, of pairs, too.
         theta_error, theta_coverage: the same of friction and mass, in worlds of which the right thing was said.
         held_out: per kind of world; ``effect`` where it is clear and named rightly.
         reliability: stated probabilities against what came true.
@@ -179,8 +180,8 @@ def figures_of(outcomes: Sequence[Outcome]) -> Figures:
             "wrong": _count(o.wrong_name for o in kinds["pair"]),
         },
         parameter_error=_quantiles([e for o in clear for e in o.errors]),
-        coverage=_count(c for o in single for c in o.covered),
-        others_coverage=_count(c for o in single for c in o.others_covered),
+        coverage=_count(c for o in outcomes for c in o.covered),
+        others_coverage=_count(c for o in outcomes for c in o.others_covered),
         theta_error=_quantiles([e for o in right for e in o.theta_errors]),
         theta_coverage=_count(c for o in right for c in o.theta_covered),
         held_out={
@@ -230,7 +231,7 @@ def table(figures: Figures) -> list[tuple[str, str, str, str]]:
         ("  error of its amplitudes, median", _percent(error), "", "10 %"),
         ("  error of its amplitudes, 90th percentile", _percent(error, tail=True), "", ""),
         *_naming_rows(f"effect below {CLEAR:g} sigma", figures.faint, ("", "")),
-        _row("amplitudes of both: 90 % intervals that hold the truth", figures.coverage, "85 to 95 %"),
+        _row("amplitudes, of pairs, too: 90 % intervals that hold the truth", figures.coverage, "85 to 95 %"),
         _row("  of their places, angles, speeds and the like", figures.others_coverage, "85 to 95 %"),
         ("error of friction and mass, median", _percent(figures.theta_error), "", ""),
         ("  90th percentile", _percent(figures.theta_error, tail=True), "", ""),
@@ -294,6 +295,7 @@ def json_of(figures: Figures) -> dict[str, Any]:
         "pairs": {name: _plain(share) for name, share in figures.pairs.items()},
         "parameter_error": _plain(figures.parameter_error),
         "coverage_90": _plain(figures.coverage),
+        "others_coverage_90": _plain(figures.others_coverage),
         "theta": {"error": _plain(figures.theta_error), "coverage_90": _plain(figures.theta_coverage)},
         "held_out": {kind: _plain(errors) for kind, errors in figures.held_out.items()},
         "calibration": {"brier": _plain(figures.brier), "bins": [_plain(b) for b in figures.reliability]},

@@ -125,4 +125,4 @@ def test_the_table_counts_worlds(tmp_path):
     assert rows["named rightly, or in a class of two"] == "1 of 1 (100 %)"
     assert rows["effect below 5 sigma: found"] == "0 of 0"
     assert rows["not in the catalogue: unexplained"] == "0 of 1 (0 %)"
-    assert rows["amplitudes of both: 90 % intervals that hold the truth"] == "1 of 1 (100 %)"
+    assert rows["amplitudes, of pairs, too: 90 % intervals that hold the truth"] == "1 of 1 (100 %)"

@@ -46,7 +46,7 @@ def test_the_result_says_everything_that_was_asked(done):
         *result["push_unknowns"],
     ]
     friction = result["theta"]["support_friction"]
-    assert set(friction) == {"value", "unit", "ci90", "identifiable", "prior"}
+    assert set(friction) == {"value", "unit", "ci90", "identifiable", "prior", "at_bound"}
     assert friction["ci90"][0] < friction["value"] < friction["ci90"][1]
     assert result["search"]["trials"] == 2
 
