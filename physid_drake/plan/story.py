@@ -26,9 +26,9 @@ Outcome = tuple[Trajectory, float]  # and its cost [m]
 CANDIDATES = 256
 REFINE_EVERY = 6  # trials: candidates gather where the best setting may be
 TOLERANCE = 0.01  # m
-# m: the search minimises the logarithm of cost and this. A lost object costs a metre and more; beside such a cliff a
-# Gaussian process of the cost itself does not see the millimetres before it.
-CLOSE = 1e-3
+# m: costs are capped at that of no push, and no lower than here. A lost object costs a metre and more; beside such a
+# cliff a Gaussian process does not see the millimetres before it.
+LEAST_CAP = 0.1
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,7 +109,7 @@ class Plan:
         loss: the cost of an object that is lost or does not stop [m].
         spread: under the belief, or None if nothing was drawn.
         sweep: cost along the policy's swept setting, the others as the search found them best.
-        search: what the search found; its errors are log(cost + ``CLOSE``), with ``risk`` of the mean cost.
+        search: what the search found; with ``risk`` its errors are mean costs under the belief.
         risk: whether the mean over the belief was made small instead of the likely theta's cost.
     """
 
@@ -251,7 +251,7 @@ def outcome_under(made: Plan, model: Model) -> Outcome:
 
 def _better(policy: Policy, found: SearchResult, rows: Sequence[SweepRow], *, risk: bool) -> Array:
     """The best setting (d,) of the search, or of the sweep along the swept one where that is better."""
-    best, least = np.array(found.theta_best), math.exp(found.error_best) - CLOSE
+    best, least = np.array(found.theta_best), found.error_best
     index = policy.space.index(policy.swept)
     for row in rows:
         cost = row.spread.mean if risk and row.spread is not None else row.cost
@@ -283,13 +283,19 @@ class _Story:
         return trajectory_of(model, self._policy.pushes(settings), self._situation)
 
     def likely_costs(self, settings: Array) -> Array:
-        """Costs (k,) of settings (k, d) under the likely theta, on the search's scale."""
-        costs = [cost_of(self._cost, self.trajectory(self._model, s), self._model.table) for s in settings]
-        return np.log(np.array(costs) + CLOSE)
+        """Costs (k,) of settings (k, d) under the likely theta, as the search sees them."""
+        return self._capped(
+            [cost_of(self._cost, self.trajectory(self._model, s), self._model.table) for s in settings]
+        )
 
     def mean_costs(self, settings: Array) -> Array:
-        """Mean costs (k,) of settings (k, d) under the belief, on the search's scale."""
-        return np.log(np.array([self.spread(s).mean for s in settings]) + CLOSE)
+        """Mean costs (k,) of settings (k, d) under the belief, as the search sees them."""
+        return self._capped([self.spread(s).mean for s in settings])
+
+    def _capped(self, costs: Sequence[float]) -> Array:
+        """No more than that of no push at all; infinite ones, of what diverged, stay so."""
+        most = max(self._cost.at(np.array(self._situation.start[:2])), LEAST_CAP)
+        return np.array([min(cost, most) if math.isfinite(cost) else cost for cost in costs])
 
     def spread(self, settings: Array) -> Spread:
         pushes = self._policy.pushes(settings)
