@@ -23,7 +23,7 @@ _PANEL = """
   <table><tr><th>parameter</th><th>estimate</th><th>90 % interval</th><th>told</th></tr>
   {% for e in estimates %}<tr><td>{{ e.name }}</td><td>{{ "%.4g" % e.value }} {{ "" if e.unit == "-" else e.unit }}</td>
     <td>{{ "%.4g" % e.ci90[0] }} to {{ "%.4g" % e.ci90[1] }}</td>
-    <td>{{ "yes" if e.identifiable else "no (prior)" }}</td></tr>{% endfor %}
+    <td>{{ "no (prior)" if not e.identifiable else "at its bound" if e.at_bound else "yes" }}</td></tr>{% endfor %}
   </table>
   {% if cells %}<h2>what these pushes tell about the cells</h2>
   {{ cells.map }}

@@ -19,7 +19,7 @@ def estimates_table(result: Identification, title: str) -> Table:
     for e in result.estimates:
         unit = "" if e.unit == "-" else f" {e.unit}"
         told = "yes" if e.identifiable else "no: anything in this interval"
-        if e.at_bound:
+        if e.identifiable and e.at_bound:
             told = "at its bound: it may lie beyond (theta.bounds)"
         table.add_row(
             e.name, f"{e.value:.4g}{unit}", f"{e.ci90[0]:.4g} to {e.ci90[1]:.4g}", told, f"{e.prior:.4g}{unit}"

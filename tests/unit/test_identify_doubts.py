@@ -68,9 +68,9 @@ def test_an_estimate_at_its_bound_is_said_to_be():
     estimate = Estimate(
         name="support_friction", unit="-", value=1.2, ci90=(0.9, 1.2), identifiable=True, prior=0.3, at_bound=True
     )
-    table = estimates_table(SimpleNamespace(estimates=(estimate, replace(estimate, at_bound=False))), "made")
-    first, second = table.columns[3].cells
-    assert first.startswith("at its bound") and second == "yes"
+    others = replace(estimate, at_bound=False), replace(estimate, identifiable=False)
+    first, second, third = estimates_table(SimpleNamespace(estimates=(estimate, *others)), "made").columns[3].cells
+    assert first.startswith("at its bound") and second == "yes" and third.startswith("no")
 
 
 def test_pushes_that_fit_by_frictions_alone_are_not_said_to_be_explained():
