@@ -28,7 +28,7 @@ SMOOTH = 1e-6  # friction: hardly any
     ids=lambda effect: effect.name,
 )
 def test_what_acts_on_the_mass_does_not_turn_the_object(effect):
-    """Without friction: what pulled at the centre of the shape would turn it by 0.1 rad and more."""
+    """Without friction: what pulled at the centre of the shape would turn it."""
     motion = slide(effect, OFFSET, velocity=(0.3, 0.1, 0.0), seconds=0.3, friction=SMOOTH)
     assert abs(end(motion)[2]) < 1e-7  # measured 2e-9 rad
     still = slide(OFFSET, velocity=(0.3, 0.1, 0.0), seconds=0.3, friction=SMOOTH)
