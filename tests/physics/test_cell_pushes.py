@@ -188,5 +188,5 @@ def test_a_push_through_the_middle_feels_the_friction_of_the_weight(model, mass,
     motion = cell.rollout(body, start=Start(pose=(0.0, 0.0, 0.0)), path=path, begin=0.0, end=until)
     steady = motion.forces[len(motion.forces) // 4 : -2]
     wanted = friction * mass * 9.81
-    np.testing.assert_allclose(steady[:, 0], wanted, rtol=0.01)  # measured 0.005 at worst
+    np.testing.assert_allclose(steady[:, 0], wanted, rtol=0.01)  # measured 0.006 at worst
     np.testing.assert_allclose(steady[:, 1], 0.0, atol=0.01 * wanted)
