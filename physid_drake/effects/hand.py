@@ -24,7 +24,6 @@ from physid_drake.effects.effect import (
 
 Array = NDArray[np.float64]
 FINE = 2e-3  # s between knots of a path that was changed
-TIP_SHARE = 0.2  # of the object's mass: what moves with the tip
 SHORTEST = 1e-7  # s between knots
 
 
@@ -44,10 +43,12 @@ class HandCompliance(_HandEffect):
 
     Assumed: the spring is linear and alike in all directions of the plane; the hand columns are of its far end, which
     goes its way whatever the force (a robot that regulates position and is measured at its joints or flange); the
-    damper is ``damping`` of critical for the object on the spring; what moves with the tip weighs ``TIP_SHARE`` of
-    the object, whose touch takes that share of the tip's momentum at once. Series elasticity, a soft fingertip and a
-    bending finger are near that; an impedance-controlled arm is where its own inertia counts little. Not in it:
-    stiffness that grows with the force, torsion of the tip, a patch of contact, give along the vertical.
+    damper is ``damping`` of critical for the object on the spring. Series elasticity, a soft fingertip and a bending
+    finger are near that; an impedance-controlled arm is where its own inertia counts little. Not in it: stiffness
+    that grows with the force, torsion of the tip, a patch of contact, give along the vertical.
+
+    ``share`` is not in the catalogue: what moves with the tip over the object's mass. A touch takes the tip's
+    momentum at once.
     """
 
     name: ClassVar[str] = "hand_compliance"
@@ -55,10 +56,12 @@ class HandCompliance(_HandEffect):
     statement: ClassVar[str] = "the tip gives way under the force of the contact"
     frame: ClassVar[str] = "contact"
     amplitudes: ClassVar[tuple[str, ...]] = ("compliance",)
+    beyond: ClassVar[tuple[str, ...]] = ("share",)
     mass_powers: ClassVar[Mapping[str, int]] = {"compliance": -1}
 
     compliance: float = parameter(0.0, "m/N")
     damping: float = parameter(0.5, "-")
+    share: float = parameter(0.2, "-")
 
     @classmethod
     def applies(cls, around: Surroundings) -> bool:
@@ -67,18 +70,21 @@ class HandCompliance(_HandEffect):
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
-        """Compliance, log damping."""
+        """Compliance, log damping, log share."""
         force = around.friction * around.weight
         return (
             Coordinate(name="compliance", step=2e-4 / force, lower=0.0, upper=0.05 / force),
             Coordinate(name="damping", log=True, step=0.2, lower=math.log(0.02), upper=math.log(3.0), std=1.0),
+            Coordinate(name="share", log=True, step=0.4, lower=math.log(0.01), upper=math.log(2.0), std=0.7),
         )
 
     @classmethod
     def families(cls, around: Surroundings) -> tuple[Family, ...]:
         """Small and large."""
         del around
-        return tuple(Family(point=(0.0, math.log(0.5)), free=(0,), size=size) for size in (1.0, 5.0, 25.0))
+        return tuple(
+            Family(point=(0.0, math.log(0.5), math.log(0.2)), free=(0,), size=size) for size in (1.0, 5.0, 25.0)
+        )
 
     @classmethod
     def leading(cls, around: Surroundings) -> tuple[int, ...]:
@@ -91,7 +97,7 @@ class HandCompliance(_HandEffect):
         stiffness = 1.0 / self.compliance
         return Mount(
             stiffness=stiffness, damping=2.0 * self.damping * math.sqrt(stiffness * facts.mass),
-            mass=TIP_SHARE * facts.mass,
+            mass=self.share * facts.mass,
         )  # fmt: skip
 
 

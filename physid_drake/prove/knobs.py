@@ -163,8 +163,10 @@ def _bounce(rng: Rng, scene: Scene) -> Knob:
 
 
 def _compliance(rng: Rng, scene: Scene) -> Knob:
-    damping = float(rng.uniform(0.1, 0.6))
-    return Knob(at=lambda a: hand.HandCompliance(compliance=a, damping=damping), limit=0.008 / _hold(scene))
+    damping, share = float(rng.uniform(0.1, 0.6)), float(np.exp(rng.uniform(math.log(0.1), math.log(0.5))))
+    return Knob(
+        at=lambda a: hand.HandCompliance(compliance=a, damping=damping, share=share), limit=0.008 / _hold(scene)
+    )
 
 
 def _lag(rng: Rng, scene: Scene) -> Knob:

@@ -31,7 +31,7 @@ from physid_drake.prove.floor import floor_of
 from physid_drake.prove.knobs import Knob, draw_knob
 from physid_drake.prove.mujoco_world import PushWorld
 from physid_drake.prove.scene import Rng, Scene, draw_scene
-from physid_drake.prove.seal import write_seal
+from physid_drake.prove.seal import RECORDING, files_digest, write_seal
 from physid_drake.prove.sensing import record, recording_of
 from physid_drake.prove.shapes import Array
 from physid_drake.prove.world_plan import Motion
@@ -121,7 +121,7 @@ def make_world(
         rng = np.random.default_rng([seed, index, 4, attempt])
         scene = draw_scene(rng)
         effects, sizes = _draw_effects(rng, scene, chosen.effects)
-        if all(size >= SMALLEST_SIZE for size in sizes) and (len(effects) < 2 or stands(scene, effects)):
+        if all(size >= SMALLEST_SIZE for size in sizes) and stands(scene, effects):
             break
     motions = simulate(scene, effects)
     size = _difference(scene, motions, simulate(scene, ())) if effects else 0.0
@@ -159,13 +159,14 @@ def simulate(scene: Scene, effects: Sequence[Effect], which: Sequence[int] | Non
             push=k,
             friction_factor=scene.pushes[k].friction_factor,
             sample_time=1.0 / scene.rate,
+            rest=scene.pushes[k].rest,
         )
         for k in chosen
     ]
 
 
 def stands(scene: Scene, effects: Sequence[Effect], seconds: float = 0.2) -> bool:
-    """Whether the object rests where each push begins; each effect leaves it at rest by itself, two may not."""
+    """Whether the object rests where each push begins: effects may drag it away."""
     world = PushWorld(scene.plan, effects, pushes=len(scene.pushes))
     for k, push in enumerate(scene.pushes):
         motion = world.run(push.pose, None, push=k, friction_factor=push.friction_factor, duration=seconds)
@@ -315,6 +316,7 @@ def _write_world(out: Path, index: int, seed: int, kind: Kind | None, effect: st
     if folder.exists():
         shutil.rmtree(folder)
     write_recording(recording, folder)
+    truth[RECORDING] = files_digest(folder)
     sealed.parent.mkdir(parents=True, exist_ok=True)
     partial = sealed.with_suffix(".partial")
     partial.write_text(json.dumps(truth, sort_keys=True) + "\n", encoding="utf-8")

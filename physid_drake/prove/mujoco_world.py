@@ -80,8 +80,10 @@ class PushWorld:
         model.stat.meaninertia = plan.mass  # the tolerance is relative to it, and must not be to the carriage
         self._q, self._v = int(model.joint("object").qposadr[0]), int(model.joint("object").dofadr[0])
         self._tip_geom = model.geom("tip").id
-        self._tip_damping = tip_law(plan)[1]
+        self._tip_law = tip_law(plan)
         self._faces, self._reach = half_planes(plan.shape)
+        solid = 1.0 - (plan.slosh.fraction if plan.slosh is not None else 0.0)  # what a touch moves
+        self._mobility = 1.0 / solid, 1.0 / (gyration_squared(plan.shape) * plan.inertia_ratio)
         gx, gy = self._to_simulation(*(GRAVITY * s for s in plan.tilt))
         model.opt.gravity[:] = gx, gy, -GRAVITY * math.sqrt(1.0 - plan.tilt[0] ** 2 - plan.tilt[1] ** 2)
 
@@ -189,7 +191,7 @@ class PushWorld:
         qpos, qvel, q, v = state.qpos, state.qvel, self._q, self._v
         turned = tips @ np.array([self._to_simulation(1.0, 0.0), self._to_simulation(0.0, 1.0)])
         speeds = np.diff(turned, axis=0) / self._dt
-        parts, touched, touch_steps = self._refine(1), 0, round(_TOUCH_TIME / self._dt)
+        parts, touched, touch_steps = self._refine(1, 1.0), 0, round(_TOUCH_TIME / self._dt)
         log, forces = np.empty((len(tips), 7)), np.zeros(((len(tips) - 1) // every + 1, 3))
         log[begin] = qpos[q : q + 7]
         sprung = self.plan.sprung_tip is not None
@@ -200,11 +202,12 @@ class PushWorld:
         for k in range(begin, len(speeds)):
             if lawful:
                 self._apply_laws(moment, k)
-            near = k < stop + touch_steps and self._tip_is_near()
-            touched = touched + self._tip_touches() if near else 0
-            wanted = _TOUCH_SUBSTEPS if near and touched <= touch_steps else 1
-            if wanted != len(parts):
-                parts = self._refine(wanted)
+            moved = self._mass_met() if k < stop + touch_steps else None
+            touches = moved is not None and self._tip_touches()
+            touched = touched + touches if moved is not None else 0
+            wanted = _TOUCH_SUBSTEPS if moved is not None and touched <= touch_steps else 1
+            if wanted != len(parts) or (moved is not None and not touches):
+                parts = self._refine(wanted, moved or 1.0)
             for part in parts:
                 place = turned[k] + part * model.opt.timestep * speeds[k]
                 if sprung:  # its joints are relative to the carriage: the tip itself stays as it is
@@ -221,14 +224,19 @@ class PushWorld:
                     return log, forces, k + 1
         return log, forces, len(log) - 1
 
-    def _refine(self, parts: int) -> range:
-        """Makes steps so many times finer; friction stops slip within one, or a stiff touch would be over before."""
+    def _refine(self, parts: int, moved: float) -> range:
+        """Makes steps so many times finer; friction stops slip within one, or a stiff touch would be over before.
+
+        The tip's spring and damper are those of the mass that the touch moves, ``moved`` of the object's: off the
+        middle, too, a touch then takes as long and gives back as much.
+        """
         step = self._dt / parts
         self._model.opt.timestep = step
         self._model.pair_solreffriction[:, 1] = -IMPEDANCE / step
+        stiffness, damping = self._tip_law
         # A touch is damped the more, so that it is over at once and does not bounce.
-        damping = min(self._tip_damping, TIP_RATES[parts > 1] * TIME_STEP / self._dt)
-        self._model.pair_solref[len(self._feet) :, 1] = -damping * SCALE
+        damping = min(damping, TIP_RATES[parts > 1] * TIME_STEP / self._dt)
+        self._model.pair_solref[len(self._feet) :] = -stiffness * SCALE * moved, -damping * SCALE * moved
         return range(parts)
 
     def _apply_laws(self, moment: Moment, k: int) -> None:
@@ -260,8 +268,8 @@ class PushWorld:
             fx, fy, torque = np.sum([law(moment) for law in self._wrenches], axis=0).tolist()
             state.xfrc_applied[self._body] = [*self._to_simulation(fx, fy), 0.0, 0.0, 0.0, torque]
 
-    def _tip_is_near(self) -> bool:
-        """Whether the tip may touch the object within three steps, or does."""
+    def _mass_met(self) -> float | None:
+        """Share of the object's mass that a touch moves, off the middle the less; None unless near in three steps."""
         state, q, v = self._state, self._q, self._v
         x, y, _, w, i, j, z = state.qpos[q : q + 7].tolist()
         tip_x, tip_y, _ = state.geom_xpos[self._tip_geom].tolist()
@@ -273,11 +281,19 @@ class PushWorld:
         c, s = math.cos(yaw), math.sin(yaw)
         local = (c * dx + s * dy, c * dy - s * dx)
         if not self._faces:
-            outside = math.hypot(dx, dy) - reach
+            distance = max(math.hypot(dx, dy), 1e-9)
+            outside, nx, ny = distance - reach, local[0] / distance, local[1] / distance
         else:
-            outside = max(nx * local[0] + ny * local[1] - offset for nx, ny, offset in self._faces)
-        near: bool = outside - self.plan.tip_radius < 3.0 * self._dt * fast + 1e-5
-        return near
+            outside, nx, ny = max((nx * local[0] + ny * local[1] - offset, nx, ny) for nx, ny, offset in self._faces)
+        if outside - self.plan.tip_radius >= 3.0 * self._dt * fast + 1e-5:
+            return None
+        if self.plan.sprung_tip is not None:
+            return 1.0  # its law is for the light tip
+        bx, by = self.plan.com
+        lever = (local[0] - bx) * ny - (local[1] - by) * nx
+        along, turning = self._mobility
+        share: float = 1.0 / (along + turning * lever**2)
+        return share
 
     def _tip_touches(self) -> bool:
         """Whether the last step saw a contact of the tip; contacts come in the order of the pairs, the tip's last."""

@@ -14,7 +14,6 @@ from physid_drake.recording import Box, Cylinder
 
 _FOOT_RADIUS: Final = 0.003
 _CAPSULE_HALF: Final = 5e-4  # m; a lying capsule's contact frame follows its axis
-_SPRUNG_TIP_MASS: Final = 0.2  # of the object's
 _WALL: Final = 0.002  # m; thickness of a prism's faces
 
 
@@ -86,7 +85,7 @@ def _inertial(x: float, y: float, mass: float, inertia: Array) -> str:
 
 def _tip_mass(plan: Plan) -> float:
     """A sprung tip weighs a part of the object; a rigid one hardly anything, since only its z is free."""
-    return _SPRUNG_TIP_MASS * plan.mass if plan.sprung_tip is not None else 1e-4
+    return plan.sprung_tip.share * plan.mass if plan.sprung_tip is not None else 1e-4
 
 
 def _tip_joints(plan: Plan) -> str:

@@ -24,15 +24,24 @@ TABLE_SIZE: Final = (1.6, 1.4)
 _SPEEDS: Final = (0.05, 0.5)
 _SHORTEST_PUSH: Final = 0.15  # s from the touch to the brake
 _LONGEST_PUSH: Final = 0.8
+_RESTS: Final = (0.2, 0.6)  # s
 
 
 @dataclass(frozen=True, kw_only=True)
 class DrawnPush:
-    """One push: start ``pose`` of B, what the recording says of the tip, and its own friction factor."""
+    """One push.
+
+    Attributes:
+        pose: of B at the start.
+        path: what the recording says of the tip.
+        friction_factor: its own, on the support friction.
+        rest: how long it is recorded once hand and object are still [s]; drawn, or it told a late tracker.
+    """
 
     pose: Pose
     path: HandPath
     friction_factor: float
+    rest: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,7 +198,8 @@ def _draw_push(rng: Rng, plan: Plan, scatter: float) -> DrawnPush:
         start=at_touch - run_up * ahead,
         velocities=speed * np.array([[0.0, 0.0], ahead, ahead, bent, [0.0, 0.0]]),
     )
-    return DrawnPush(pose=(float(place[0]), float(place[1]), yaw), path=path, friction_factor=factor)
+    pose = float(place[0]), float(place[1]), yaw
+    return DrawnPush(pose=pose, path=path, friction_factor=factor, rest=float(rng.uniform(*_RESTS)))
 
 
 def _draw_contact(rng: Rng, plan: Plan) -> tuple[Array, Array]:

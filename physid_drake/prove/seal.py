@@ -1,11 +1,13 @@
 """The seal on the truth: hashes that are written down before a diagnosis begins, and a folder that stays shut.
 
-``seal.txt`` is what ``sha256sum -c`` reads, one line for each sealed file; ``seal.sha256`` is one hash over all.
+``seal.txt`` is what ``sha256sum -c`` reads, one line for each sealed file; ``seal.sha256`` is one hash over all. Each
+sealed file has the hash of its recording, so that the seal is over the recordings, too.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
 import stat
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -17,6 +19,18 @@ from physid_drake.errors import ProofError
 SEALED: Final = "sealed"
 LINES: Final = "seal.txt"
 TOTAL: Final = "seal.sha256"
+RECORDING: Final = "recording_sha256"
+"""Key, in the truth, of `files_digest` of the recording."""
+
+
+def files_digest(folder: Path) -> str:
+    """SHA-256 over names and contents of all files of a folder, sorted by name."""
+    total = hashlib.sha256()
+    for file in sorted(path for path in folder.rglob("*") if path.is_file()):
+        total.update(
+            f"{file.relative_to(folder).as_posix()} {hashlib.sha256(file.read_bytes()).hexdigest()}\n".encode()
+        )
+    return total.hexdigest()
 
 
 def seal_of(folder: Path, identities: Sequence[str]) -> str:
@@ -73,15 +87,15 @@ def read_seal(out: Path) -> str:
 
 
 def check_seal(out: Path, identities: Sequence[str], written: str) -> None:
-    """Refuse a truth that is not the one that was sealed.
+    """Refuse a truth, or a recording, that is not the one that was sealed.
 
     Args:
-        out: folder that holds ``sealed``.
+        out: folder that holds ``sealed`` and ``recordings``.
         identities: of the worlds.
         written: the hash that was written down before.
 
     Raises:
-        ProofError: if the hash is another now.
+        ProofError: if a hash is another now.
     """
     now = seal_of(out / SEALED, identities)
     if now != written:
@@ -89,6 +103,13 @@ def check_seal(out: Path, identities: Sequence[str], written: str) -> None:
             f"the seal is broken: sha256 of '{out / SEALED}' is {now}, but {written} was written down before the"
             " diagnosis; nothing is scored."
         )
+    for identity in identities:
+        sealed = json.loads((out / SEALED / f"{identity}.json").read_text(encoding="utf-8")).get(RECORDING)
+        if sealed is not None and files_digest(out / "recordings" / identity) != sealed:
+            raise ProofError(
+                f"the seal is broken: '{out / 'recordings' / identity}' is not the recording that was sealed; nothing"
+                " is scored."
+            )
 
 
 @contextmanager

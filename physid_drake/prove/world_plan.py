@@ -36,10 +36,17 @@ class Slosh:
 
 @dataclass(frozen=True, kw_only=True)
 class SprungTip:
-    """A tip on springs: ``compliance`` [m/N], and ``damping`` as a ratio with the object's mass on the spring."""
+    """A tip on springs.
+
+    Attributes:
+        compliance: m/N.
+        damping: ratio, with the object's mass on the spring.
+        share: mass of what moves with the tip, over the object's.
+    """
 
     compliance: float
     damping: float
+    share: float
 
 
 @dataclass(frozen=True, kw_only=True)

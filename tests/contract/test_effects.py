@@ -179,7 +179,10 @@ def test_the_catalogue_is_complete_and_in_order():
     assert [kind.name for kind in CATALOGUE] == list(EXPECTED)
 
 
-LEFT_OPEN = {"sloshing": {"turning": ("-", None)}}  # by the catalogue, which fixes the other parameters
+LEFT_OPEN = {
+    "sloshing": {"turning": ("-", None)},
+    "hand_compliance": {"share": ("-", None)},
+}  # by the catalogue, which fixes the other parameters
 
 
 @every_name

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from physid_drake.errors import ProofError
-from physid_drake.prove.seal import check_seal, seal_of, shut, unlock, write_seal
+from physid_drake.prove.seal import RECORDING, check_seal, files_digest, seal_of, shut, unlock, write_seal
 from physid_drake.resources import shipped
 
 
@@ -31,6 +31,22 @@ def test_a_truth_that_changed_after_it_was_sealed_is_refused(folder):
     with pytest.raises(ProofError, match=r"bb\.json' has changed since it was sealed"):
         write_seal(folder, ["aa", "bb"])
     assert (folder / "seal.sha256").read_text() == f"{written}\n"
+
+
+def test_a_recording_that_changed_after_it_was_sealed_is_refused(folder):
+    push = folder / "recordings" / "aa" / "pushes" / "001.csv"
+    push.parent.mkdir(parents=True)
+    push.write_text("time_s\n0\n")
+    truth = {"id": "aa", RECORDING: files_digest(folder / "recordings" / "aa")}
+    (folder / "sealed" / "aa.json").write_text(json.dumps(truth))
+    written = write_seal(folder, ["aa", "bb"])
+    check_seal(folder, ["aa", "bb"], written)
+    push.write_text("time_s\n1\n")
+    with pytest.raises(ProofError, match=r"recordings/aa' is not the recording that was sealed"):
+        check_seal(folder, ["aa", "bb"], written)
+    push.rename(push.with_name("002.csv"))
+    with pytest.raises(ProofError, match="not the recording that was sealed"):
+        check_seal(folder, ["aa"], seal_of(folder / "sealed", ["aa"]))
 
 
 def test_a_truth_that_is_missing_is_named(folder):

@@ -30,15 +30,20 @@ class Restitution(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class HandCompliance(Effect):
-    """The tip is on springs of ``compliance`` [m/N]; ``damping`` is the ratio with the object's mass on them."""
+    """The tip is on springs of ``compliance`` [m/N]; ``damping`` is the ratio with the object's mass on them.
+
+    What moves with it weighs ``share`` of the object.
+    """
 
     name: ClassVar[str] = "hand_compliance"
     strengths: ClassVar[tuple[str, ...]] = ("compliance",)
     compliance: float = 0.0
     damping: float = 0.3
+    share: float = 0.2
 
     def build(self, plan: Plan) -> Plan:
-        return replace(plan, sprung_tip=SprungTip(compliance=self.compliance, damping=self.damping))
+        tip = SprungTip(compliance=self.compliance, damping=self.damping, share=self.share)
+        return replace(plan, sprung_tip=tip)
 
 
 @dataclass(frozen=True, kw_only=True)
