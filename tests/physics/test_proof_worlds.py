@@ -9,6 +9,7 @@ import pytest
 pytest.importorskip("mujoco")
 
 from reference import planar
+from scipy import optimize
 
 from physid_drake.prove.effects import catalogue as fx
 from physid_drake.prove.feet import feet_of, weighted_feet
@@ -203,6 +204,15 @@ def test_viscous_drag():
     assert slide(fx.ViscousDrag(coefficient=0.8))[0] == pytest.approx(expected, rel=0.003)
 
 
+def test_viscous_drag_brakes_a_spin_by_the_underside_s_radius_of_gyration():
+    feet, weights = feet_of(ERASER)
+    polar, spin = gyration_squared(ERASER), 12.0
+    c, a = 0.8 / MASS, MU * GRAVITY * float(weights @ np.hypot(*feet.T)) / polar
+    expected = (spin - a / c * math.log(1 + c * spin / a)) / c
+    # Measured -0.19 %.
+    assert slide(fx.ViscousDrag(coefficient=0.8), velocity=(0, 0, spin))[2] == pytest.approx(expected, rel=0.003)
+
+
 def test_quadratic_drag():
     # Measured -0.23 %.
     c, a = 2.0 / MASS, MU * GRAVITY
@@ -263,6 +273,23 @@ def test_tether_and_magnet_pull_towards_their_point():
     k, friction = 0.5, MU * MASS * GRAVITY
     x = np.roots([-k / 2, k * 1.0 - friction, MASS * 0.125]).max()
     assert slide(fx.Tether(stiffness=k, x=1.0))[0] == pytest.approx(float(x), rel=0.003)
+
+
+@pytest.mark.parametrize(("core", "share"), [(0.03, 0.4), (0.05, 0.2)])
+def test_a_magnet_does_the_work_of_its_law(core, share):
+    # Into it and not past it: half m v^2 + the attraction's work = friction's.
+    away, friction = 0.06, MU * MASS * GRAVITY
+    strength = share * friction * core**2
+
+    def work(x):
+        return strength / core * (math.atan(away / core) - math.atan((away - x) / core))
+
+    want = optimize.brentq(lambda x: MASS * 0.125 + work(x) - friction * x, 0.03, away)
+    magnet = fx.Magnet(strength=strength, x=0.07, y=0.02, core=core)
+    moved = slide(magnet, pose=(0.07 - away, 0.02, 0.0))
+    assert want > 1.1 * slide()[0]
+    # Measured -0.2 %.
+    assert moved[0] == pytest.approx(want, rel=0.005)
 
 
 def test_com_offset_turns_a_central_push_about_it():
