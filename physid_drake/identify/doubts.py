@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from physid_drake.identify.force_windows import WINDOW, too_seldom
 from physid_drake.identify.frames import depths_at_touch
 from physid_drake.recording import Cylinder, Push, Recording
 
@@ -13,7 +14,7 @@ BESIDE = 3e-3  # m between tip and face as objects begin to move: 1 mm at most w
 
 def doubts(recording: Recording) -> tuple[str, ...]:
     """What to look at again, in words."""
-    return (*_leaning(recording), *_beside_the_tip(recording))
+    return (*_leaning(recording), *_beside_the_tip(recording), *_sparse_forces(recording))
 
 
 def _leaning(recording: Recording) -> tuple[str, ...]:
@@ -27,6 +28,17 @@ def _leaning(recording: Recording) -> tuple[str, ...]:
     return (
         f"the object's lean changes by more than {LEANS:.0f} degrees while it is on the table; are its quaternions in"
         f" the order w, x, y, z? {', '.join(names)}",
+    )
+
+
+def _sparse_forces(recording: Recording) -> tuple[str, ...]:
+    """Forces of which nothing is compared."""
+    names = [push.name for push in recording.pushes if too_seldom(push)]
+    if not names:
+        return ()
+    return (
+        f"forces are compared as means over {WINDOW:g} s, and in none of these are two samples: {', '.join(names)};"
+        " they are not used",
     )
 
 

@@ -50,8 +50,7 @@ def force_windows(push: Push, path: HandPath | None, sensor_std: float, start_st
     if push.force is None:
         return ForceWindows(middles=np.zeros(0), means=np.zeros((0, 2)), stds=np.zeros(0))
     times, forces = push.force.times, push.force.forces[:, :2]
-    index = np.floor((times - times[0]) / WINDOW).astype(np.intp)
-    parts = [np.flatnonzero(index == k) for k in np.unique(index) if np.count_nonzero(index == k) >= 2]
+    parts = _windows(times)
     middles = np.array([times[part].mean() for part in parts])
     means = np.array([forces[part].mean(axis=0) for part in parts]).reshape(-1, 2)
     white = sensor_std / np.sqrt([len(part) for part in parts])
@@ -61,6 +60,17 @@ def force_windows(push: Push, path: HandPath | None, sensor_std: float, start_st
     told = ~silent
     largest = float(np.linalg.norm(means[told], axis=1).max(initial=0.0))
     return ForceWindows(middles=middles[told], means=means[told], stds=np.hypot(white[told], SHARE * largest))
+
+
+def too_seldom(push: Push) -> bool:
+    """Whether forces are recorded, but none of their windows has two samples."""
+    return push.force is not None and not _windows(push.force.times)
+
+
+def _windows(times: Array) -> list[NDArray[np.intp]]:
+    """Indices of the samples of each window; of one sample none is made."""
+    index = np.floor((times - times[0]) / WINDOW).astype(np.intp)
+    return [np.flatnonzero(index == k) for k in np.unique(index) if np.count_nonzero(index == k) >= 2]
 
 
 def _struck(samples: Sequence[Array], means: Array, white: Array) -> Mask:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,28 +24,8 @@ STILL_FAST = 0.5  # of a hand's speed: faster, it has not come to a stop
 LIGHTEST, HEAVIEST = 1.0, 23000.0  # kg/m^3, of the box around an object: lighter than air, denser than osmium
 SLOWEST = 1.0  # s between samples: slower, it is no stream of a push
 FEWEST_FORCES = 3  # pushes
+FEWEST_FREE = 3  # poses of a free motion
 BESIDE = 0.05  # m between tip and object that no error of calibration explains
-
-
-def refusals(recording: Recording) -> tuple[str, ...]:
-    """What an identification or a diagnosis would refuse, as far as places, times and masses say so; in words."""
-    checks: list[Callable[[], None]] = [
-        partial(check, recording)
-        for check in (check_mass, check_hand_near, check_hand_outside, check_force_direction)
-    ]
-    for push in recording.pushes:
-        checks += [
-            partial(check_upright, recording, push),
-            partial(check_on_table, recording, push),
-            partial(check_clocks, push),
-        ]
-    found = []
-    for check in checks:
-        try:
-            check()
-        except RecordingError as error:
-            found.append(str(error))
-    return tuple(found)
 
 
 def check_mass(recording: Recording) -> None:
@@ -109,6 +86,15 @@ def check_clocks(push: Push) -> None:
         raise RecordingError(
             f"push '{push.name}': the hand is recorded from {hand[0]:.3f} to {hand[-1]:.3f} s, and the object from"
             f" {seen[0]:.3f} to {seen[-1]:.3f} s; are both on the same clock?"
+        )
+
+
+def check_free_start(push: Push) -> None:
+    """Refuses a free motion with so few poses that they have no start velocity."""
+    if push.hand is None and len(push.object) < FEWEST_FREE:
+        raise RecordingError(
+            f"push '{push.name}': without a hand, at least {FEWEST_FREE} poses are needed for the start velocity, but"
+            f" got {len(push.object)}."
         )
 
 

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from physid_drake.cell import CellConfig, HandPath, Start
 from physid_drake.cell.hand_fit import fit_hand_paths, stream_std
-from physid_drake.errors import RecordingError
 from physid_drake.identify.force_windows import force_windows
 from physid_drake.identify.frames import (
+    FEWEST_FREE,
     check_clocks,
     check_force_direction,
+    check_free_start,
     check_hand_near,
     check_hand_outside,
     check_mass,
@@ -226,6 +227,7 @@ def _problem(
     check_upright(recording, push)
     check_on_table(recording, push)
     check_clocks(push)
+    check_free_start(push)
     planar = push.object.planar
     start, start_std = _start_of(push, planar, noise, free=path is None)
     compared = np.ones(len(planar), dtype=bool)
@@ -274,11 +276,7 @@ def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[S
 
 def _moving_start(push: Push, planar: Array, noise: Noise) -> tuple[Start, Array]:
     times, sigmas = push.object.times, noise.sigmas
-    n = int(min(len(times), max(3, np.searchsorted(times, times[0] + 0.08))))
-    if n < 3:
-        raise RecordingError(
-            f"push '{push.name}': without a hand, at least 3 poses are needed for the start velocity, but got {n}."
-        )
+    n = int(min(len(times), max(FEWEST_FREE, np.searchsorted(times, times[0] + 0.08))))
     t = times[:n] - times[0]
     design = np.column_stack([np.ones(n), t, 0.5 * t**2])
     coefficients, *_ = np.linalg.lstsq(design, planar[:n], rcond=None)

@@ -5,12 +5,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from problems import QUIET
 from runs import shipped_pushes
 
 from physid_drake.errors import RecordingError
 from physid_drake.identify.doubts import doubts
-from physid_drake.identify.frames import check_force_direction, refusals
+from physid_drake.identify.frames import check_force_direction
 from physid_drake.identify.identify import Estimate
+from physid_drake.identify.problem import problems_of
+from physid_drake.identify.refusals import refusals
 from physid_drake.recording import ForceStream, PoseStream
 from physid_drake.report.tables import estimates_table, verdict
 
@@ -62,6 +65,46 @@ def test_a_force_on_the_sensor_instead_of_the_object_is_refused(recording):
         check_force_direction(wrong)
     assert any("force of the hand on the object" in said for said in refusals(wrong))
     check_force_direction(replace(wrong, pushes=wrong.pushes[:2]))  # two pushes tell no rule
+
+
+def test_forces_that_are_too_seldom_to_be_used_are_said(recording):
+    def forced(interval):
+        first, *others = recording.pushes
+        times = np.arange(first.object.times[0], first.object.times[-1], interval)
+        force = ForceStream(times=times, forces=np.tile([1.0, 0.0, 0.0], (len(times), 1)))
+        return replace(recording, pushes=(replace(first, force=force), *others))
+
+    assert doubts(forced(0.04)) == ()
+    (said,) = doubts(forced(0.11))
+    assert recording.pushes[0].name in said and "not used" in said
+
+
+def test_inspect_says_every_hand_that_passes_over_its_object(recording):
+    def lifted(push):
+        hand = push.hand
+        above = hand.positions + np.array([0.0, 0.0, 0.5])
+        return replace(push, hand=PoseStream(times=hand.times, positions=above, quaternions=hand.quaternions))
+
+    first, second, *others = recording.pushes
+    wrong = replace(recording, pushes=(lifted(first), lifted(second), *others))
+    said = refusals(wrong)
+    assert [line.split("'")[1] for line in said] == [first.name, second.name]
+    assert all("passes the object" in line for line in said)
+    with pytest.raises(RecordingError, match="passes the object"):
+        problems_of(wrong, QUIET, 0.03)
+
+
+def test_inspect_says_every_free_motion_with_too_few_poses(recording):
+    def free(push, count):
+        part = (values[:count] for values in (push.object.times, push.object.positions, push.object.quaternions))
+        times, positions, quaternions = part
+        return replace(push, hand=None, object=PoseStream(times=times, positions=positions, quaternions=quaternions))
+
+    wrong = replace(recording, hand=None, pushes=tuple(free(p, 2 + k // 4) for k, p in enumerate(recording.pushes)))
+    said = refusals(wrong)
+    assert len(said) == 4 and all("at least 3 poses" in line for line in said)
+    with pytest.raises(RecordingError, match="at least 3 poses"):
+        problems_of(wrong, QUIET, 0.03)
 
 
 def test_an_estimate_at_its_bound_is_said_to_be():
