@@ -20,15 +20,14 @@ class AppliedLaws:
     def __init__(self, laws: Sequence[ForceLaw], frictions: Sequence[FrictionLaw]) -> None:
         """``frictions`` give back what the contact, which holds their largest friction, has too much."""
         self._laws, self._frictions = laws, frictions
+        self._largest = Frictions(tuple(frictions)).largest
 
-    def act(self, state: PlantState, time: float, span: float, *, settled: bool) -> None:
-        """Add the laws' impulses over a tick [s] to the object's velocities, and what turning slip has too much.
-
-        ``settled`` where the friction of the tick will be mended to what the weight bears.
-        """
-        if not self._laws and not self._frictions and not state.turns():
+    def act(self, state: PlantState, time: float, span: float) -> None:
+        """Add the laws' impulses over a tick [s] to the object's velocities, and what the contact has too much."""
+        state.give_back_lift(span, self._largest)
+        if not (self._laws or self._frictions or state.turns()):
             return
-        seen = state.object_state(time, span, settled=settled)
+        seen = state.object_state(time, span)
         for wrench in total_wrenches(seen, self._laws, self._frictions):
             state.kick(seen.yaw, span * wrench.fx, span * wrench.fy, span * wrench.torque)
             if wrench.tip_x or wrench.tip_y:

@@ -106,11 +106,7 @@ class Cell:
                 ),
                 self.simulator,
             )
-        hydroelastic = self.config.contact.model == "hydroelastic" and solver.scheme == "cenic"
-        self._stepper = Stepper(
-            self.scene, self.simulator, solver, hand_radius,
-            tilt_depth=self.scene.rest_depth if hydroelastic and edge is None else None,
-        )  # fmt: skip
+        self._stepper = Stepper(self.scene, self.simulator, solver, hand_radius)
 
     def set_body(self, body: Body) -> None:
         """Write the parameters into the Context.

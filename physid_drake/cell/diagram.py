@@ -70,6 +70,8 @@ class Scene:
         joints: the hand's prismatic joints x, y, z; empty without a hand.
         gravity: m/s^2.
         rest_depth: how deep an evenly loaded underside is in the table [m].
+        lifts: whether friction follows depths that are larger than the loads (`ObjectState.lifts`): hydroelastic
+            contact under CENIC's lagged approximation.
         edge: lower and upper corner of a table that ends, x + iy [m]; None where it does not.
     """
 
@@ -86,6 +88,7 @@ class Scene:
     joints: tuple[PrismaticJoint, ...]
     gravity: float
     rest_depth: float
+    lifts: bool
     edge: tuple[complex, complex] | None = None
 
 
@@ -156,7 +159,7 @@ def add_scene(
     return Scene(
         plant=plant, scene_graph=scene_graph, object=body, table_geometry=table, feet=feet, foot_cells=foot_cells,
         hand_geometry=hand, face_geometries=faces, support=support, solid=solid, joints=joints, gravity=gravity,
-        rest_depth=config.contact.rest_depth_m * _stiffer(solid),
+        rest_depth=config.contact.rest_depth_m * _stiffer(solid), lifts=hydroelastic and not discrete,
         edge=None if edge is None else (complex(*edge[0]), complex(*edge[1])),
     )  # fmt: skip
 

@@ -41,11 +41,6 @@ class Underside:
     radii: Array
 
     @cached_property
-    def load_centre(self) -> complex:
-        """Of an evenly deep underside, x + iy in B [m]."""
-        return complex(self.weights @ self.points)
-
-    @cached_property
     def reach(self) -> float:
         """From Bo, how far away a place may be about which slip turns within what a point stands for [m]."""
         return float((np.abs(self.points) + CANCELS * self.radii).max())
@@ -72,8 +67,8 @@ class ObjectState:
         inertia: about the vertical through the centre of mass [kg m^2].
         underside: the support points.
         lean: depth of Bo's foot in the table [m], and how it grows along x and y of B [-].
-        stiffness: of the whole support [N/m], from which the contact takes what friction bears; None where the loads
-            together carry the weight, however deep the object is.
+        stiffness: of the whole support [N/m].
+        lifted: whether the contact takes friction from depths that are larger than the loads (``lifts``).
         v_rolling: of the underside against Bo, in an object that rolls, x + iy [m/s].
         lead: how far ahead a force by the object's place is taken, in ticks [-].
         edge: lower and upper corner of a table that ends, x + iy [m]; None where it does not.
@@ -92,7 +87,8 @@ class ObjectState:
     inertia: float
     underside: Underside
     lean: tuple[float, float, float]
-    stiffness: float | None = None
+    stiffness: float
+    lifted: bool = False
     v_rolling: complex = 0j
     lead: float = 0.5
     edge: tuple[complex, complex] | None = None
@@ -158,36 +154,41 @@ class ObjectState:
         return self.underside.friction
 
     @cached_property
+    def depths(self) -> Array:
+        """Of the support points (n,) in the table [m]; none where the table has ended."""
+        foot, along_x, along_y = self.lean
+        points = self.underside.points
+        depths: Array = np.maximum(foot + along_x * points.real + along_y * points.imag, 0.0)
+        if self.edge is not None:
+            low, high = (self.places - corner for corner in self.edge)
+            depths[(low.real < 0.0) | (low.imag < 0.0) | (high.real > 0.0) | (high.imag > 0.0)] = 0.0
+        return depths
+
+    @cached_property
+    def lifts(self) -> Array:
+        """How much deeper than their loads the support points (n,) are [m]: see `physid_drake.cell.lift`."""
+        return lifts_of(self.underside.points, self.slips * cmath.exp(-1j * self.yaw), self.span, self.lean)
+
+    @cached_property
     def loads(self) -> Array:
         """Normal forces (n,) on the support points [N]: in proportion to depth.
 
         They are the contact's own: what laws give back of its friction must be a share of what it has. Of loads that
         always carry the weight together, the difference leans a tall object that is pushed, and that makes it larger.
         """
-        foot, along_x, along_y = self.lean
-        points = self.underside.points
-        shares = self.underside.weights * np.maximum(foot + along_x * points.real + along_y * points.imag, 0.0)
-        if self.edge is not None:
-            low, high = (self.places - corner for corner in self.edge)
-            shares[(low.real < 0.0) | (low.imag < 0.0) | (high.real > 0.0) | (high.imag > 0.0)] = 0.0
-        if self.stiffness is not None:
-            return np.asarray(self.stiffness * shares)
-        total = float(shares.sum())
-        loads: Array = shares * (self.weight / total) if total > 0.0 else shares
+        depths = self.depths - self.lifts if self.lifted else self.depths
+        loads: Array = self.stiffness * self.underside.weights * depths
         return loads
 
     def holding_at(self, i: int) -> float:
         """Largest friction of support point i without any law [N]: one of ``holding``, where few are asked for."""
         base, (foot, along_x, along_y) = self.underside, self.lean
         deep = foot > math.hypot(along_x, along_y) * base.reach
-        if "holding" in self.__dict__ or not deep or self.edge is not None:
+        if "holding" in self.__dict__ or self.lifted or not deep or self.edge is not None:
             return float(self.holding[i])
-        # No point is off the table, and the mean depth is that of the load's centre.
-        point, centre = complex(base.points[i]), base.load_centre
+        point = complex(base.points[i])  # on the table, as all of them
         depth = foot + along_x * point.real + along_y * point.imag
-        mean = foot + along_x * centre.real + along_y * centre.imag
-        stiffness = self.weight / mean if self.stiffness is None else self.stiffness
-        return float(base.friction[i] * base.weights[i]) * stiffness * depth
+        return float(base.friction[i] * base.weights[i]) * self.stiffness * depth
 
     def slip_direction_at(self, i: int) -> complex:
         """Direction in which support point i slips, x + iy in W: that of ``slip_directions``."""
@@ -242,6 +243,7 @@ class StateReader:
         rolling_radius: of a lying cylinder [m]; None of what does not roll.
         edge: lower and upper corner of a table that ends, x + iy [m]; None where it does not.
         lead: how far ahead a force by the object's place is taken, in ticks [-]: half of one in a rollout.
+        lifted: whether the contact takes friction from depths that are larger than the loads.
     """
 
     underside: Underside
@@ -254,10 +256,9 @@ class StateReader:
     rolling_radius: float | None = None
     edge: tuple[complex, complex] | None = None
     lead: float = 0.5
+    lifted: bool = False
 
-    def at(
-        self, time: float, span: float, X_WB: Sequence[float], V_WB: Sequence[float], *, settled: bool = False
-    ) -> ObjectState:
+    def at(self, time: float, span: float, X_WB: Sequence[float], V_WB: Sequence[float]) -> ObjectState:
         """The state.
 
         Args:
@@ -265,7 +266,6 @@ class StateReader:
             span: how long the tick is that begins then [s].
             X_WB: (7,) quaternion wxyz and position [m].
             V_WB: (6,) angular and linear velocity in W.
-            settled: whether the friction of the tick will be mended to what the weight bears.
         """
         px, py, yaw = planar_pose(*X_WB[:6])
         return ObjectState(
@@ -282,7 +282,8 @@ class StateReader:
             inertia=self.inertia,
             underside=self.underside,
             lean=self.lean(X_WB),
-            stiffness=None if settled else self.stiffness,
+            stiffness=self.stiffness,
+            lifted=self.lifted,
             v_rolling=0j if self.rolling_radius is None else self.rolling_radius * complex(-V_WB[1], V_WB[0]),
             edge=self.edge,
             lead=self.lead,
@@ -312,6 +313,7 @@ def reader_of(body: Body, scene: Scene) -> StateReader:
         stiffness=body.mass * scene.gravity / scene.rest_depth,
         rolling_radius=solid.rolling_radius,
         edge=scene.edge,
+        lifted=scene.lifts,
     )
 
 
@@ -325,3 +327,17 @@ def as_complex(vectors: Array) -> Complex:
     """Vectors (n, 2) as x + iy (n,)."""
     flat: Complex = np.ascontiguousarray(vectors).view(np.complex128)[:, 0]
     return flat
+
+
+def lifts_of(points: Complex, slips: Complex, span: float, lean: tuple[float, float, float]) -> Array:
+    """How much deeper than their loads points (n,) are [m].
+
+    Args:
+        points: x + iy in B [m].
+        slips: their velocities, x + iy in B [m/s].
+        span: of the tick [s].
+        lean: depth of Bo's foot in the table [m], and how it grows along x and y of B [-].
+    """
+    foot, along_x, along_y = lean
+    depths = np.maximum(foot + along_x * points.real + along_y * points.imag, 0.0)
+    return np.asarray(np.minimum(span * (along_x * slips.real + along_y * slips.imag), depths))

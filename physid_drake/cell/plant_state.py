@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import Context
 
 from physid_drake.cell.diagram import Scene
+from physid_drake.cell.lift import Lift
 from physid_drake.cell.motion import Start, planar_pose
 from physid_drake.cell.object_state import ObjectState, reader_of
 from physid_drake.cell.setters import Body
@@ -44,7 +46,8 @@ class PlantState:
             start: its pose and velocity.
             rest: (7,) the settled pose of B at the origin with yaw 0.
         """
-        self._reader = reader_of(body, self._scene)
+        reader = self._reader = reader_of(body, self._scene)
+        self._lift = Lift(reader.underside, reader.stiffness) if reader.lifted else None
         self._mass = body.mass
         self._cx, self._cy = float(body.p_BBcm[0]), float(body.p_BBcm[1])
         self._inertias = tuple(body.mass * body.inertia_ratio * g for g in self._scene.solid.gyration)
@@ -97,6 +100,11 @@ class PlantState:
         wz, vx, vy = self._x[self._v + 2 : self._v + 5].tolist()
         return vx, vy, wz
 
+    def heading(self) -> tuple[float, float]:
+        """Yaw of B [rad], and its rate [rad/s]."""
+        yaw = planar_pose(*self._x[self._q : self._q + 6].tolist())[2]
+        return yaw, float(self._x[self._v + 2])
+
     def section(self, height: float) -> tuple[Planar, Planar]:
         """Pose and twist of the object's section at a height [m], the hand tip's.
 
@@ -113,14 +121,11 @@ class PlantState:
         py += 2.0 * (j * k - w * i) * above
         return (px, py, pose[2]), (vx + wy * above, vy - wx * above, wz)
 
-    def object_state(self, time: float, span: float, *, settled: bool = False) -> ObjectState:
-        """The object as force laws see it when a tick of ``span`` [s] begins, ``time`` [s] after the start.
-
-        ``settled`` where the friction of the tick will be mended to what the weight bears.
-        """
+    def object_state(self, time: float, span: float) -> ObjectState:
+        """The object as force laws see it when a tick of ``span`` [s] begins, ``time`` [s] after the start."""
         q, v = self._q, self._v
         X_WB, V_WB = self._x[q : q + 7].tolist(), self._x[v : v + 6].tolist()
-        return self._reader.at(time, span, X_WB, V_WB, settled=settled)
+        return self._reader.at(time, span, X_WB, V_WB)
 
     def over_table(self) -> bool:
         """Whether the table is under the centre of mass."""
@@ -168,6 +173,21 @@ class PlantState:
         v = self._v
         self._x[v + 3], self._x[v + 4], self._x[v + 2] = twist
 
+    def keep_momentum(self, yaw: float, spin: float, span: float) -> None:
+        """Give Bcm the velocity that forces gave it in a step of ``span`` [s] from a yaw [rad] and a spin [rad/s].
+
+        Drake steps the velocity of Bo, which goes round Bcm, along a straight line: off by half the spin cubed times
+        the arm and the step squared, each time the same way. What no force acts on would not go straight on.
+        """
+        if self._cx == 0.0 == self._cy:
+            return
+        after, rate = self.heading()
+        vx, vy = self._x[self._v + 3 : self._v + 5].tolist()
+        arm = complex(self._cx, self._cy)
+        was, now = arm * cmath.exp(1j * yaw), arm * cmath.exp(1j * after)
+        velocity = complex(vx, vy) + 1j * rate * (was - now) - span * spin**2 * was
+        self._x[self._v + 3], self._x[self._v + 4] = velocity.real, velocity.imag
+
     def kick(self, yaw: float, jx: float, jy: float, spin: float) -> Planar:
         """Give the object a planar impulse [N s] at Bcm and an angular one [N m s]; returns Bo's gain in velocity."""
         c, s = math.cos(yaw), math.sin(yaw)
@@ -194,6 +214,24 @@ class PlantState:
         self._x[self._v + 1] += wy
         cx, cy = self._cx, self._cy
         self._x[self._v + 5] += wy * (c * cx - s * cy) - wx * (s * cx + c * cy)
+
+    def give_back_lift(self, span: float, largest: float) -> None:
+        """Add what the contact's friction has too much over a tick [s], where it follows depths beyond the loads.
+
+        Args:
+            span: of the tick.
+            largest: of the contact's friction over the cell's, where laws reach so much [-].
+        """
+        if self._lift is None:
+            return
+        yaw, spin = self.heading()
+        turn, (vx, vy) = cmath.exp(1j * yaw), self._x[self._v + 3 : self._v + 5].tolist()
+        force, moment = self._lift.excess(span, self.lean(), complex(vx, vy) / turn, spin)
+        moment -= self._cx * force.imag - self._cy * force.real  # about Bcm
+        force *= largest * span * turn
+        self.kick(yaw, force.real, force.imag, largest * span * moment)
+        arm = self._reader.half_height
+        self.rock(yaw, arm * force.imag, -arm * force.real)
 
     def shift(self, dx: float, dy: float, turn: float) -> None:
         """Move the object's pose by a small planar displacement [m, rad]."""

@@ -16,7 +16,6 @@ from physid_drake.cell.config import SolverConfig
 from physid_drake.cell.contact_drift import ContactDrift
 from physid_drake.cell.diagram import HAND_MASS, Scene
 from physid_drake.cell.forces import ForceLaw, FrictionLaw
-from physid_drake.cell.free_slide import FreeSlide
 from physid_drake.cell.hand_path import HandPath
 from physid_drake.cell.motion import Log, Motion, Outcome, Start
 from physid_drake.cell.plant_state import PlantState
@@ -50,16 +49,13 @@ class Stepper:
         simulator: Simulator,
         solver: SolverConfig,
         hand_radius: float | None,
-        *,
-        tilt_depth: float | None = None,
     ) -> None:
-        """Prepare to step ``scene``; ``tilt_depth`` is the rest depth [m] of a hydroelastic support, else None."""
+        """Prepare to step ``scene``, with a hand's tip of a radius [m]; None without one."""
         self._simulator, self._solver = simulator, solver
         self._root = simulator.get_mutable_context()
         self._state = PlantState(scene, self._root)
         self._tip = Tip(scene.solid.outline, hand_radius or 0.0)
         self._drift = ContactDrift(self._tip)
-        self._slide = FreeSlide(scene.support, trapezoid=solver.trapezoid_slide, tilt_depth=tilt_depth)
         self._rolls, self._gravity = scene.solid.rolling_radius is not None, scene.gravity
         self._discrete = solver.scheme != "cenic"
         self._slide_ticks = 1 if self._discrete else max(1, round(solver.slide_time_step_s / solver.time_step_s))
@@ -294,10 +290,8 @@ class Stepper:
         if push is not None:
             force = push.jx / span, push.jy / span, 0.0
             self._take(push)
-        pushed, after = self._advance(end, begin, free=push is None)
-        if push is None:
-            after = self._slide.without_tilt_friction(self._state, pushed, after)
-        self._slide.mend_position(self._state, old, after, span)
+        after = self._advance(end, begin, free=push is None)
+        self._mend_position(old, after, span)
         self._record(end, force)
 
     def _step_with_hand(self, end: float, begin: float, move: HandMove, seen: Touch | None) -> None:
@@ -309,18 +303,17 @@ class Stepper:
             self._drift.forget()
         command = self._drift.command(before, move.velocity, span)
         state.set_hand(move.start, self._height, command)
-        pushed, after = self._advance(end, begin, free=not touching)
+        after = self._advance(end, begin, free=not touching)
         if touching:
             force = self._hand_force(command, span)
             if self._solver.drift_feedforward:
                 self._drift.learn(before, *state.section(self._height), move, span)
         else:
-            after = self._slide.without_tilt_friction(state, pushed, after)
-            self._slide.mend_position(state, old, after, span)
+            self._mend_position(old, after, span)
         self._record(end, force)
 
-    def _advance(self, end: float, begin: float, *, free: bool) -> tuple[Planar, Planar]:
-        """Let the laws act and Drake step; returns the object's twists before and after Drake's step.
+    def _advance(self, end: float, begin: float, *, free: bool) -> Planar:
+        """Let the laws act and Drake step; returns the object's twist.
 
         ``free`` where nothing pushes the object.
 
@@ -328,16 +321,24 @@ class Stepper:
             FloatingPointError: if the object has flown away.
         """
         state = self._state
-        self._laws.act(state, begin, end - begin, settled=free and self._slide.mends_friction)
-        before = state.twist()
+        self._laws.act(state, begin, end - begin)
+        yaw, spin = state.heading()
         state.send()
         self._simulator.AdvanceTo(end)
         state.fetch()
+        if free:
+            state.keep_momentum(yaw, spin, end - begin)
         after = state.twist()
         # Written so that a NaN anywhere fails the comparison.
         if not abs(after[0]) + abs(after[1]) + 1e-3 * abs(after[2]) < FASTEST:
             raise FloatingPointError("the object left")
-        return before, after
+        return after
+
+    def _mend_position(self, before: Planar, after: Planar, span: float) -> None:
+        """Trapezoidal instead of symplectic: move the object by half of what its velocity changed over a span [s]."""
+        if self._solver.trapezoid_slide:
+            dx, dy, turn = (0.5 * span * (old - new) for old, new in zip(before, after, strict=True))
+            self._state.shift(dx, dy, turn)
 
     def _take(self, push: TipImpulse) -> None:
         """Give the object a sprung tip's impulse, at the tip's height."""

@@ -95,8 +95,9 @@ def add_effect_forces(
         frictions: friction laws.
     """
     plant = scene.plant
-    # Drake's step moves by the velocity at its end, not as a rollout does: see ``ObjectState.p_WBcm_held``.
-    reader = dc.replace(reader_of(body, scene), lead=0.0)
+    # Drake's step moves by the velocity at its end, not as a rollout does: see ``ObjectState.p_WBcm_held``. And it
+    # is Drake's own, with the friction of its contact as it is.
+    reader = dc.replace(reader_of(body, scene), lead=0.0, lifted=False)
     system: EffectForces = builder.AddSystem(EffectForces(scene, reader, tick, laws, frictions))
     builder.Connect(plant.get_state_output_port(scene.object.model_instance()), system.get_input_port())
     builder.Connect(system.get_output_port(), plant.get_applied_spatial_force_input_port())
