@@ -10,7 +10,8 @@ from twin import SIGMA, body_of
 
 from physid_drake.cell import HandPath, Outcome, Start
 from physid_drake.effects import effect_named
-from physid_drake.effects.rollout import Rollout, roll
+from physid_drake.effects.rollout import Geometry, Rollout, roll
+from physid_drake.recording import Box
 
 OFFSET = make("com_offset", x=0.015, y=0.01)
 SMOOTH = 1e-6  # friction: hardly any
@@ -66,25 +67,16 @@ def test_the_offset_is_the_bodys_in_its_own_frame():
     np.testing.assert_allclose([y, -x, yaw - 0.5 * math.pi], end(straight), atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("model", "velocity", "most"),
-    [
-        ("point", (1.0, 0.0, 0.0), 0.5),
-        ("point", (0.5, 0.1, 5.0), 0.5),
-        ("hydroelastic", (0.5, 0.0, 0.0), 0.8),
-        # The friction that a leaning face feels too much of is taken back by one factor for the whole face.
-        ("hydroelastic", (1.0, 0.0, 0.0), 5.5),
-        ("hydroelastic", (0.5, 0.1, 5.0), 2.2),
-    ],
-)
-def test_a_free_slide_is_the_references(model, velocity, most):
+@pytest.mark.parametrize("velocity", [(0.5, 0.0, 0.0), (1.0, 0.0, 0.0), (0.5, 0.1, 5.0)])
+@pytest.mark.parametrize("model", ["point", "hydroelastic"])
+def test_a_free_slide_is_the_references(model, velocity):
     """In standard deviations of the tracker, at the end."""
     (vx, vy, spin), times = velocity, np.linspace(0.0, 0.8, 9)
     of_mass = (vx - spin * OFFSET.y, vy + spin * OFFSET.x, spin)
     reference = box("offset", SIZE, MASS, com_offset=np.array([OFFSET.x, OFFSET.y]))
     want = simulate_planar(reference, MU, times, velocity=of_mass, time_step=1e-4).poses[-1]
     got = end(slide(OFFSET, velocity=velocity, seconds=0.8, model=model))
-    np.testing.assert_array_less(np.abs(got - want) / SIGMA, most)
+    np.testing.assert_array_less(np.abs(got - want) / SIGMA, 0.8)  # measured at most 0.63
 
 
 def test_a_patch_is_where_it_is_said_to_be():
@@ -115,3 +107,29 @@ def test_a_stiff_tip_pushes_an_offset_mass_as_a_rigid_one_does(side):
     assert abs(rigid[2]) > 0.1
     np.testing.assert_allclose(stiff[:2], rigid[:2], atol=1.5e-4)  # measured 1.1e-4 m
     assert stiff[2] == pytest.approx(rigid[2], abs=4e-3)  # measured 3.1e-3 rad
+
+
+@pytest.mark.parametrize("velocity", [(1.0, 0.0, 0.0), (0.5, 0.1, 5.0), (0.2, 0.0, -15.0)])
+@pytest.mark.parametrize("size", [SIZE, (0.08, 0.08, 0.11)], ids=["box", "tall"])
+def test_a_free_slide_of_the_hydroelastic_cell_is_the_references(size, velocity):
+    # Measured: 0.21 to 1.5, and 2.6 of a tall one at 1 m/s, which hardly keeps its edge down. Friction that was
+    # scaled as one for the whole face, and Bo going straight on instead of Bcm, left 1.5 to 4.5, and 34.
+    com, times = np.array([0.012, 0.008]), np.linspace(0.0, 0.8, 81)
+    vx, vy, spin = velocity
+    of_mass = (vx - spin * com[1], vy + spin * com[0], spin)
+    offset = make("com_offset", x=com[0], y=com[1])
+    geometry = Geometry(shape=Box(size=size))
+    want = simulate_planar(box("b", size, MASS, com_offset=com), MU, times, velocity=of_mass).poses
+    motion = slide(offset, velocity=velocity, seconds=0.8, geometry=geometry, model="hydroelastic")
+    worst = np.abs((motion.planar_at(times) - want) / SIGMA).max()
+    assert worst < (3.2 if size != SIZE and vx == 1.0 else 1.8)
+
+
+def test_what_no_force_acts_on_goes_straight_on_however_it_spins():
+    spin, seconds = 12.0, 0.5
+    motion = slide(OFFSET, velocity=(0.3 + spin * OFFSET.y, -spin * OFFSET.x, spin), seconds=seconds, friction=SMOOTH)
+    x, y, yaw = end(motion)
+    c, s = math.cos(yaw), math.sin(yaw)
+    mass = np.array([x + c * OFFSET.x - s * OFFSET.y, y + s * OFFSET.x + c * OFFSET.y])
+    # Measured 3e-5 m; Drake's own steps leave 1.3 mm.
+    np.testing.assert_allclose(mass, [OFFSET.x + 0.3 * seconds, OFFSET.y], atol=1e-4)

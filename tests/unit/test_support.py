@@ -150,6 +150,7 @@ def spinning(name, centre, yaw=0.0, points=POINTS):
     return ObjectState(
         time=0.0, span=1e-3, p_WBo=0j, v_WBo=-1j * spin * complex(*centre) * np.exp(1j * yaw), p_BoBcm_W=0j, yaw=yaw,
         yaw_rate=spin, mass=1.0, weight=1.0, half_height=0.02, inertia=1.0, underside=base, lean=(3e-6, 0.0, 0.0),
+        stiffness=1.0 / 3e-6,
     )  # fmt: skip
 
 
