@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 WORTH_A_FIT = 0.35  # of the best score test's gain
 RIVAL = 0.5  # where one explains the pushes already
+AS_MUCH = 0.9  # of the best score test's gain: what promises so much may be the same physics
 WORTH_A_TRY = 0.1  # where none takes a good part of the mismatch away
 ENOUGH = 120  # rollouts per push in one step after which no further effect is tried, nor another shape of one
 STUCK = 1.6  # cost per degree of freedom after which a fit is tried again from elsewhere
@@ -61,6 +62,7 @@ def confirm(
     for k in _once_more(step.found):
         step.fit_once_more(k)
     step.found = _tried_from_nearer_theta(fitter, before, ranked(step.found), step.plain, tick)
+    step.found = _simpler_tried_from_there(fitter, step.found, step.plain, tick)
     return tuple(_tried_in_its_place(fitter, before, step.found, scores, step.plain, tick))
 
 
@@ -174,6 +176,34 @@ def _tried_from_nearer_theta(
         again = fitter.fit(start, rounds=7, careful=4, renew=True)
         if again.score > found[k].fitted.score:
             tried[k] = _candidate(fitter, one, again, plain)
+    return ranked(tried)
+
+
+def _simpler_tried_from_there(
+    fitter: Fitter, found: Sequence[Candidate], plain: Array, tick: Progress
+) -> list[Candidate]:
+    """The candidates; a simpler one that promised as much as the best is fitted from the theta of the best.
+
+    Its own fit set out from the theta of the model before, and may have stopped a little short of one that is the
+    same physics with more coordinates: a spring that is anchored thirty metres away is a tilted table.
+    """
+    tried, best = list(found), found[0] if found and found[0].accepted else None
+    if best is None:
+        return tried
+    simpler = [
+        k
+        for k, c in enumerate(found)
+        if c.coordinates < best.coordinates
+        and c.score.gain >= AS_MUCH * best.score.gain
+        and c.fitted.score < best.fitted.score
+    ]
+    for k in simpler[:PERSISTENT]:
+        one = found[k]
+        tick(f"fit with {one.name} from the theta of {best.name}", 0, 0)
+        start = fitter.start(best.fitted.state.u, one.fitted.state.effects)
+        again = fitter.fit(start, rounds=7, careful=4, renew=True)
+        if again.score > one.fitted.score:
+            tried[k] = _candidate(fitter, one.score, again, plain)
     return ranked(tried)
 
 

@@ -131,6 +131,45 @@ def test_what_ended_far_off_is_tried_from_the_theta_of_what_came_near(monkeypatc
 
 
 @pytest.mark.parametrize(
+    ("promised", "reached", "confirmed", "fitted_again"),
+    [
+        (1000.0, 889.0, True, True),
+        (800.0, 889.0, True, False),  # it promised less, and is something else
+        (1000.0, 910.0, True, False),  # it came as far already
+        (1000.0, 889.0, False, False),  # nothing is found yet
+    ],
+)
+def test_the_same_physics_with_fewer_coordinates_is_fitted_from_the_theta_of_the_best(
+    monkeypatch, promised, reached, confirmed, fitted_again
+):
+    """A spring anchored thirty metres away was named, since the fit of a tilt had stopped a hundredth short."""
+    made = []
+
+    def candidate(name, gain, score, coordinates, gains=None):
+        state = SimpleNamespace(u=name, effects=(name,))
+        return Candidate(
+            score=SimpleNamespace(gain=gain, kind=effect_named(name), in_order=False),
+            fitted=SimpleNamespace(reduced_chi2=0.9, score=score, state=state), degenerate=False,
+            gains=np.full(8, (score if confirmed else -score) / 8), coordinates=coordinates,
+        )  # fmt: skip
+
+    def fit(state, *, rounds, careful, renew):
+        made.append((state.u, state.effects))
+        return SimpleNamespace(state=state, reduced_chi2=0.9, score=909.0)
+
+    def judged(fitter, one, model, plain):
+        return Candidate(score=one, fitted=model, gains=np.full(8, 909.0 / 8), degenerate=False, coordinates=2)
+
+    monkeypatch.setattr(confirm, "_candidate", judged)
+    found = [candidate("tether", 1000.0, 909.5, 4), candidate("table_tilt", promised, reached, 2)]
+    fitter = SimpleNamespace(start=lambda u, effects: SimpleNamespace(u=u, effects=effects), fit=fit)
+    again = confirm._simpler_tried_from_there(fitter, found, np.zeros(8), lambda *said: None)
+    assert made == ([("tether", ("table_tilt",))] if fitted_again else [])
+    assert again[0].name == ("table_tilt" if fitted_again or reached > 909.5 else "tether")
+    assert {c.name for c in again} == {"tether", "table_tilt"}
+
+
+@pytest.mark.parametrize(
     ("left", "beside", "gone_on_with", "first"),
     [
         ({"friction_patch": 11.4, "friction_gradient": 12.6, "sloshing": 18.0}, True, 2, "friction_gradient"),
