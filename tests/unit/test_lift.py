@@ -46,10 +46,10 @@ def test_four_points_tell_it_as_all_do(underside, velocity, spin):
     lean = (DEPTH, *SLOPE)
     force, moment = Lift(underside, STIFFNESS).excess(SPAN, lean, velocity, spin)
     want, torque = of_all(underside, lean, velocity, spin)
-    # Of the friction and its largest torque: measured 2e-5 to 2e-3, the most in a spin about the middle.
+    # Of the friction and of its torque in a spin: measured 4e-4 and 8e-4 at most.
     friction = STIFFNESS * DEPTH * 0.4
-    assert abs(force - want) < 4e-3 * friction
-    assert abs(moment - torque) < 4e-3 * friction * 0.035
+    assert abs(force - want) < 1e-3 * friction
+    assert abs(moment - torque) < 1.5e-3 * friction * 0.035
 
 
 def test_what_is_not_in_the_table_gives_nothing_back(underside):
