@@ -21,8 +21,8 @@ class Lift:
     """The excess friction of a rollout's support points.
 
     It goes with slip and is a few per cent of the friction: four points that are together as rough as all of them,
-    with the same mean and covariance, tell it to a thousandth of the friction, unless some of them leave the table. Plain
-    floats, since a rollout asks at every tick.
+    with the same mean and covariance, tell it to a thousandth of the friction, unless some of them leave the table.
+    Plain floats, since a rollout asks at every tick.
     """
 
     def __init__(self, underside: Underside, stiffness: float) -> None:
