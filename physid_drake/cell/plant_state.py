@@ -186,7 +186,7 @@ class PlantState:
         arm = complex(self._cx, self._cy)
         was, now = arm * cmath.exp(1j * yaw), arm * cmath.exp(1j * after)
         velocity = complex(vx, vy) + 1j * rate * (was - now) - span * spin**2 * was
-        self._x[self._v + 3], self._x[self._v + 4] = velocity.real, velocity.imag
+        self.set_twist((velocity.real, velocity.imag, rate))
 
     def kick(self, yaw: float, jx: float, jy: float, spin: float) -> Planar:
         """Give the object a planar impulse [N s] at Bcm and an angular one [N m s]; returns Bo's gain in velocity."""

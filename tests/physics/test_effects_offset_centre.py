@@ -51,10 +51,12 @@ def test_a_drag_slows_the_mass_and_not_the_middle_of_the_shape(effect):
     np.testing.assert_allclose(mass, [OFFSET.x, OFFSET.y], atol=1e-4)
 
 
-def test_friction_of_a_law_acts_under_the_object_as_friction_of_the_contact_does():
-    """A patch under everything is a rougher table, wherever the mass is."""
-    rough = slide(OFFSET, velocity=(0.5, 0.1, 5.0), friction=1.5 * MU)
-    patch = slide(OFFSET, make("friction_patch", ratio=1.5, x=0.0, y=0.0, radius=0.9), velocity=(0.5, 0.1, 5.0))
+@pytest.mark.parametrize("model", ["point", "hydroelastic"])
+def test_friction_of_a_law_acts_under_the_object_as_friction_of_the_contact_does(model):
+    """A patch under everything is a rougher table, wherever the mass is, and lifts give back as much."""
+    how = {"velocity": (0.5, 0.1, 5.0), "model": model}
+    rough = slide(OFFSET, friction=1.5 * MU, **how)
+    patch = slide(OFFSET, make("friction_patch", ratio=1.5, x=0.0, y=0.0, radius=0.9), **how)
     np.testing.assert_allclose(end(patch), end(rough), atol=1e-12)  # measured 2e-16
 
 
