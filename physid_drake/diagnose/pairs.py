@@ -29,8 +29,8 @@ Pair = tuple[Score, Score]
 AMONG = 6  # effects, by their own score tests
 FITTED = 3  # pairs
 ROUNDS, CAREFUL = 6, 3  # of a fit; in the first of them the pushes' unknowns are held
-PROMISING = 0.5  # of the plain cell's cost: a pair that leaves more by then explains nothing in the end
 EXPECTED = 1.0  # cost per degree of freedom that the right pair leaves
+PROMISING = 0.5  # of the plain cell's cost beyond that: a pair that leaves more by then explains nothing in the end
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -72,8 +72,8 @@ def confirmed_pairs(
         tick: told which pair is fitted.
         most: rollouts of the pool after which no further pair is fitted.
     """
-    if PROMISING * plain.reduced_chi2 <= EXPECTED:
-        return []  # no pair could promise anything, and effects that leave so little do not bend far
+    if plain.reduced_chi2 <= EXPECTED:
+        return []  # no pair can promise anything
     found: list[FittedPair] = []
     for k, pair in enumerate(promising(plain, scores)):
         if fitter.case.pool.count > most:
@@ -159,7 +159,7 @@ def _model_with(fitter: Fitter, plain: Fitted, pair: Pair) -> Fitted | None:
     second, *_ = scanned_start(fitter, plain, pair[1], (first,))
     start = fitter.start(plain.state.u, (first, second))
     model = fitter.fit(start, rounds=CAREFUL, careful=CAREFUL, renew=True)
-    if model.reduced_chi2 > PROMISING * plain.reduced_chi2:
+    if model.reduced_chi2 > EXPECTED + PROMISING * (plain.reduced_chi2 - EXPECTED):
         return None
     return fitter.fit(model.state, rounds=ROUNDS - CAREFUL, like=model, renew=True)
 
