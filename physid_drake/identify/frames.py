@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +14,7 @@ from physid_drake.errors import RecordingError
 from physid_drake.recording import Box, Cylinder, PoseStream, Push, Recording
 
 Array = NDArray[np.float64]
+Check = Callable[[], None]  # raises RecordingError
 
 UPRIGHT = 0.87  # cosine of 30 degrees: an object that leans more does not stand on its face
 TIPPED = 3  # samples: fewer are a tracker's error
@@ -26,6 +30,22 @@ SLOWEST = 1.0  # s between samples: slower, it is no stream of a push
 FEWEST_FORCES = 3  # pushes
 FEWEST_FREE = 3  # poses of a free motion
 BESIDE = 0.05  # m between tip and object that no error of calibration explains
+
+
+def checks_of(recording: Recording) -> tuple[Check, ...]:
+    """What must be true of a recording as a whole."""
+    every = (check_mass, check_hand_near, check_hand_outside, check_force_direction)
+    return tuple(partial(check, recording) for check in every)
+
+
+def push_checks_of(recording: Recording, push: Push) -> tuple[Check, ...]:
+    """What must be true of each push."""
+    return (
+        partial(check_upright, recording, push),
+        partial(check_on_table, recording, push),
+        partial(check_clocks, push),
+        partial(check_free_start, push),
+    )
 
 
 def check_mass(recording: Recording) -> None:

@@ -11,17 +11,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import CellConfig, HandPath, Start
 from physid_drake.cell.hand_fit import fit_hand_paths, stream_std
 from physid_drake.identify.force_windows import force_windows
-from physid_drake.identify.frames import (
-    FEWEST_FREE,
-    check_clocks,
-    check_force_direction,
-    check_free_start,
-    check_hand_near,
-    check_hand_outside,
-    check_mass,
-    check_on_table,
-    check_upright,
-)
+from physid_drake.identify.frames import FEWEST_FREE, checks_of, push_checks_of
 from physid_drake.identify.hand_stream import beside_object, vertical_reach
 from physid_drake.recording import Cylinder as CylinderShape
 from physid_drake.recording import (
@@ -209,10 +199,8 @@ def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[Push
         RecordingError: if the hand passes above the object, never comes near it or is far inside it, or if an object
             stands beside the table, tips, has an impossible mass, or cannot be compared.
     """
-    check_mass(recording)
-    check_hand_near(recording)
-    check_hand_outside(recording)
-    check_force_direction(recording)
+    for check in checks_of(recording):
+        check()
     hands = {k: beside_object(recording, push, height, noise.position) for k, push in enumerate(recording.pushes)}
     moving = {k: hand for k, hand in hands.items() if hand is not None}
     fitted = fit_hand_paths([(hand.times, hand.positions[:, :2]) for hand in moving.values()], noise.hand)
@@ -224,10 +212,8 @@ def _problem(
     recording: Recording, order: int, hand: PoseStream | None, path: HandPath | None, noise: Noise, height: float
 ) -> PushProblem:
     push = recording.pushes[order]
-    check_upright(recording, push)
-    check_on_table(recording, push)
-    check_clocks(push)
-    check_free_start(push)
+    for check in push_checks_of(recording, push):
+        check()
     planar = push.object.planar
     start, start_std = _start_of(push, planar, noise, free=path is None)
     compared = np.ones(len(planar), dtype=bool)
