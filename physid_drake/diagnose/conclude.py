@@ -155,7 +155,7 @@ def _verdict(evidence: Evidence, p_value: float, alpha: float, detectable: Seque
         return "underpowered" if _blind(evidence, detectable) else "consistent"
     if not evidence.steps or not _explained(evidence):
         return "unexplained"
-    return "ambiguous" if any(_class_beside(evidence, k) for k in range(len(evidence.steps))) else "explained"
+    return "ambiguous" if any(class_beside(evidence, k) for k in range(len(evidence.steps))) else "explained"
 
 
 def _blind(evidence: Evidence, detectable: Sequence[Detectable]) -> bool:
@@ -212,7 +212,7 @@ def _others(evidence: Evidence, k: int) -> set[str]:
     return {step[0].name for j, step in enumerate(evidence.steps) if j != k}
 
 
-def _class_beside(evidence: Evidence, k: int) -> tuple[str, ...]:
+def class_beside(evidence: Evidence, k: int) -> tuple[str, ...]:
     """Names that these pushes cannot tell from the effect of step k, beside the model's other effects."""
     others = _others(evidence, k)
     return tuple(name for name in class_of(evidence.plain, evidence.steps[k]) if name not in others)
@@ -241,7 +241,7 @@ def _findings(evidence: Evidence) -> tuple[EffectFinding, ...]:
             EffectFinding(
                 name=kind.name,
                 element=kind.element,
-                indistinguishable_from=_class_beside(evidence, k),
+                indistinguishable_from=class_beside(evidence, k),
                 probability=_probability(step, _others(evidence, k)),
                 parameters=parameters_of(evidence, k),
                 statement=kind.statement,

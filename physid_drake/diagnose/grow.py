@@ -183,7 +183,7 @@ class Growth:
     def reconsidered(self, grown: Grown, k: int) -> Grown:
         """The rivals of a step judged again beside the effects that came after it: what was missing blurred them.
 
-        One that does better there takes the place of the step's effect.
+        One that does better there takes the place of the step's effect. Gains are what each adds to the others.
         """
         plain, model, step = grown.base.fitted, grown.last.fitted, grown.steps[k]
         effects = model.state.effects
@@ -203,19 +203,23 @@ class Growth:
             models[other.name] = self.fitter.fit(with_kth(point), rounds=4, like=model)
         bare = grown.without.get(step[0].name) or self.without(step[0].name, model)
         without = push_scores(bare)
-        scores = {name: push_scores(one) for name, one in models.items()}
-        best = ranked([dc.replace(c, gains=scores[c.name] - without) for c in (step[0], *rivals)])[0].name
-        before = push_scores(plain)
-        judged = [dc.replace(c, gains=scores[c.name] - before) if c.name in scores else c for c in step]
-        judged.sort(key=lambda c: c.name != best)
-        steps = (*grown.steps[:k], tuple(judged), *grown.steps[k + 1 :])
+        again = [
+            dc.replace(c, fitted=models[c.name], gains=push_scores(models[c.name]) - without)
+            for c in (step[0], *rivals)
+        ]
+        judged = tuple(ranked(again))
+        best = judged[0].name
+        # The others' gains are over the plain model: they do not compare with these.
+        others = tuple(c for c in step[1:] if c.name not in models)
+        steps = (*grown.steps[:k], judged, *grown.steps[k + 1 :])
+        grown = dc.replace(grown, steps=steps, rejected=(*grown.rejected, *others))
         if best == step[0].name:
-            return dc.replace(grown, steps=steps)
+            return grown
         self.tick(f"model with {best}", 0, 0)
         swapped = self._model_with(models[best].state, bare)
         missed = [s for s in grown.base.signatures if s.kind.name == step[0].name]
         left = [s for s in grown.last.signatures if s.kind.name != best]
-        return dc.replace(grown, steps=steps, last=Looked.at(swapped, (*left, *missed), self.rng), without={})
+        return dc.replace(grown, last=Looked.at(swapped, (*left, *missed), self.rng), without={})
 
     def plain_from(self, plain: Fitted, candidate: Candidate) -> Fitted | None:
         """A better plain fit from the theta at which an effect's fit ended; None where there is none."""

@@ -163,10 +163,16 @@ def _of_hand_and_force(recording: Recording, plain: Noise) -> list[str]:
     said = (("hand's", "hand", recording.sensors.hand_position_std, plain.hand, "mm", 1e3),
             ("force's", "force", recording.sensors.force_std, plain.force, "N", 1.0))  # fmt: skip
     return [
-        f"the {whose} noise is {scale * seen:.2g} {unit}, {seen / stated:.1f} times what the recording states"
+        f"the {whose} noise is {scale * seen:.2g} {unit}, {_beside(seen, stated)}"
         for whose, name, stated, seen, unit, scale in said
         if stated is not None and plain.source[name] == "seen"
     ]
+
+
+def _beside(seen: float, stated: float) -> str:
+    if stated == 0.0:
+        return "where the recording states none"
+    return f"{seen / stated:.1f} times what the recording states"
 
 
 def _chosen(what: str, value: float, source: str, seen: SeenNoise | None, warnings: list[str]) -> SeenNoise:

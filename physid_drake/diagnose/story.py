@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from physid_drake.diagnose.candidate import Candidate
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.conclude import class_of, conclude
+from physid_drake.diagnose.conclude import class_beside, conclude
 from physid_drake.diagnose.confirm import WORTH_A_TRY
 from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, confirmed, unexplained
 from physid_drake.diagnose.fit import Fitter
@@ -226,17 +227,20 @@ def _located(evidence: Evidence, tick: Progress) -> Evidence:
 
 
 def _rival_states(evidence: Evidence) -> list[State]:
-    """The models in question: the final one and the rivals of its last effect; none if it explains nothing."""
-    if not evidence.steps or evidence.final.reduced_chi2 > HOPELESS:
+    """The models in question: the final one, and those with another effect in the place of one of its own.
+
+    That is the first effect which these pushes cannot tell from others, else the last one and what came next to it;
+    none where the final model explains nothing.
+    """
+    steps, final = evidence.steps, evidence.final.state
+    if not steps or evidence.final.reduced_chi2 > HOPELESS:
         return []
-    last, final = evidence.steps[-1], evidence.final.state
-    alike = class_of(evidence.plain, last)
-    others = [c for c in last[1:] if c.name in alike] or [c for c in last[1:] if not c.degenerate][:1]
-    points = [next(e for e in c.fitted.state.effects if e.kind.name == c.name) for c in others]
-    return [
-        final,
-        *(
-            dc.replace(c.fitted.state, effects=(*final.effects[:-1], point))
-            for c, point in zip(others, points, strict=True)
-        ),
-    ]
+    k = next((j for j in range(len(steps)) if class_beside(evidence, j)), len(steps) - 1)
+    alike = class_beside(evidence, k)
+    others = [c for c in steps[k][1:] if c.name in alike] or [c for c in steps[k][1:] if not c.degenerate][:1]
+
+    def in_place(c: Candidate) -> State:
+        point = next(e for e in c.fitted.state.effects if e.kind.name == c.name)
+        return dc.replace(c.fitted.state, effects=(*final.effects[:k], point, *final.effects[k + 1 :]))
+
+    return [final, *(in_place(c) for c in others)]

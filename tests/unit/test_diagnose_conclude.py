@@ -187,8 +187,8 @@ def test_what_the_model_has_beside_an_effect_is_no_rival_of_it(monkeypatch):
     monkeypatch.setattr(conclude, "class_of", lambda plain, step: tuple(c.name for c in step[1:]))
     alone = evidence(steps=((size, stribeck, drag),))
     both = evidence(steps=((size, stribeck, drag), (stribeck,)))
-    assert conclude._class_beside(alone, 0) == ("stribeck_friction", "viscous_drag")
-    assert conclude._class_beside(both, 0) == ("viscous_drag",)
+    assert conclude.class_beside(alone, 0) == ("stribeck_friction", "viscous_drag")
+    assert conclude.class_beside(both, 0) == ("viscous_drag",)
     monkeypatch.setattr(conclude, "out_of_question", lambda best, other: False)
     three, two = (conclude._probability(e.steps[0], conclude._others(e, 0)) for e in (alone, both))
     assert three < two < 1.0

@@ -157,11 +157,16 @@ def test_a_rival_that_does_better_beside_a_later_effect_takes_the_place(rivalled
     refits = Refits({("table_tilt", "viscous_drag"): beside, ("viscous_drag",): -60.0})
     judged = growth(refits).reconsidered(rivalled, 0)
     assert names_of(judged) == [first, "viscous_drag"]
-    assert {c.name for c in judged.steps[0]} == {"magnet", "table_tilt", "uneven_support"}
+    assert {c.name for c in judged.steps[0]} == {"magnet", "table_tilt"}
+    assert [c.name for c in judged.rejected] == ["uneven_support"]
     assert [e.kind.name for e in judged.last.fitted.state.effects] == [first, "viscous_drag"]
     gains = {c.name: c.gain for c in judged.steps[0]}
-    assert gains["magnet"] == pytest.approx(PUSHES * 45.0)  # over the plain cell, as those of other candidates
-    assert gains["table_tilt"] == pytest.approx(PUSHES * (beside + 50.0))
+    assert gains["magnet"] == pytest.approx(PUSHES * (60.0 - 5.0))  # over the drag alone: what each adds to it
+    assert gains["table_tilt"] == pytest.approx(PUSHES * (60.0 + beside))
+    assert {c.name: [e.kind.name for e in c.fitted.state.effects] for c in judged.steps[0]} == {
+        "magnet": ["magnet", "viscous_drag"],
+        "table_tilt": ["table_tilt", "viscous_drag"],
+    }
 
 
 def test_a_step_without_rivals_stays(rivalled, monkeypatch):

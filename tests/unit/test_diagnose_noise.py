@@ -89,17 +89,18 @@ def test_a_stated_noise_that_the_rests_contradict_is_not_believed(recording):
     assert "position" in noise.warnings[0]
 
 
-def test_a_hands_noise_that_its_stream_contradicts_is_said(recording):
+@pytest.mark.parametrize(("stated", "said"), [(5e-5, "times what the recording states"), (0.0, "states none")])
+def test_a_hands_noise_that_its_stream_contradicts_is_said(recording, stated, said):
     loud = [
         dc.replace(
             p, hand=dc.replace(p.hand, positions=p.hand.positions + 5e-4 * RNG.standard_normal((len(p.hand), 3)))
         )
         for p in recording.pushes
     ]
-    sensors = dc.replace(recording.sensors, hand_position_std=5e-5)
+    sensors = dc.replace(recording.sensors, hand_position_std=stated)
     noise, plain = tracker_noise(dc.replace(recording, pushes=tuple(loud), sensors=sensors))
     assert plain.hand == pytest.approx(5e-4, rel=0.3)
-    assert "hand's noise" in noise.warnings[0] and noise.stated
+    assert "hand's noise" in noise.warnings[0] and said in noise.warnings[0] and noise.stated
 
 
 def test_a_rotation_that_is_neither_stated_nor_seen_is_not_known(recording):

@@ -1,5 +1,6 @@
 """The order of a diagnosis: what is looked at, and with which tolerances."""
 
+import dataclasses as dc
 from types import SimpleNamespace
 
 import numpy as np
@@ -67,3 +68,52 @@ def test_an_unknown_noise_is_what_the_model_at_the_end_leaves(monkeypatch, quiet
     answer = search.answer_by_ratios("case", "rough", frozenset(), None)
     assert answer.noise_share == share
     assert {step[0].name for step in answer.grown.steps} == quiet_finds
+
+
+def point(name):
+    return SimpleNamespace(kind=SimpleNamespace(name=name))
+
+
+@dc.dataclass(frozen=True)
+class Model:
+    """A state that only has theta and effects."""
+
+    u: float
+    effects: tuple[SimpleNamespace, ...]
+
+
+def step(*names, beside=()):
+    """Candidates of a step, each fitted in place of the first one with a theta of its own."""
+    return tuple(
+        SimpleNamespace(
+            name=name, degenerate=False, fitted=SimpleNamespace(state=Model(k, (*map(point, beside), point(name))))
+        )
+        for k, name in enumerate(names, start=1)
+    )
+
+
+@pytest.mark.parametrize(
+    ("alike", "expected"),
+    [
+        ({0: ("actuator_lag",)}, ["actuator_lag", "table_tilt"]),  # though nothing is like the last effect
+        ({1: ("tether",)}, ["tracker_latency", "tether"]),
+        ({}, ["tracker_latency", "magnet"]),  # what came next to it
+    ],
+)
+def test_the_next_push_is_to_tell_what_these_cannot(monkeypatch, alike, expected):
+    evidence = SimpleNamespace(
+        steps=(
+            step("tracker_latency", "actuator_lag"),
+            step("table_tilt", "magnet", "tether", beside=["size_error"]),
+        ),
+        final=SimpleNamespace(reduced_chi2=1.0, state=Model(0, (point("tracker_latency"), point("table_tilt")))),
+    )
+    monkeypatch.setattr(story, "class_beside", lambda evidence, k: alike.get(k, ()))
+    final, rival = story._rival_states(evidence)
+    assert final is evidence.final.state
+    assert [e.kind.name for e in rival.effects] == expected and rival.u != final.u
+
+
+def test_a_model_that_explains_nothing_has_no_next_push():
+    far = SimpleNamespace(steps=(step("table_tilt", "tether"),), final=SimpleNamespace(reduced_chi2=50.0, state=None))
+    assert story._rival_states(far) == []
