@@ -24,6 +24,7 @@ WORTH_A_TRY = 0.1  # where none takes a good part of the mismatch away
 ENOUGH = 120  # rollouts per push in one step after which no further effect is tried, nor another shape of one
 STUCK = 1.6  # cost per degree of freedom after which a fit is tried again from elsewhere
 NEAR = 0.5  # of the cost beyond noise: an effect that leaves more is not near another place or shape
+AFRESH, CAREFUL = 7, 4  # rounds of a fit from afar; in the first of them the pushes' unknowns are held
 HOP = 3  # steps of a fit from another place or shape: an effect that belongs there shows by then
 ANOTHER_BASIN = 10.0  # nats by which a fit must be better to be another one
 FELL_SHORT = 0.8  # of the gain that the score test promised: such a fit is tried again too
@@ -45,34 +46,29 @@ def confirm(
         most: effects that are fitted in any case, if they are worth it; as long as none leads near an explanation,
             twice as many. Far from the plain cell a score test says little of what a fit will find.
     """
-    worth, more = _worth_fitting(scores, most)
-    step = _Step(fitter=fitter, before=before, plain=push_scores(before), tick=tick)
-    for k, one in enumerate((*worth, *more)):
-        if k == len(worth) and not step.leads_near:
-            # Before what promises little: derivatives of the model before may have led the best one astray.
-            step.fit_once_more(_most_promising(step.found))
-        if k >= len(worth) and (step.leads_near or step.spent):
-            break
-        if _explained([c for c in step.found if c.accepted]) and one.gain < RIVAL * worth[0].gain:
-            break
-        tick(f"fit with {one.kind.name}", k, len(worth))
-        step.found.append(_candidate(fitter, one, _fit(fitter, before, one), step.plain))
-    step.found = _tried_elsewhere(fitter, before, ranked(step.found), step.plain, tick)
-    step.found = _gone_on_with(fitter, before, step.found, step.plain, tick)
-    for k in _once_more(step.found):
-        step.fit_once_more(k)
-    step.found = _tried_from_nearer_theta(fitter, before, ranked(step.found), step.plain, tick)
-    step.found = _simpler_tried_from_there(fitter, step.found, step.plain, tick)
-    return tuple(_tried_in_its_place(fitter, before, step.found, scores, step.plain, tick))
+    step = Step(fitter=fitter, before=before, tick=tick)
+    step.fit_the_best(scores, most)
+    step.try_elsewhere()
+    step.go_on()
+    step.fit_once_more()
+    step.try_from_nearer_theta()
+    step.try_simpler_from_the_best()
+    step.try_in_the_same_place(scores)
+    return tuple(step.found)
 
 
-class _Step:
-    """The candidates of one step, and which of them were fitted from elsewhere."""
+class Step:
+    """The candidates of one step; each method fits some of them again from where more may be found.
 
-    def __init__(self, *, fitter: Fitter, before: Fitted, plain: Array, tick: Progress) -> None:
-        self.fitter, self.before, self.plain, self.tick = fitter, before, plain, tick
-        self.found: list[Candidate] = []
-        self._again: set[str] = set()
+    Attributes:
+        found: the candidates, best held-out gain first.
+    """
+
+    def __init__(self, *, fitter: Fitter, before: Fitted, tick: Progress, found: Sequence[Candidate] = ()) -> None:
+        self.fitter, self.before, self.tick = fitter, before, tick
+        self.found = list(found)
+        self._plain = push_scores(before)
+        self._again: set[str] = set()  # fitted once more
         self._most = fitter.case.pool.count + ENOUGH * len(fitter.case.problems)
 
     @property
@@ -85,16 +81,145 @@ class _Step:
         """Whether a candidate leads near an explanation."""
         return any(worthwhile(self.before, c) and c.fitted.reduced_chi2 <= FAR_OFF for c in self.found)
 
-    def fit_once_more(self, k: int) -> None:
-        """Fit candidate k from elsewhere, if it was not yet and may do better."""
-        one = self.found[k]
+    def fit_the_best(self, scores: Sequence[Score], most: int) -> None:
+        """Fit the effects that promise most, and as long as none leads near an explanation, others."""
+        worth, more = _worth_fitting(scores, most)
+        for k, one in enumerate((*worth, *more)):
+            if k == len(worth) and not self.leads_near:
+                # Before what promises little: derivatives of the model before may have led the best one astray.
+                self._fit_once_more(_most_promising(self.found))
+            if k >= len(worth) and (self.leads_near or self.spent):
+                break
+            if _explained([c for c in self.found if c.accepted]) and one.gain < RIVAL * worth[0].gain:
+                break
+            self.tick(f"fit with {one.kind.name}", k, len(worth))
+            self.found.append(self._candidate(one, _fit(self.fitter, self.before, one)))
+        self.found = ranked(self.found)
+
+    def try_elsewhere(self) -> None:
+        """Fit the best from other places as long as none explains the pushes.
+
+        Only what has a place and may be near: a candidate that takes most of the mismatch away.
+        """
+        if _explained(self.found):
+            return
+        case = self.fitter.case
+        near = [c for c in self.found if takes_most(self.before, c.fitted) and elsewhere(case, c.score)]
+        for one in near[:PERSISTENT]:
+            if _explained(self.found):
+                break
+            self.tick(f"fit with {one.name} elsewhere", 0, 0)
+            self._replace(one, _fit_elsewhere(self.fitter, self.before, one))
+        self.found = ranked(self.found)
+
+    def go_on(self) -> None:
+        """Where none leads near an explanation, go on with the best fits before one is chosen.
+
+        Far off, the derivatives of the model before end a fit long before its effect is where it belongs, and which
+        got further by then says little. Beside another effect only: the first is fitted from the best of a scan as
+        well.
+        """
+        if any(c.fitted.reduced_chi2 <= FAR_OFF for c in self.found) or not self.before.state.effects:
+            return
+        rivals = [c for c in self.found if worthwhile(self.before, c)][:PERSISTENT]
+        if len(rivals) < PERSISTENT:
+            return
+        for one in rivals:
+            self.tick(f"fit with {one.name} gone on with", 0, 0)
+            stopped = one.fitted.state
+            self._replace(one, fit_afresh(self.fitter, stopped.u, stopped.effects))
+        self.found = ranked(self.found)
+
+    def fit_once_more(self) -> None:
+        """Fit the best, and what promised most, from elsewhere."""
+        for one in _once_more(self.found):
+            self._fit_once_more(one)
+        self.found = ranked(self.found)
+
+    def try_from_nearer_theta(self) -> None:
+        """Fit what is far from an explanation again from the theta of one that is near but will not do.
+
+        One that ran to the end of its range tells where theta is, too: the weakest of springs, anchored far away, is
+        a table that is tilted.
+        """
+        if not self.found or _explained([c for c in self.found if c.accepted]):
+            return
+        nearest = min((c.fitted for c in self.found), key=lambda fitted: fitted.reduced_chi2)
+        if nearest.reduced_chi2 > FAR_OFF:
+            return
+        least = RIVAL * max(c.score.gain for c in self.found)
+        far = [c for c in self.found if c.fitted.reduced_chi2 > FAR_OFF and c.score.gain >= least]
+        for one in far[:PERSISTENT]:
+            self.tick(f"fit with {one.name} from another theta", 0, 0)
+            effects = (*self.before.state.effects, start_of(self.fitter, one.score))
+            self._replace(one, fit_afresh(self.fitter, nearest.state.u, effects))
+        self.found = ranked(self.found)
+
+    def try_simpler_from_the_best(self) -> None:
+        """Fit a simpler effect that promised as much as the best one from the theta of the best.
+
+        Its own fit set out from the theta of the model before, and may have stopped a little short of one that is the
+        same physics with more coordinates: a spring that is anchored thirty metres away is a tilted table.
+        """
+        best = self._best
+        if best is None:
+            return
+        least = AS_MUCH * best.score.gain
+        simpler = [
+            c
+            for c in self.found
+            if c.coordinates < best.coordinates and c.score.gain >= least and c.fitted.score < best.fitted.score
+        ]
+        for one in simpler[:PERSISTENT]:
+            self.tick(f"fit with {one.name} from the theta of {best.name}", 0, 0)
+            self._replace(one, fit_afresh(self.fitter, best.fitted.state.u, one.fitted.state.effects))
+        self.found = ranked(self.found)
+
+    def try_in_the_same_place(self, scores: Sequence[Score]) -> None:
+        """Where the best has a place, fit from there what else may act there.
+
+        A weak attraction to a place slows and speeds an object about it as a patch does.
+        """
+        best = self._best
+        place = None if best is None else best.fitted.state.effects[-1].effect(self.fitter.case).place
+        if best is None or place is None:
+            return
+        others = [s.kind for s in scores if s.kind is not best.score.kind]
+        for one in in_place(self.fitter, self.before, others, place):
+            if one.gain < RIVAL * best.score.gain:
+                continue
+            self.tick(f"fit with {one.kind.name} in the same place", 0, 0)
+            there = _fit(self.fitter, self.before, one)
+            here = next((c for c in self.found if c.score.kind is one.kind), None)
+            if here is None:
+                self.found.append(self._candidate(one, there))
+            elif there.score > here.fitted.score:
+                self._put(here, self._candidate(one, there))
+        self.found = ranked(self.found)
+
+    @property
+    def _best(self) -> Candidate | None:
+        """The first candidate, if pushes that were left out confirm it."""
+        return self.found[0] if self.found and self.found[0].accepted else None
+
+    def _fit_once_more(self, one: Candidate) -> None:
+        """Fit a candidate from elsewhere, if it was not yet and may do better."""
         if self.spent or one.name in self._again or not _may_do_better(self.before, one, _explained(self.found)):
             return
         self._again.add(one.name)
         self.tick(f"fit with {one.name} once more", 0, 0)
-        again = _fit_from_afar(self.fitter, self.before, one.score)
+        self._replace(one, _fit_from_afar(self.fitter, self.before, one.score))
+
+    def _replace(self, one: Candidate, again: Fitted | None) -> None:
+        """Take another fit of a candidate, if it is better."""
         if again is not None and again.score > one.fitted.score:
-            self.found[k] = _candidate(self.fitter, one.score, again, self.plain)
+            self._put(one, self._candidate(one.score, again))
+
+    def _put(self, before: Candidate, after: Candidate) -> None:
+        self.found = [after if c is before else c for c in self.found]
+
+    def _candidate(self, one: Score, fitted: Fitted) -> Candidate:
+        return candidate_of(self.fitter, one, fitted, fitted.state.effects[-1], self._plain)
 
 
 def _worth_fitting(scores: Sequence[Score], most: int) -> tuple[list[Score], list[Score]]:
@@ -109,126 +234,6 @@ def _worth_fitting(scores: Sequence[Score], most: int) -> tuple[list[Score], lis
     return worth, rest[: 2 * most - len(worth)]
 
 
-def _tried_elsewhere(
-    fitter: Fitter, before: Fitted, found: Sequence[Candidate], plain: Array, tick: Progress
-) -> list[Candidate]:
-    """The candidates, the best of them fitted from other places as long as none explains the pushes.
-
-    Only what has a place and may be near: a candidate that takes most of the mismatch away.
-    """
-    if _explained(found):
-        return list(found)
-    tried = list(found)
-    near = [k for k, c in enumerate(tried) if takes_most(before, c.fitted) and elsewhere(fitter.case, c.score)]
-    for k in near[:PERSISTENT]:
-        if _explained(tried):
-            break
-        tick(f"fit with {tried[k].name} elsewhere", 0, 0)
-        better = _fit_elsewhere(fitter, before, tried[k])
-        if better is not None:
-            tried[k] = _candidate(fitter, tried[k].score, better, plain)
-    return ranked(tried)
-
-
-def _gone_on_with(
-    fitter: Fitter, before: Fitted, found: Sequence[Candidate], plain: Array, tick: Progress
-) -> list[Candidate]:
-    """The candidates; where none leads near an explanation, the best fits gone on with before one is chosen.
-
-    Far off, the derivatives of the model before end a fit long before its effect is where it belongs, and which got
-    further by then says little. Beside another effect only: the first is fitted from the best of a scan as well.
-    """
-    tried = list(found)
-    if any(c.fitted.reduced_chi2 <= FAR_OFF for c in found) or not before.state.effects:
-        return tried
-    rivals = [k for k, c in enumerate(found) if worthwhile(before, c)][:PERSISTENT]
-    if len(rivals) < PERSISTENT:
-        return tried
-    for k in rivals:
-        one, stopped = found[k], found[k].fitted.state
-        tick(f"fit with {one.name} gone on with", 0, 0)
-        further = fitter.fit(fitter.start(stopped.u, stopped.effects), rounds=7, careful=4, renew=True)
-        if further.score > one.fitted.score:
-            tried[k] = _candidate(fitter, one.score, further, plain)
-    return ranked(tried)
-
-
-def _tried_from_nearer_theta(
-    fitter: Fitter, before: Fitted, found: Sequence[Candidate], plain: Array, tick: Progress
-) -> list[Candidate]:
-    """The candidates; those far from an explanation fitted again from the theta of one that is near but will not do.
-
-    One that ran to the end of its range tells where theta is, too: the weakest of springs, anchored far away, is a
-    table that is tilted.
-    """
-    tried = list(found)
-    if not found:
-        return tried
-    nearest = min((c.fitted for c in found), key=lambda fitted: fitted.reduced_chi2)
-    if _explained([c for c in found if c.accepted]) or nearest.reduced_chi2 > FAR_OFF:
-        return tried
-    promised = max(c.score.gain for c in found)
-    far = [k for k, c in enumerate(found) if c.fitted.reduced_chi2 > FAR_OFF and c.score.gain >= RIVAL * promised]
-    for k in far[:PERSISTENT]:
-        one = found[k].score
-        tick(f"fit with {one.kind.name} from another theta", 0, 0)
-        start = fitter.start(nearest.state.u, (*before.state.effects, start_of(fitter, one)))
-        again = fitter.fit(start, rounds=7, careful=4, renew=True)
-        if again.score > found[k].fitted.score:
-            tried[k] = _candidate(fitter, one, again, plain)
-    return ranked(tried)
-
-
-def _simpler_tried_from_there(
-    fitter: Fitter, found: Sequence[Candidate], plain: Array, tick: Progress
-) -> list[Candidate]:
-    """The candidates; a simpler one that promised as much as the best is fitted from the theta of the best.
-
-    Its own fit set out from the theta of the model before, and may have stopped a little short of one that is the
-    same physics with more coordinates: a spring that is anchored thirty metres away is a tilted table.
-    """
-    tried, best = list(found), found[0] if found and found[0].accepted else None
-    if best is None:
-        return tried
-    simpler = [
-        k
-        for k, c in enumerate(found)
-        if c.coordinates < best.coordinates
-        and c.score.gain >= AS_MUCH * best.score.gain
-        and c.fitted.score < best.fitted.score
-    ]
-    for k in simpler[:PERSISTENT]:
-        one = found[k]
-        tick(f"fit with {one.name} from the theta of {best.name}", 0, 0)
-        start = fitter.start(best.fitted.state.u, one.fitted.state.effects)
-        again = fitter.fit(start, rounds=7, careful=4, renew=True)
-        if again.score > one.fitted.score:
-            tried[k] = _candidate(fitter, one.score, again, plain)
-    return ranked(tried)
-
-
-def _tried_in_its_place(
-    fitter: Fitter, before: Fitted, found: Sequence[Candidate], scores: Sequence[Score], plain: Array, tick: Progress
-) -> list[Candidate]:
-    """The candidates; where the best has a place, what else may act there is fitted from there.
-
-    A weak attraction to a place slows and speeds an object about it as a patch does.
-    """
-    tried = {c.name: c for c in found}
-    best = found[0] if found and found[0].accepted else None
-    place = None if best is None else best.fitted.state.effects[-1].effect(fitter.case).place
-    if best is None or place is None:
-        return list(found)
-    for one in in_place(fitter, before, [s.kind for s in scores if s.kind is not best.score.kind], place):
-        if one.gain < RIVAL * best.score.gain:
-            continue
-        tick(f"fit with {one.kind.name} in the same place", 0, 0)
-        there = _fit(fitter, before, one)
-        if one.kind.name not in tried or there.score > tried[one.kind.name].fitted.score:
-            tried[one.kind.name] = _candidate(fitter, one, there, plain)
-    return ranked(list(tried.values()))
-
-
 def _may_do_better(before: Fitted, candidate: Candidate, explained: bool) -> bool:
     """Whether a fit from elsewhere may find more.
 
@@ -241,17 +246,16 @@ def _may_do_better(before: Fitted, candidate: Candidate, explained: bool) -> boo
     return far or takes_most(before, candidate.fitted)
 
 
-def _once_more(found: Sequence[Candidate]) -> list[int]:
+def _once_more(found: Sequence[Candidate]) -> list[Candidate]:
     """Which candidates to fit again: the one that promised most, whatever came of it, and the best."""
-    best = list(range(len(found)))[:PERSISTENT]
     if not found:
         return []
-    promised = _most_promising(found)
-    return best if promised in best else [promised, *best]
+    best, promised = list(found[:PERSISTENT]), _most_promising(found)
+    return best if any(c is promised for c in best) else [promised, *best]
 
 
-def _most_promising(found: Sequence[Candidate]) -> int:
-    return max(range(len(found)), key=lambda k: found[k].score.gain)
+def _most_promising(found: Sequence[Candidate]) -> Candidate:
+    return max(found, key=lambda c: c.score.gain)
 
 
 def worthwhile(before: Fitted, candidate: Candidate) -> bool:
@@ -263,10 +267,6 @@ def worthwhile(before: Fitted, candidate: Candidate) -> bool:
 
 def _explained(candidates: Sequence[Candidate]) -> bool:
     return any(c.fitted.reduced_chi2 <= STUCK for c in candidates)
-
-
-def _candidate(fitter: Fitter, one: Score, fitted: Fitted, plain: Array) -> Candidate:
-    return candidate_of(fitter, one, fitted, fitted.state.effects[-1], plain)
 
 
 def candidate_of(fitter: Fitter, one: Score, fitted: Fitted, point: EffectPoint, before: Array) -> Candidate:
@@ -286,11 +286,16 @@ def fit_with(fitter: Fitter, before: Fitted, one: Score) -> Fitted:
     return again if again is not None and again.score > first.score else first
 
 
+def fit_afresh(fitter: Fitter, u: Array, effects: tuple[EffectPoint, ...]) -> Fitted:
+    """A model fitted from a theta (d,) and effects that may be far off, all derivatives taken on the way."""
+    return fitter.fit(fitter.start(u, effects), rounds=AFRESH, careful=CAREFUL, renew=True)
+
+
 def _fit(fitter: Fitter, before: Fitted, one: Score) -> Fitted:
     """The model with an effect, from where the score test says, with the derivatives of the model before."""
     effects = (*before.state.effects, start_of(fitter, one))
     if before.reduced_chi2 > FAR_OFF:
-        return fitter.fit(fitter.start(before.state.u, effects), rounds=7, careful=4, like=before)
+        return fitter.fit(fitter.start(before.state.u, effects), rounds=AFRESH, careful=CAREFUL, like=before)
     return fitter.fit(dc.replace(before.state, effects=effects), rounds=4, like=before)
 
 

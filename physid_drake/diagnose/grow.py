@@ -9,7 +9,15 @@ import numpy as np
 
 from physid_drake.diagnose.candidate import A_LAW, EXPLAINED, FAR_OFF, Candidate, push_scores, ranked, rejudged
 from physid_drake.diagnose.conclude import class_of
-from physid_drake.diagnose.confirm import ANOTHER_BASIN, ENOUGH, HOP, confirm, takes_most, worthwhile
+from physid_drake.diagnose.confirm import (
+    ANOTHER_BASIN,
+    ENOUGH,
+    HOP,
+    confirm,
+    fit_afresh,
+    takes_most,
+    worthwhile,
+)
 from physid_drake.diagnose.evidence import mismatch, unexplained
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.left_out import comes_nearer
@@ -265,8 +273,7 @@ class Growth:
         if np.array_equal(u, model.state.u):
             return model
         self.tick(f"model with {' and '.join(e.kind.name for e in effects)} from another theta", 0, 0)
-        again = fitter.fit(fitter.start(u, effects), rounds=7, careful=4, renew=True)
-        return max((model, again), key=lambda one: one.score)
+        return max((model, fit_afresh(fitter, u, effects)), key=lambda one: one.score)
 
     def _of_other_shape(self, model: Fitted, before: Fitted) -> Fitted:
         """A model fitted again from other shapes of its last effect, as long as none explains the pushes.

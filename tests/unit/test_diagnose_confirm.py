@@ -167,6 +167,9 @@ def test_few_pushes_span_no_regimes():
     assert _by_speed(case) is None and _by_heading(case) is None
 
 
+FITTER = SimpleNamespace(case=SimpleNamespace(pool=SimpleNamespace(count=0), problems=range(8)))  # of few rollouts
+
+
 def acting_at(place):
     """State of a model whose last effect acts in a place, or in none."""
     return SimpleNamespace(effects=(SimpleNamespace(effect=lambda case: SimpleNamespace(place=place)),))
@@ -191,7 +194,7 @@ def test_what_else_may_act_in_the_place_of_the_best_is_fitted_there(monkeypatch,
         fitted.append(one)
         return SimpleNamespace(reduced_chi2=1.0, score=score, state=acting_at(place))
 
-    def candidate_at(fitter, one, model, plain):
+    def candidate_at(fitter, one, model, point, plain):
         return Candidate(score=one, fitted=model, gains=np.full(8, model.score / 8), degenerate=False)
 
     def in_place(fitter, before, others, where):
@@ -199,13 +202,14 @@ def test_what_else_may_act_in_the_place_of_the_best_is_fitted_there(monkeypatch,
         return [test] if where == (0.1, 0.0) else []
 
     monkeypatch.setattr(confirm, "_fit", fit)
-    monkeypatch.setattr(confirm, "_candidate", candidate_at)
+    monkeypatch.setattr(confirm, "candidate_of", candidate_at)
+    monkeypatch.setattr(confirm, "push_scores", lambda one: np.zeros(8))
     monkeypatch.setattr(confirm, "in_place", in_place)
     scores = [SimpleNamespace(kind=kind, gain=gain, in_order=False) for kind, gain in ((patch, 100.0), (magnet, 9.0))]
-    best = candidate_at(None, scores[0], SimpleNamespace(reduced_chi2=1.1, score=80.0, state=acting_at(place)), None)
-    fitter = SimpleNamespace(case=None)
-    found = confirm._tried_in_its_place(fitter, None, [best], scores, np.zeros(8), lambda *said: None)
-    assert found[0].name == first
+    best = candidate_at(None, scores[0], SimpleNamespace(reduced_chi2=1.1, score=80.0, state=acting_at(place)), 0, 0)
+    step = confirm.Step(fitter=FITTER, before=None, tick=lambda *said: None, found=[best])
+    step.try_in_the_same_place(scores)
+    assert step.found[0].name == first
     assert len(fitted) == fits
     assert tested == ([] if place is None else [magnet])
 
@@ -221,10 +225,9 @@ def test_what_left_out_pushes_do_not_confirm_keeps_no_weaker_effect_from_a_try(m
     monkeypatch.setattr(confirm, "_fit", lambda fitter, before, one: fitted)
     judged = {"gains": np.array(gains), "degenerate": False}
     monkeypatch.setattr(
-        confirm, "_candidate", lambda fitter, one, fitted, plain: Candidate(score=one, fitted=fitted, **judged)
+        confirm, "candidate_of", lambda fitter, one, fitted, *_: Candidate(score=one, fitted=fitted, **judged)
     )
-    fitter = SimpleNamespace(case=SimpleNamespace(pool=SimpleNamespace(count=0), problems=range(8)))
-    found = confirm.confirm(fitter, SimpleNamespace(reduced_chi2=1.0, score=0.0), scores, lambda *said: None, most=4)
+    found = confirm.confirm(FITTER, SimpleNamespace(reduced_chi2=1.0, score=0.0), scores, lambda *said: None, most=4)
     assert len(found) == tried
 
 
@@ -239,7 +242,7 @@ def test_what_left_out_pushes_do_not_confirm_keeps_no_weaker_effect_from_a_try(m
 )
 def test_the_effect_that_promised_most_is_tried_again_whatever_came_of_it(promised, again):
     found = [SimpleNamespace(score=SimpleNamespace(gain=gain)) for gain in promised]
-    assert confirm._once_more(found) == again
+    assert [found.index(one) for one in confirm._once_more(found)] == again
 
 
 @pytest.mark.parametrize(
@@ -271,7 +274,7 @@ def test_what_promised_much_is_tried_again_before_what_promises_little(monkeypat
         made.append(name)
         return SimpleNamespace(reduced_chi2=left, score=-100.0 * left, state=acting_at(None))
 
-    def judged(fitter, one, fitted, plain):
+    def judged(fitter, one, fitted, *_):
         return Candidate(score=one, fitted=fitted, gains=np.full(8, 9.0), degenerate=False)
 
     monkeypatch.setattr(confirm, "push_scores", lambda one: np.zeros(8))
@@ -279,9 +282,8 @@ def test_what_promised_much_is_tried_again_before_what_promises_little(monkeypat
     monkeypatch.setattr(
         confirm, "_fit_from_afar", lambda fitter, before, one: fitted(one.kind.name + " again", again)
     )
-    monkeypatch.setattr(confirm, "_candidate", judged)
+    monkeypatch.setattr(confirm, "candidate_of", judged)
     monkeypatch.setattr(confirm, "_once_more", lambda found: [])
-    fitter = SimpleNamespace(case=SimpleNamespace(pool=SimpleNamespace(count=0), problems=range(8)))
     before = SimpleNamespace(reduced_chi2=20.0, score=-2000.0, state=SimpleNamespace(effects=()))
-    confirm.confirm(fitter, before, scores, lambda *said: None, most=4)
+    confirm.confirm(FITTER, before, scores, lambda *said: None, most=4)
     assert made == ["tracker_bias", "tracker_bias again", *tried]

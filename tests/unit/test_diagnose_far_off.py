@@ -9,6 +9,19 @@ from physid_drake.diagnose import confirm
 from physid_drake.diagnose.candidate import Candidate
 from physid_drake.effects import effect_named
 
+CASE = SimpleNamespace(pool=SimpleNamespace(count=0), problems=range(8))
+
+
+@pytest.fixture
+def step_of(monkeypatch):
+    """A step with candidates that are there already; the model before leaves each push as likely as it was."""
+    monkeypatch.setattr(confirm, "push_scores", lambda fitted: np.zeros(8))
+
+    def of(fitter, before, found):
+        return confirm.Step(fitter=fitter, before=before, tick=lambda *said: None, found=found)
+
+    return of
+
 
 @pytest.mark.parametrize(("seen", "fits"), [(-500.0, 0), (-90.0, 1)])
 def test_no_fit_begins_where_all_of_a_scan_is_worse_than_no_effect(monkeypatch, seen, fits):
@@ -70,7 +83,7 @@ def test_other_places_are_tried_until_one_explains_the_pushes(monkeypatch, left,
         ([10.4, 10.6, 10.6, 10.4], ["magnet"]),  # a drag has no place
     ],
 )
-def test_only_what_takes_most_away_and_does_not_explain_all_is_tried_elsewhere(monkeypatch, left, tried):
+def test_only_what_takes_most_away_and_does_not_explain_all_is_tried_elsewhere(monkeypatch, step_of, left, tried):
     ended = []
     monkeypatch.setattr(confirm, "ranked", list)
     monkeypatch.setattr(confirm, "_fit_elsewhere", lambda fitter, before, one: ended.append(one.name))
@@ -81,8 +94,9 @@ def test_only_what_takes_most_away_and_does_not_explain_all_is_tried_elsewhere(m
         for name, chi2 in zip(names, left, strict=False)
     ]
     before = SimpleNamespace(reduced_chi2=20.0)
-    fitter = SimpleNamespace(case=None)
-    assert confirm._tried_elsewhere(fitter, before, found, np.zeros(8), lambda *said: None) == found
+    step = step_of(SimpleNamespace(case=CASE), before, found)
+    step.try_elsewhere()
+    assert step.found == found
     assert ended == tried
 
 
@@ -98,7 +112,9 @@ def test_only_what_takes_most_away_and_does_not_explain_all_is_tried_elsewhere(m
     ],
 )
 @pytest.mark.parametrize("plain", [139.0, 2.0])
-def test_what_ended_far_off_is_tried_from_the_theta_of_what_came_near(monkeypatch, left, degenerate, fits, plain):
+def test_what_ended_far_off_is_tried_from_the_theta_of_what_came_near(
+    monkeypatch, step_of, left, degenerate, fits, plain
+):
     """A spring that ran to its weakest stands for a tilt, whose own fit was lost from the theta of the plain cell."""
     made = []
 
@@ -107,14 +123,14 @@ def test_what_ended_far_off_is_tried_from_the_theta_of_what_came_near(monkeypatc
         return SimpleNamespace(state=state, reduced_chi2=1.0, score=-1.0)
 
     def fitted(chi2):
-        return SimpleNamespace(reduced_chi2=chi2, score=-chi2, state=SimpleNamespace(u=np.full(1, chi2)))
+        return SimpleNamespace(reduced_chi2=chi2, score=-chi2, state=SimpleNamespace(u=np.full(1, chi2), effects=()))
 
-    def judged(fitter, one, model, plain):
+    def judged(fitter, one, model, *_):
         assert model.state.u == min(left.values())
         return Candidate(score=one, fitted=model, gains=np.full(8, 50.0), degenerate=False)
 
     monkeypatch.setattr(confirm, "start_of", lambda fitter, one: one)
-    monkeypatch.setattr(confirm, "_candidate", judged)
+    monkeypatch.setattr(confirm, "candidate_of", judged)
     promised = {"tether": 1000.0, "table_tilt": 900.0, "viscous_drag": 400.0}
     found = [
         Candidate(
@@ -123,11 +139,12 @@ def test_what_ended_far_off_is_tried_from_the_theta_of_what_came_near(monkeypatc
         )
         for name, chi2 in left.items()
     ]  # fmt: skip
-    fitter = SimpleNamespace(start=lambda u, effects: SimpleNamespace(u=u, effects=effects), fit=fit)
+    fitter = SimpleNamespace(case=CASE, start=lambda u, effects: SimpleNamespace(u=u, effects=effects), fit=fit)
     before = SimpleNamespace(reduced_chi2=plain, state=SimpleNamespace(effects=()))
-    again = confirm._tried_from_nearer_theta(fitter, before, found, np.zeros(8), lambda *said: None)
+    step = step_of(fitter, before, found)
+    step.try_from_nearer_theta()
     assert made == fits
-    assert len(again) == len(found) and (not fits or again[0].name == fits[0])
+    assert len(step.found) == len(found) and (not fits or step.found[0].name == fits[0])
 
 
 @pytest.mark.parametrize(
@@ -140,7 +157,7 @@ def test_what_ended_far_off_is_tried_from_the_theta_of_what_came_near(monkeypatc
     ],
 )
 def test_the_same_physics_with_fewer_coordinates_is_fitted_from_the_theta_of_the_best(
-    monkeypatch, promised, reached, confirmed, fitted_again
+    monkeypatch, step_of, promised, reached, confirmed, fitted_again
 ):
     """A spring anchored thirty metres away was named, since the fit of a tilt had stopped a hundredth short."""
     made = []
@@ -157,16 +174,17 @@ def test_the_same_physics_with_fewer_coordinates_is_fitted_from_the_theta_of_the
         made.append((state.u, state.effects))
         return SimpleNamespace(state=state, reduced_chi2=0.9, score=909.0)
 
-    def judged(fitter, one, model, plain):
+    def judged(fitter, one, model, *_):
         return Candidate(score=one, fitted=model, gains=np.full(8, 909.0 / 8), degenerate=False, coordinates=2)
 
-    monkeypatch.setattr(confirm, "_candidate", judged)
+    monkeypatch.setattr(confirm, "candidate_of", judged)
     found = [candidate("tether", 1000.0, 909.5, 4), candidate("table_tilt", promised, reached, 2)]
-    fitter = SimpleNamespace(start=lambda u, effects: SimpleNamespace(u=u, effects=effects), fit=fit)
-    again = confirm._simpler_tried_from_there(fitter, found, np.zeros(8), lambda *said: None)
+    fitter = SimpleNamespace(case=CASE, start=lambda u, effects: SimpleNamespace(u=u, effects=effects), fit=fit)
+    step = step_of(fitter, None, found)
+    step.try_simpler_from_the_best()
     assert made == ([("tether", ("table_tilt",))] if fitted_again else [])
-    assert again[0].name == ("table_tilt" if fitted_again or reached > 909.5 else "tether")
-    assert {c.name for c in again} == {"tether", "table_tilt"}
+    assert step.found[0].name == ("table_tilt" if fitted_again or reached > 909.5 else "tether")
+    assert {c.name for c in step.found} == {"tether", "table_tilt"}
 
 
 @pytest.mark.parametrize(
@@ -178,7 +196,7 @@ def test_the_same_physics_with_fewer_coordinates_is_fitted_from_the_theta_of_the
         ({"friction_patch": 2.9, "friction_gradient": 12.6}, True, 0, "friction_patch"),  # one leads near
     ],
 )
-def test_far_off_the_best_fits_go_on_before_one_is_chosen(monkeypatch, left, beside, gone_on_with, first):
+def test_far_off_the_best_fits_go_on_before_one_is_chosen(monkeypatch, step_of, left, beside, gone_on_with, first):
     """Beside a bounce a gradient's fit had stopped short of a patch's, which led nowhere."""
     ends = {"friction_patch": 16.6, "friction_gradient": 0.95}
     made = []
@@ -190,17 +208,18 @@ def test_far_off_the_best_fits_go_on_before_one_is_chosen(monkeypatch, left, bes
         made.append(state.u)
         return fitted(state.u, ends[state.u])
 
-    def judged(fitter, one, model, plain):
+    def judged(fitter, one, model, *_):
         return Candidate(score=one, fitted=model, gains=np.full(8, 50.0 - model.reduced_chi2), degenerate=False)
 
-    monkeypatch.setattr(confirm, "_candidate", judged)
+    monkeypatch.setattr(confirm, "candidate_of", judged)
     found = [
         judged(None, SimpleNamespace(kind=effect_named(name), in_order=False), fitted(name, chi2), None)
         for name, chi2 in left.items()
     ]
-    fitter = SimpleNamespace(start=lambda u, effects: SimpleNamespace(u=u, effects=effects), fit=fit)
+    fitter = SimpleNamespace(case=CASE, start=lambda u, effects: SimpleNamespace(u=u, effects=effects), fit=fit)
     before = SimpleNamespace(reduced_chi2=20.0, state=SimpleNamespace(effects=("bounce",) if beside else ()))
-    again = confirm._gone_on_with(fitter, before, found, np.zeros(8), lambda *said: None)
+    step = step_of(fitter, before, found)
+    step.go_on()
     assert made == list(left)[:gone_on_with]
-    assert len(again) == len(found) and again[0].name == first
-    assert again[0].fitted.score == max(one.fitted.score for one in again)
+    assert len(step.found) == len(found) and step.found[0].name == first
+    assert step.found[0].fitted.score == max(one.fitted.score for one in step.found)
