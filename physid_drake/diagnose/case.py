@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.recording import Recording, thinned
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 # Of the hand between two ticks [m]. Measured on forty drawn pushes against ticks of half a millisecond: 0.02 mm and
 # 0.5 mrad for slow pushes, as much as one millisecond costs for fast ones.
@@ -37,6 +39,7 @@ MOST_PUSHES = 24  # more take longer and tell little more
 UNIT_SCATTER = 0.025  # of friction, push to push: the columns' unit and the median of its prior
 LEAST_MOTION = 6.0  # standard deviations: an object that moves less in every push does not move
 # A rollout's own error acts like a start that is known no better than this [m, m, rad].
+WHY_LOST = "at any theta: the solver diverges, or no object stands so"
 START_FLOOR = np.array([3e-5, 3e-5, 3e-4])
 
 
@@ -57,6 +60,7 @@ class Case:
         config: of the cell.
         odd: (n,) how many times as loud as the others a push is; empty where none is.
         pushes: of the whole recording.
+        lost: names of pushes that the cell cannot simulate, which are none of the others.
     """
 
     recording: Recording
@@ -71,17 +75,21 @@ class Case:
     config: CellConfig
     odd: tuple[float, ...] = ()
     pushes: int = 0
+    lost: tuple[str, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know of how the recording was taken."""
-        some = len(self.problems)
+        some = len(self.problems) + len(self.lost)
         thinned = (
             f"{some} of the {self.pushes} pushes were looked at, at equal distances (diagnose --pushes N for more)"
         )
         unseen = unseen_motion(self.recording, self.noise.position)
         few = (thinned,) if some < self.pushes else ()
-        return (*few, *doubts(self.recording), *self.noise.warnings, *unseen, *self._unused_forces())
+        gone = f"left out: {', '.join(self.lost)}, which the cell cannot simulate {WHY_LOST}"
+        lost = (gone,) if self.lost else ()
+        said = (*doubts(self.recording), *self.noise.warnings, *unseen, *self._unused_forces())
+        return (*few, *lost, *said)
 
     def _unused_forces(self) -> tuple[str, ...]:
         """That forces were recorded of which nothing could be compared."""
@@ -92,6 +100,27 @@ class Case:
             f"none of the recorded forces could be compared: it takes two samples in {WINDOW:g} s, while the hand"
             " pushes and after it has surely touched",
         )
+
+    def without(self, lost: Sequence[int]) -> Case:
+        """The case without pushes that the cell cannot simulate.
+
+        Raises:
+            RecordingError: if there are no others.
+        """
+        kept = [i for i in range(len(self.problems)) if i not in lost]
+        if not kept:
+            raise RecordingError(
+                f"recording '{self.recording.name}': the cell cannot simulate a single push {WHY_LOST}."
+            )
+
+        def some(of: Sequence[T]) -> tuple[T, ...]:
+            return tuple(of[i] for i in kept)
+
+        return dc.replace(
+            self, recording=self.recording.subset(kept), problems=some(self.problems),
+            nuisances=some(self.nuisances), features=some(self.features), odd=some(self.odd) if self.odd else (),
+            lost=(*self.lost, *(self.problems[i].name for i in lost)),
+        )  # fmt: skip
 
     def louder(self, factor: float, forces: ForceNoise, odd: Sequence[float] = ()) -> Case:
         """The case with more noise.

@@ -14,7 +14,7 @@ from physid_drake.diagnose.candidate import FAR_OFF
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
-from physid_drake.identify.misfit import difference
+from physid_drake.identify.misfit import DIVERGED, difference, diverged
 from physid_drake.identify.problem import spec_of
 from physid_drake.identify.rollouts import RolloutPool
 from physid_drake.progress import Progress
@@ -27,6 +27,7 @@ BUDGET = 24
 CAREFUL = 3  # rounds
 ODD = 0.8  # of the squares that a model leaves
 SOME_PUSHES = 6  # the search needs a start, not an answer
+TRIED = 8  # thetas, and the nominal one, at which a push must diverge to be left out
 
 
 def search_theta(
@@ -54,8 +55,14 @@ def search_theta(
         for theta in thetas:
             state = fitter.start(np.asarray(space.to_unit(theta)), tuple(effects))
             vectors = fitter.vectors([fitter.task(state, int(i)) for i in some])
-            squares = [np.mean((v - case.features[i].recorded) ** 2) for v, i in zip(vectors, some, strict=True)]
-            errors.append(0.5 * np.log(np.mean(squares)))
+            squares = [
+                np.mean((v - case.features[i].recorded) ** 2)
+                for v, i in zip(vectors, some, strict=True)
+                if not diverged(v)
+            ]
+            lost = len(some) - len(squares)
+            # A push that diverges says nothing, and must not hide what the others say.
+            errors.append(0.5 * np.log(np.mean(squares)) + DIVERGED * lost if lost < len(squares) else np.inf)
         return np.array(errors)
 
     candidates = space.sample(rng, CANDIDATES, from_prior=True)
@@ -70,6 +77,19 @@ def search_theta(
     if near is not None and objective(np.asarray(space.from_unit(near))[None])[0] <= found.error_best:
         return near
     return np.asarray(space.to_unit(found.theta_best))
+
+
+def lost_pushes(case: Case) -> tuple[int, ...]:
+    """Indices of the pushes that the cell cannot simulate, not at the nominal theta and not at draws of the prior."""
+    fitter, space = Fitter(case), case.thetas.space
+    lost = list(range(len(case.problems)))
+    for theta in (space.nominal, *space.sample(np.random.default_rng(0), TRIED, from_prior=True)):
+        state = fitter.start(np.asarray(space.to_unit(theta)))
+        vectors = fitter.vectors([fitter.task(state, i) for i in lost])
+        lost = [i for i, vector in zip(lost, vectors, strict=True) if diverged(vector)]
+        if not lost:
+            break
+    return tuple(lost)
 
 
 def numerics(case: Case, state: State) -> tuple[Array, ...]:

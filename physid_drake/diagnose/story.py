@@ -21,7 +21,7 @@ from physid_drake.diagnose.loudness import as_loud_as_left, quieter
 from physid_drake.diagnose.memory import Memory
 from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.next_push import next_push
-from physid_drake.diagnose.plain import coarse, fit_plain, nearest, numerics
+from physid_drake.diagnose.plain import coarse, fit_plain, lost_pushes, nearest, numerics
 from physid_drake.diagnose.screen import (
     Screening,
     Signature,
@@ -70,6 +70,9 @@ def gather(
     search_rng, screen_rng = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2))
     look = _Search(kinds=applicable(case.around, effects), alpha=alpha, rng=screen_rng, tick=tick)
     rough = coarse(case)
+    lost = lost_pushes(rough)
+    if lost:
+        case, rough = case.without(lost), rough.without(lost)
     first = _first(rough, search_rng, tick, memory)
     answer = (look.answer if case.noise.known else look.answer_by_ratios)(case, rough, first, memory)
     return _on_short_ticks(answer, tick)

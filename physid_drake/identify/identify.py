@@ -17,7 +17,7 @@ from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
 from physid_drake.identify.cells import TOLD, CellsTold, cells_told, tied_cells
 from physid_drake.identify.config import SearchConfig, ThetaConfig
-from physid_drake.identify.misfit import whitened_residual
+from physid_drake.identify.misfit import DIVERGED, whitened_residual
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
 from physid_drake.identify.polish import Polished, Polisher
 from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems_of, spec_of
@@ -30,7 +30,6 @@ from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
 
-DIVERGED = 3.0  # nats of a theta's cost for each push whose rollout diverges
 EXPLAINED = 1.5  # reduced chi-square below which the plain cell leaves no more than noise and its own error
 MOST_SCATTER = 0.08  # of friction from push to push: pushes that differ by more differ in something that is left out
 AT_BOUND = 1e-3  # of the unit cube

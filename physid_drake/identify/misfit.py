@@ -14,6 +14,7 @@ from physid_drake.identify.rollouts import Prediction
 Array = NDArray[np.float64]
 
 FAILED = 1e4  # standard deviations: of a rollout that diverged, in all that is compared
+DIVERGED = 3.0  # nats of a theta's cost for each push whose rollout diverges
 
 
 def whitened_residual(problem: PushProblem, noise: Noise, prediction: Prediction | None) -> Array:

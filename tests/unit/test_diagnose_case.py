@@ -7,6 +7,7 @@ import pytest
 from physid_drake.diagnose.case import case_of, cell_config
 from physid_drake.diagnose.next_push import LONGEST_TICK, brisk_pool
 from physid_drake.diagnose.plain import coarse
+from physid_drake.errors import RecordingError
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.recording import ForceStream, Recording, read_recording
 from physid_drake.resources import shipped
@@ -62,3 +63,20 @@ def test_the_next_push_of_a_slow_recording_is_simulated_on_ticks_for_a_fast_hand
     assert brisk_pool(slow).spec.config.solver.time_step_s == pytest.approx(LONGEST_TICK)
     usual = coarse(case(recording))
     assert brisk_pool(usual).spec == usual.pool.spec
+
+
+def test_pushes_that_cannot_be_simulated_are_left_out_and_said(recording):
+    whole = case(recording)
+    rest = whole.without([1])
+    assert (
+        [p.name for p in rest.problems]
+        == [p.name for p in rest.recording.pushes]
+        == ["pushes/001.csv", "pushes/003.csv"]
+    )
+    assert [p.order for p in rest.problems] == [0, 2]  # a drift goes on meanwhile
+    assert len(rest.features) == len(rest.nuisances) == 2
+    assert not any("left out" in w for w in whole.warnings)
+    assert [w for w in rest.warnings if "left out" in w and "002" in w]
+    assert not any("equal distances" in w for w in rest.warnings)
+    with pytest.raises(RecordingError, match="single push"):
+        rest.without([0, 1])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from physid_drake.diagnose import plain
+from physid_drake.identify.misfit import FAILED
 from physid_drake.space import Parameter, ParameterSpace
 
 SPACE = ParameterSpace(
@@ -54,6 +55,32 @@ def test_the_search_ends_nearer_than_where_people_would_start(case):
     theta, _, stage = searched(case)
     assert np.linalg.norm(theta - TRUE) < 0.1 < np.linalg.norm(SPACE.nominal - TRUE)
     assert Bowl.effects == () and stage == "greedy entropy search"
+
+
+def test_a_push_that_diverges_takes_nothing_from_what_the_others_say(case, monkeypatch):
+    simulate = Bowl.vectors
+    found = searched(case)[1]
+
+    def one_lost(self, tasks):
+        return [np.full(2, FAILED), *simulate(self, tasks[1:])]
+
+    monkeypatch.setattr(Bowl, "vectors", one_lost)
+    np.testing.assert_allclose(searched(case)[1], found, atol=1e-6)
+
+
+@pytest.mark.parametrize(("fails", "lost"), [(lambda u: True, (2, 5)), (lambda u: u[0] < 0.7, ()), (None, ())])
+def test_what_diverges_at_every_theta_is_lost(case, monkeypatch, fails, lost):
+    """Pushes 2 and 5 do at all, at some, at no thetas."""
+    monkeypatch.setattr(Bowl, "task", lambda self, state, i: (i, state))
+    made = []
+
+    def vectors(self, tasks):
+        made.append(len(tasks))
+        return [np.full(2, FAILED) if fails and i in (2, 5) and fails(u) else np.zeros(2) for i, u in tasks]
+
+    monkeypatch.setattr(Bowl, "vectors", vectors)
+    assert plain.lost_pushes(case) == lost
+    assert made[0] == 8 and set(made[1:]) <= {2, 1}
 
 
 def test_effects_stay_in_the_cell_meanwhile(case):
