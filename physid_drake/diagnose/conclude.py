@@ -32,7 +32,7 @@ from physid_drake.diagnose.evidence import (
     unexplained,
 )
 from physid_drake.diagnose.frictions import friction_trend
-from physid_drake.diagnose.left_out import comes_nearer, errors_of, shown_by_several
+from physid_drake.diagnose.left_out import comes_nearer, errors_of, least_motion, shown_by_several
 from physid_drake.diagnose.looks import locate
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import regime_gains
@@ -67,7 +67,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
     """The verdict and all figures, from evidence; no rollouts."""
     case, plain, final = evidence.case, evidence.plain, evidence.final
     p_value = _p_value(evidence)
-    detectable = smallest(evidence, alpha)
+    detectable = smallest(evidence, alpha, least_motion(case, evidence.errors_before))
     verdict = _verdict(evidence, p_value, alpha, detectable)
     findings = _findings(evidence) if verdict in ("explained", "ambiguous") else ()
     after, shown = (final, final) if findings else (plain, evidence.nearest)

@@ -185,8 +185,14 @@ def correlation_of(case: Case, fitted: Fitted) -> tuple[tuple[str, ...], Array]:
     return tuple(varying), np.atleast_2d(np.corrcoef(scores)) if scores else np.zeros((0, 0))
 
 
-def smallest(evidence: Evidence, alpha: float) -> tuple[Detectable, ...]:
-    """The smallest effect of each kind that the score tests would have shown, in its own unit and in motion."""
+def smallest(evidence: Evidence, alpha: float, least: float) -> tuple[Detectable, ...]:
+    """The smallest effect of each kind that would have been shown, in its own unit and in motion.
+
+    Args:
+        evidence: signatures at the plain model.
+        alpha: false-alarm rate of the score tests.
+        least: motion that left-out pushes would have to show [standard deviations].
+    """
     plain, case = evidence.plain, evidence.case
     found = list(evidence.signatures)
     if not found:
@@ -200,15 +206,15 @@ def smallest(evidence: Evidence, alpha: float) -> tuple[Detectable, ...]:
             norm = float(np.linalg.norm(block[:, d]))
             if norm < 1e-9:
                 continue
-            steps = math.sqrt(threshold) / norm
+            # Poses only: forces may follow them.
+            poses = [c[: 3 * len(f.middles), d] for c, f in zip(signature.columns, case.features, strict=True)]
+            a_step = rms(np.concatenate(poses))
+            steps = max(math.sqrt(threshold) / norm, least / max(a_step, 1e-9))
             coordinate = signature.kind.chart(case.around)[j]
             point = np.array(signature.family.point)
             point[j] += steps * signature.family.size * coordinate.step
-            # Poses only: forces may follow them.
-            poses = [c[: 3 * len(f.middles), d] for c, f in zip(signature.columns, case.features, strict=True)]
-            moved = steps * rms(np.concatenate(poses))
-            one = _detectable(case, signature.kind, point, j, moved)
-            if one.name not in best or moved < best[one.name].sigmas:
+            one = _detectable(case, signature.kind, point, j, steps * a_step)
+            if one.name not in best or one.sigmas < best[one.name].sigmas:
                 best[one.name] = one
     return tuple(best.values())
 

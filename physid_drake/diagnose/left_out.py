@@ -53,6 +53,18 @@ def comes_nearer(case: Case, before: Sequence[Array], after: Sequence[Array]) ->
     return _nearer_without(int(np.argmax(new - old)), old, new)
 
 
+def least_motion(case: Case, errors: Sequence[Array]) -> float:
+    """How far an effect must move left-out pushes for a model with it to come visibly nearer [standard deviations].
+
+    Args:
+        case: the pushes.
+        errors: (m_i,) of each, simulated by a model that explains them: what is left beside the effect.
+    """
+    squares = np.sort(np.square(errors_of(case, errors).per_push))
+    others = squares[:-1] if len(squares) > 1 else squares
+    return math.sqrt((BETTER**2 - 1.0) * float(others.mean()))
+
+
 def _nearer_without(push: int, old: Array, new: Array, times: float = BETTER) -> bool:
     """Whether squared errors (n,) of the other pushes are visibly smaller."""
     others = np.arange(len(old)) != push
