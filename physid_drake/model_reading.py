@@ -16,11 +16,9 @@ from physid_drake.cell.config import ContactConfig, SolverConfig
 from physid_drake.effects import Effect, effect_named
 from physid_drake.errors import ConfigError
 from physid_drake.model import AS_W, FORMAT, SHAPES, Correlation, Model
+from physid_drake.ranges import ANY, NOT_NEGATIVE, POSITIVE, Range
 from physid_drake.recording import Shape
 from physid_drake.yaml_text import read_yaml
-
-_POSITIVE = ("ratio", "speed", "radius", "frequency")  # of effects: nothing has none of it
-_NOT_NEGATIVE = ("compliance", "damping", "stiffness", "strength", "core", "rest_length")
 
 
 def load_model(path: Path | str) -> Model:
@@ -70,10 +68,10 @@ def _model(content: dict[str, Any], file: Path) -> Model:
     return Model(
         recording=str(content["recording"]),
         shape=_shape(content["object"], file.parent),
-        hand_radius=None if radius is None else _number("hand_radius_m", radius, above=0.0),
+        hand_radius=None if radius is None else _number("hand_radius_m", radius, POSITIVE),
         table=(
             (x0, y0),
-            (_number("table_m", x1, above=x0), _number("table_m", y1, above=y0)),
+            (_number("table_m", x1, Range(above=x0)), _number("table_m", y1, Range(above=y0))),
         ),
         config=config,
         body=_body(content["theta"], cells=config.friction_cells[0] * config.friction_cells[1]),
@@ -86,50 +84,48 @@ def _model(content: dict[str, Any], file: Path) -> Model:
     )
 
 
-def _number(key: str, value: Any, *, above: float = -math.inf, least: float = -math.inf) -> float:
-    """A finite number within its bounds.
+def _number(key: str, value: Any, allowed: Range = ANY) -> float:
+    """A finite number of those that are allowed.
 
     Raises:
         ConfigError: naming the key and the rule.
     """
     good = isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-    if not (good and value > above and value >= least):
-        rule = f" above {above:g}" if above > -math.inf else f" of at least {least:g}" if least > -math.inf else ""
+    if not (good and allowed.holds(value)):
+        rule = f" {allowed.rule}" if allowed.rule else ""
         raise ConfigError(f"key '{key}': must be a finite number{rule}, but is {value!r}.")
     return float(value)
 
 
 def _body(theta: Mapping[str, Any], *, cells: int) -> Body:
     numbers = {f.name for f in dc.fields(Body)} - {"p_BBcm", "support_friction"}
-    above = dict.fromkeys(("mass", "inertia_ratio", "static_ratio"), 0.0)
+    positive = ("mass", "inertia_ratio", "static_ratio")
     given = {
-        name: _number(f"theta.{name}", value, above=above.get(name, -math.inf), least=0.0)
+        name: _number(f"theta.{name}", value, POSITIVE if name in positive else NOT_NEGATIVE)
         for name, value in theta.items() if name in numbers
     }  # fmt: skip
     place = _numbers("theta.p_BBcm", theta["p_BBcm"], 2)
-    friction = _numbers("theta.support_friction", theta["support_friction"], cells, above=0.0)
+    friction = _numbers("theta.support_friction", theta["support_friction"], cells, POSITIVE)
     rest = {name: value for name, value in theta.items() if name not in {*given, "p_BBcm", "support_friction"}}
     return Body(p_BBcm=np.array(place), support_friction=np.array(friction), **given, **rest)
 
 
-def _numbers(key: str, values: Any, count: int, *, above: float = -math.inf) -> list[float]:
+def _numbers(key: str, values: Any, count: int, allowed: Range = ANY) -> list[float]:
     if not isinstance(values, list) or len(values) != count:
         raise ConfigError(f"key '{key}': must be a list of {count} numbers, but is {values!r}.")
-    return [_number(key, value, above=above) for value in values]
+    return [_number(key, value, allowed) for value in values]
 
 
 def _effect(content: Mapping[str, Any]) -> Effect:
     kind = effect_named(str(content["name"]))
-    nulls = {f.name: f.default for f in dc.fields(kind)}
+    nulls, ranges = {f.name: f.default for f in dc.fields(kind)}, kind.ranges()
     parameters: dict[str, Any] = {}
     for name, value in content["parameters"].items():
         key = f"effects.{kind.name}.{name}"
         if isinstance(nulls.get(name, 0.0), tuple):
             parameters[name] = _grid(key, value)
-        elif name in _POSITIVE:
-            parameters[name] = _number(key, value, above=0.0)
         else:
-            parameters[name] = _number(key, value, least=0.0 if name in _NOT_NEGATIVE else -math.inf)
+            parameters[name] = _number(key, value, ranges.get(name, ANY))
     return kind(**parameters)
 
 
@@ -138,7 +134,7 @@ def _grid(key: str, rows: Any) -> tuple[tuple[float, ...], ...]:
     even = isinstance(rows, list) and rows and all(isinstance(r, list) and len(r) == len(rows[0]) for r in rows)
     if not even:
         raise ConfigError(f"key '{key}': must be rows of equally many numbers, but is {rows!r}.")
-    grid = tuple(tuple(_number(key, value, least=0.0) for value in row) for row in rows)
+    grid = tuple(tuple(_number(key, value, NOT_NEGATIVE) for value in row) for row in rows)
     if not sum(map(sum, grid)) > 0.0:
         raise ConfigError(f"key '{key}': must have a weight above 0, but is {rows!r}.")
     return grid

@@ -20,6 +20,7 @@ from physid_drake.effects.effect import (
     families_of_sizes,
     parameter,
 )
+from physid_drake.ranges import COEFFICIENT, POSITIVE
 from physid_drake.recording import Box, Cylinder, MeshShape, Prism, Shape
 
 Array = NDArray[np.float64]
@@ -143,7 +144,7 @@ class RotationalInertia(Effect):
     frame: ClassVar[str] = "object"
     amplitudes: ClassVar[tuple[str, ...]] = ("ratio",)
 
-    ratio: float = parameter(1.0, "-")
+    ratio: float = parameter(1.0, "-", values=POSITIVE)
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
@@ -169,7 +170,7 @@ class Restitution(Effect):
     frame: ClassVar[str] = "contact"
     amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
 
-    coefficient: float = parameter(0.0, "-")
+    coefficient: float = parameter(0.0, "-", values=COEFFICIENT)
 
     @classmethod
     def applies(cls, around: Surroundings) -> bool:
@@ -210,7 +211,7 @@ class SizeError(Effect):
     frame: ClassVar[str] = "object"
     amplitudes: ClassVar[tuple[str, ...]] = ("ratio",)
 
-    ratio: float = parameter(1.0, "-")
+    ratio: float = parameter(1.0, "-", values=POSITIVE)
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 from physid_drake.cell.forces import ForceLaw, Wrench
 from physid_drake.cell.object_state import ObjectState
 from physid_drake.effects.effect import Coordinate, Effect, PushFacts, Surroundings, parameter
+from physid_drake.ranges import NOT_NEGATIVE
 
 ROLLING_EDGE = 1e-3  # m/s: below it rolling resistance fades, so that it never drives backwards
 
@@ -32,7 +33,7 @@ class ViscousDrag(Effect):
     amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
     mass_powers: ClassVar[Mapping[str, int]] = {"coefficient": 1}
 
-    coefficient: float = parameter(0.0, "N*s/m")
+    coefficient: float = parameter(0.0, "N*s/m", values=NOT_NEGATIVE)
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
@@ -69,7 +70,7 @@ class QuadraticDrag(Effect):
     amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
     mass_powers: ClassVar[Mapping[str, int]] = {"coefficient": 1}
 
-    coefficient: float = parameter(0.0, "N*s^2/m^2")
+    coefficient: float = parameter(0.0, "N*s^2/m^2", values=NOT_NEGATIVE)
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
@@ -106,7 +107,7 @@ class RollingResistance(Effect):
     frame: ClassVar[str] = "object_velocity"
     amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
 
-    coefficient: float = parameter(0.0, "m")
+    coefficient: float = parameter(0.0, "m", values=NOT_NEGATIVE)
 
     @classmethod
     def applies(cls, around: Surroundings) -> bool:

@@ -15,15 +15,16 @@ from physid_drake.cell.diagram import GRAVITY
 from physid_drake.cell.forces import ForceLaw, FrictionLaw
 from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.support import PressureGrid
+from physid_drake.ranges import ANY, Range
 from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]
 Pose = tuple[float, float, float]
 
 
-def parameter(null: Any, unit: str, period: float | None = None) -> Any:
-    """A field of an effect: its null value, which is its default, its unit, and its period (pi for an axis)."""
-    return dc.field(default=null, metadata={"unit": unit, "period": period})
+def parameter(null: Any, unit: str, *, period: float | None = None, values: Range = ANY) -> Any:
+    """A field of an effect: its null value, which is its default; its unit, period (pi for an axis) and range."""
+    return dc.field(default=null, metadata={"unit": unit, "period": period, "values": values})
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -187,6 +188,11 @@ class Effect:
     def periods(cls) -> dict[str, float | None]:
         """Period of each parameter; None for what is not periodic."""
         return {f.name: f.metadata["period"] for f in dc.fields(cls)}
+
+    @classmethod
+    def ranges(cls) -> dict[str, Range]:
+        """Which values each parameter can have."""
+        return {f.name: f.metadata["values"] for f in dc.fields(cls)}
 
     def reaches(self, places: Array, around: Surroundings) -> bool:
         """Whether an object that was at places (n, 2) [m] may have felt it."""

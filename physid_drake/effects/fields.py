@@ -14,6 +14,7 @@ from physid_drake.cell.forces import ForceLaw, Wrench
 from physid_drake.cell.object_state import ObjectState
 from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
 from physid_drake.effects.places import grid_of_places
+from physid_drake.ranges import NOT_NEGATIVE, POSITIVE
 
 Array = NDArray[np.float64]
 WEAKEST = 1e-9  # N/m: a spring weaker than this has no anchor
@@ -67,10 +68,10 @@ class Tether(Effect):
     amplitudes: ClassVar[tuple[str, ...]] = ("stiffness",)
     mass_powers: ClassVar[Mapping[str, int]] = {"stiffness": 1, "force_x": 1, "force_y": 1}
 
-    stiffness: float = parameter(0.0, "N/m")
+    stiffness: float = parameter(0.0, "N/m", values=NOT_NEGATIVE)
     x: float = parameter(0.0, "m")
     y: float = parameter(0.0, "m")
-    rest_length: float = parameter(0.0, "m")
+    rest_length: float = parameter(0.0, "m", values=NOT_NEGATIVE)
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
@@ -144,10 +145,10 @@ class Magnet(Effect):
     amplitudes: ClassVar[tuple[str, ...]] = ("strength",)
     mass_powers: ClassVar[Mapping[str, int]] = {"strength": 1}
 
-    strength: float = parameter(0.0, "N*m^2")
+    strength: float = parameter(0.0, "N*m^2", values=NOT_NEGATIVE)
     x: float = parameter(0.0, "m")
     y: float = parameter(0.0, "m")
-    core: float = parameter(0.03, "m")
+    core: float = parameter(0.03, "m", values=POSITIVE)
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:

@@ -15,8 +15,10 @@ from physid_drake.cell.forces import FrictionLaw
 from physid_drake.cell.object_state import Complex, ObjectState
 from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
 from physid_drake.effects.places import close_grid_of_places
+from physid_drake.ranges import POSITIVE, Range
 
 Array = NDArray[np.float64]
+LEAST_LEFT = 0.05  # of the friction of the first push
 POINT = 1e-9  # m: of what stands for no disc, as under a lying cylinder
 SLIGHT_SHARE = 0.015  # of the friction
 BASE = 0.6  # of the distance between two places: a patch's radius that covers the gaps
@@ -37,8 +39,8 @@ class StribeckFriction(Effect):
     frame: ClassVar[str] = "object_velocity"
     amplitudes: ClassVar[tuple[str, ...]] = ("excess",)
 
-    excess: float = parameter(0.0, "-")
-    speed: float = parameter(0.1, "m/s")
+    excess: float = parameter(0.0, "-", values=Range(least=-1.0))
+    speed: float = parameter(0.1, "m/s", values=POSITIVE)
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
@@ -86,7 +88,7 @@ class _Anisotropic(Effect):
     amplitudes: ClassVar[tuple[str, ...]] = ("ratio",)
     fixed_in_object: ClassVar[bool]
 
-    ratio: float = parameter(1.0, "-")
+    ratio: float = parameter(1.0, "-", values=POSITIVE)
     angle: float = parameter(0.0, "rad", period=math.pi)
 
     @classmethod
@@ -139,7 +141,7 @@ class _EllipseLaw:
 
     @property
     def largest(self) -> float:
-        return math.sqrt(self.axes)
+        return math.sqrt(max(self.axes, 1.0 / self.axes))
 
     def ratio(self, state: ObjectState) -> Array | Complex:
         angle = self.angle + (state.yaw if self.fixed_in_object else 0.0)
@@ -166,10 +168,10 @@ class FrictionPatch(Effect):
     frame: ClassVar[str] = "world"
     amplitudes: ClassVar[tuple[str, ...]] = ("ratio",)
 
-    ratio: float = parameter(1.0, "-")
+    ratio: float = parameter(1.0, "-", values=POSITIVE)
     x: float = parameter(0.0, "m")
     y: float = parameter(0.0, "m")
-    radius: float = parameter(0.05, "m")
+    radius: float = parameter(0.05, "m", values=POSITIVE)
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
@@ -265,7 +267,8 @@ def share_inside(away: Array, radius: float, radii: Array) -> Array:
     of_circle = np.clip((d**2 + radius**2 - radii**2) / (2.0 * d * radius), -1.0, 1.0)
     kite = (radii + radius - d) * (d + radii - radius) * (d - radii + radius) * (d + radii + radius)
     lens = radii**2 * np.arccos(of_disc) + radius**2 * np.arccos(of_circle) - 0.5 * np.sqrt(np.maximum(kite, 0.0))
-    inside: Array = lens / (math.pi * radii**2)
+    # Of points the quotient is noise where the circle's edge goes through them.
+    inside: Array = np.clip(lens / (math.pi * radii**2), 0.0, 1.0)
     return inside
 
 
@@ -331,11 +334,15 @@ class FrictionDrift(Effect):
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """The change per push."""
         count = max(1, around.pushes - 1)
-        return (Coordinate(name="per_push", step=2.0 * SLIGHT_SHARE / count, lower=-0.95 / count, upper=3.0 / count),)
+        return (
+            Coordinate(
+                name="per_push", step=2.0 * SLIGHT_SHARE / count, lower=(LEAST_LEFT - 1.0) / count, upper=3.0 / count
+            ),
+        )
 
     def friction_change(self, order: int) -> float:
-        """In proportion to the push's number."""
-        return max(-1.0, self.per_push * order)
+        """In proportion to the push's number; some friction is left, also after pushes that are still to come."""
+        return max(LEAST_LEFT - 1.0, self.per_push * order)
 
     def body(self, body: Body, facts: PushFacts) -> Body:
         """The friction of this push."""

@@ -21,6 +21,7 @@ from physid_drake.effects.effect import (
     families_of_sizes,
     parameter,
 )
+from physid_drake.ranges import NOT_NEGATIVE, POSITIVE
 
 Array = NDArray[np.float64]
 FINE = 2e-3  # s between knots of a path that was changed
@@ -59,9 +60,9 @@ class HandCompliance(_HandEffect):
     beyond: ClassVar[tuple[str, ...]] = ("share",)
     mass_powers: ClassVar[Mapping[str, int]] = {"compliance": -1}
 
-    compliance: float = parameter(0.0, "m/N")
-    damping: float = parameter(0.5, "-")
-    share: float = parameter(0.2, "-")
+    compliance: float = parameter(0.0, "m/N", values=NOT_NEGATIVE)
+    damping: float = parameter(0.5, "-", values=NOT_NEGATIVE)
+    share: float = parameter(0.2, "-", values=POSITIVE)
 
     @classmethod
     def applies(cls, around: Surroundings) -> bool:
@@ -111,7 +112,7 @@ class ActuatorLag(_HandEffect):
     frame: ClassVar[str] = "time"
     amplitudes: ClassVar[tuple[str, ...]] = ("time_constant",)
 
-    time_constant: float = parameter(0.0, "s")
+    time_constant: float = parameter(0.0, "s", values=NOT_NEGATIVE)
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:

@@ -12,6 +12,7 @@ from physid_drake.cell.diagram import GRAVITY
 from physid_drake.cell.forces import ForceLaw, Wrench
 from physid_drake.cell.object_state import ObjectState
 from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
+from physid_drake.ranges import NOT_NEGATIVE, POSITIVE, SHARE
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -36,10 +37,10 @@ class Sloshing(Effect):
     amplitudes: ClassVar[tuple[str, ...]] = ("fraction",)
     beyond: ClassVar[tuple[str, ...]] = ("turning",)
 
-    fraction: float = parameter(0.0, "-")
-    frequency: float = parameter(4.0, "Hz")
-    damping: float = parameter(0.05, "-")
-    turning: float = parameter(1.0, "-")
+    fraction: float = parameter(0.0, "-", values=SHARE)
+    frequency: float = parameter(4.0, "Hz", values=POSITIVE)
+    damping: float = parameter(0.05, "-", values=NOT_NEGATIVE)
+    turning: float = parameter(1.0, "-", values=NOT_NEGATIVE)
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.effects.effect import Coordinate, Effect, Family, Pose, Surroundings, families_of_sizes, parameter
+from physid_drake.ranges import POSITIVE
 
 Array = NDArray[np.float64]
 
@@ -108,7 +109,7 @@ class TrackerScale(Effect):
     frame: ClassVar[str] = "world"
     amplitudes: ClassVar[tuple[str, ...]] = ("ratio",)
 
-    ratio: float = parameter(1.0, "-")
+    ratio: float = parameter(1.0, "-", values=POSITIVE)
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:

@@ -17,13 +17,18 @@ from physid_drake.errors import ConfigError
 from physid_drake.identify.theta import friction_names
 from physid_drake.model import Model
 from physid_drake.plan.trajectory import Situation
+from physid_drake.ranges import ANY, COEFFICIENT, POSITIVE, Range
 
 Array = NDArray[np.float64]
 
 Z90 = float(stats.norm.ppf(0.95))
 FURTHEST = 3.0  # standard deviations
 LEAST_FRICTION = 0.01
-_POSITIVE = ("mass", "hand_friction", "support_friction", "inertia_ratio", "static_ratio")
+RANGES = {
+    "mass": POSITIVE, "hand_friction": POSITIVE, "inertia_ratio": POSITIVE, "com_x": ANY, "com_y": ANY,
+    "static_ratio": Range(above=0.0, least=1.0), "restitution": COEFFICIENT,
+}  # fmt: skip
+"""Of theta; all frictions with the table are positive, too."""
 
 
 def uncertain_names(model: Model) -> list[str]:
@@ -125,15 +130,14 @@ def _moved(model: Model, scores: dict[str, float], scatter: float) -> Model:
         interval = _interval(name, model.intervals[name])
         assert interval is not None
 
-        def shift(value: float, interval: tuple[float, float] = interval, score: float = score,
-                  positive: bool = owner == "theta" and parameter.startswith(_POSITIVE)) -> float:  # fmt: skip
-            return _shifted(value, interval, score, positive=positive)
+        def shift(value: float, allowed: Range, by: tuple[tuple[float, float], float] = (interval, score)) -> float:
+            return _shifted(value, *by, allowed)
 
         if owner == "theta":
             body = _body(body, parameter, model, shift)
         elif owner in effects and hasattr(effects[owner], parameter):
-            value = float(getattr(effects[owner], parameter))
-            effects[owner] = dc.replace(effects[owner], **{parameter: shift(value)})
+            value, allowed = float(getattr(effects[owner], parameter)), effects[owner].ranges()[parameter]
+            effects[owner] = dc.replace(effects[owner], **{parameter: shift(value, allowed)})
         elif owner not in effects:
             continue  # of an effect that was left out
         else:
@@ -142,15 +146,15 @@ def _moved(model: Model, scores: dict[str, float], scatter: float) -> Model:
     return dc.replace(model, body=dc.replace(body, support_friction=friction), effects=tuple(effects.values()))
 
 
-def _shifted(value: float, interval: tuple[float, float], score: float, *, positive: bool) -> float:
+def _shifted(value: float, interval: tuple[float, float], score: float, allowed: Range) -> float:
     low, high = interval
-    if low > 0.0 and value > 0.0 and (positive or _is_logarithms(value, low, high)):
-        return math.exp(_drawn(math.log(value), math.log(low), math.log(high), score))
+    if low > 0.0 and value > 0.0 and (allowed.above == 0.0 or _is_logarithms(value, low, high)):
+        return allowed.nearest(math.exp(_drawn(math.log(value), math.log(low), math.log(high), score)))
     moved = _drawn(value, low, high, score)
     # An interval that stays on one side of zero is of something that has a sign.
     if low >= 0.0:
-        return max(0.0, moved)
-    return min(0.0, moved) if high <= 0.0 else moved
+        return allowed.nearest(max(0.0, moved))
+    return allowed.nearest(min(0.0, moved) if high <= 0.0 else moved)
 
 
 def _drawn(value: float, low: float, high: float, score: float) -> float:
@@ -164,23 +168,19 @@ def _is_logarithms(value: float, low: float, high: float) -> bool:
     return abs(math.sqrt(low * high) - value) < abs(0.5 * (low + high) - value)
 
 
-def _body(body: Body, parameter: str, model: Model, shift: Callable[[float], float]) -> Body:
+def _body(body: Body, parameter: str, model: Model, shift: Callable[[float, Range], float]) -> Body:
     cells = friction_names((model.config.friction_cells[0], model.config.friction_cells[1]))
     if parameter in cells:
         friction = body.support_friction.copy()
-        friction[cells.index(parameter)] = shift(float(friction[cells.index(parameter)]))
+        friction[cells.index(parameter)] = shift(float(friction[cells.index(parameter)]), POSITIVE)
         return dc.replace(body, support_friction=friction)
+    if parameter not in RANGES:
+        raise ConfigError(f"model: the interval 'theta.{parameter}' belongs to no parameter.")
+    allowed = RANGES[parameter]
     if parameter in ("com_x", "com_y"):
         p_BBcm = body.p_BBcm.copy()
         axis = "xy".index(parameter[-1])
-        p_BBcm[axis] = shift(float(p_BBcm[axis]))
+        p_BBcm[axis] = shift(float(p_BBcm[axis]), allowed)
         return dc.replace(body, p_BBcm=p_BBcm)
-    if parameter not in ("mass", "inertia_ratio", "hand_friction", "static_ratio", "restitution"):
-        raise ConfigError(f"model: the interval 'theta.{parameter}' belongs to no parameter.")
-    value = shift(float(getattr(body, parameter)))
-    if parameter == "static_ratio":
-        value = max(1.0, value)
-    if parameter == "restitution":
-        value = min(1.0, value)
-    changes: dict[str, Any] = {parameter: value}
+    changes: dict[str, Any] = {parameter: shift(float(getattr(body, parameter)), allowed)}
     return dc.replace(body, **changes)

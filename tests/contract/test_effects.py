@@ -275,6 +275,7 @@ def test_parameters_of_any_chart_point_mean_something(kind):
             assert math.isfinite(value)
             assert isinstance(value, float)
             assert lowest <= value <= highest, name
+            assert kind.ranges()[name].holds(value), name
 
 
 @every_effect

@@ -131,6 +131,20 @@ def test_a_gradient_across_the_slide_turns_it_to_the_rough_side():
     assert got[2] == pytest.approx(want[2], rel=0.05)  # measured 0.022
 
 
+@pytest.mark.parametrize("model", ["point", "hydroelastic"])
+def test_a_grain_is_the_same_by_its_slippery_and_by_its_rough_axis(model):
+    by_slippery = slide(make("anisotropic_table", ratio=2.0, angle=0.4), model=model)
+    by_rough = slide(make("anisotropic_table", ratio=0.5, angle=0.4 + 0.5 * math.pi), model=model)
+    np.testing.assert_allclose(end(by_rough), end(by_slippery), rtol=0.0, atol=1e-9)
+
+
+def test_some_friction_is_left_however_many_pushes_come():
+    """A plan is of a push after the last recorded one."""
+    drift = make("friction_drift", per_push=-0.1)
+    changes = [drift.friction_change(order) for order in (5, 9, 10, 100)]
+    assert changes == pytest.approx([-0.5, -0.9, -0.95, -0.95])
+
+
 @pytest.mark.parametrize("order", [0, 1, 4])
 def test_friction_of_push_k_has_drifted_k_times(order):
     motion = slide(make("friction_drift", per_push=0.1), order=order)

@@ -8,7 +8,9 @@ import pytest
 from plans import GOAL, MODEL, START, TILTED, made
 from scipy import stats
 
+from physid_drake.effects.body import Restitution
 from physid_drake.effects.drag import QuadraticDrag
+from physid_drake.effects.friction import StribeckFriction
 from physid_drake.effects.liquid import Sloshing
 from physid_drake.errors import ConfigError
 from physid_drake.model import Correlation
@@ -86,12 +88,32 @@ def test_draws_have_their_interval_wherever_in_it_or_beside_it_the_value_is(valu
 
 
 def test_a_draw_of_an_object_that_cannot_be_is_one_that_diverged():
-    half_full = replace(MODEL, effects=(Sloshing(fraction=0.9),), intervals={"sloshing.fraction": [0.6, 1.2]})
+    unsure = replace(MODEL, intervals={"theta.com_x": [-0.1, 0.1]})
     push = (PlannedPush(direction=0.0, speed=0.3, travel=0.1),)
-    draws = drawn_from(half_full, 8)
-    spread = spread_of(draws, push, DistanceToGoal(goal=GOAL), model=half_full, situation=Situation(start=START))
-    impossible = sum(draw.model.effects[0].fraction >= 1.0 for draw in draws)
+    draws = drawn_from(unsure, 8)
+    spread = spread_of(draws, push, DistanceToGoal(goal=GOAL), model=unsure, situation=Situation(start=START))
+    impossible = sum(abs(draw.model.body.p_BBcm[0]) > 0.5 * MODEL.shape.size[0] for draw in draws)
     assert 0 < impossible < 8 and spread.diverged >= impossible
+
+
+@pytest.mark.parametrize(
+    ("effect", "name", "interval"),
+    [
+        (Sloshing(fraction=0.9), "fraction", [0.6, 1.2]),  # more of it than there is
+        (
+            Sloshing(fraction=0.3, frequency=40.0),
+            "frequency",
+            [10.0, 40.0],
+        ),  # ended at its bound, far from the middle
+        (StribeckFriction(excess=0.5, speed=0.95), "speed", [0.2, 1.0]),
+        (Restitution(coefficient=0.9), "coefficient", [0.7, 1.0]),
+    ],
+)
+def test_draws_of_an_effect_are_of_what_it_can_be(effect, name, interval):
+    model = replace(MODEL, effects=(effect,), intervals={f"{effect.name}.{name}": interval})
+    drawn = np.array([getattr(m.effects[0], name) for m in models_from(model, 512)])
+    allowed = effect.ranges()[name]
+    assert all(map(allowed.holds, drawn)) and np.ptp(drawn) > 0.5 * np.ptp(interval)
 
 
 def test_friction_and_tilt_that_are_known_together_spread_the_end_less_than_each_alone():

@@ -202,6 +202,12 @@ def test_what_a_correlation_does_not_hold_is_independent():
         ({"cell": {}}, "key 'contact' is missing"),
         ({"table_m": [[1.0, 1.0], [-1.0, -1.0]]}, "table_m"),
         ({"effects": [{"name": "size_error", "parameters": {"ratio": 0.0}}]}, "size_error.ratio"),
+        ({"effects": [{"name": "sloshing", "parameters": {"fraction": 1.0}}]}, "of at least 0 and below 1"),
+        ({"effects": [{"name": "viscous_drag", "parameters": {"coefficient": -0.5}}]}, "viscous_drag.coefficient"),
+        (
+            {"effects": [{"name": "restitution", "parameters": {"coefficient": 1.7}}]},
+            "of at least 0 and of at most 1",
+        ),
         ({"effects": [{"name": "uneven_support", "parameters": {"weights": [[1.0], [1.0, 2.0]]}}]}, "equally many"),
         ({"effects": [{"name": "table_tilt", "parameters": {"x": float("inf")}}]}, "table_tilt.x"),
         ({"effects": [{"name": "table_tilt", "parameters": {}}] * 2}, "twice"),

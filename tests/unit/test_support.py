@@ -302,3 +302,11 @@ def test_a_patch_acts_on_its_own_area_however_small(radius):
     shares = share_inside(away, radius, np.full(len(away), disc))
     assert np.trapezoid(shares * 2.0 * math.pi * away, away) == pytest.approx(math.pi * radius**2, rel=1e-4)
     assert shares[0] == pytest.approx(min(1.0, (radius / disc) ** 2)) and shares[-1] == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("radius", [0.05, 0.1, 0.13])
+def test_a_point_on_the_edge_of_a_circle_lies_in_it_by_a_share(radius):
+    """A lying cylinder may start with a point of its line exactly there."""
+    away = radius + np.linspace(-5e-9, 5e-9, 101)
+    shares = share_inside(away, radius, np.full(len(away), 1e-9))
+    assert ((shares >= 0.0) & (shares <= 1.0)).all() and shares[0] == 1.0 and shares[-1] == 0.0
