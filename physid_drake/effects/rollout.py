@@ -20,6 +20,7 @@ from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]
 
+FURTHER = 4.0  # times: a bounce doubles the speed, a tilt takes three quarters of the friction
 SHORT = 1e-4  # s: for differences
 
 
@@ -71,7 +72,7 @@ def roll(
     """
     present = [effect for effect in effects if not effect.is_null]
     cell = build(geometry_with(present, geometry))
-    facts = facts_of(cell, body, _region(cell, body, push), push.order, push.hand_axes)
+    facts = facts_of(cell, body, _region(cell, body, push, present), push.order, push.hand_axes)
     body = body_with(present, body, facts)
     start = _true_start(present, push.start)
     path = push.path
@@ -166,14 +167,18 @@ def tracked(motion: Motion, times: Array, effects: Sequence[Effect]) -> Array:
     return poses
 
 
-def _region(cell: Cell, body: Body, push: Rollout) -> Array:
-    """Lower and upper corner (2, 2) of where the object's points may come [m]."""
+def _region(cell: Cell, body: Body, push: Rollout, effects: Sequence[Effect]) -> Array:
+    """Lower and upper corner (2, 2) of where the object's points may come [m].
+
+    Several effects carry it further than the plain cell would: beyond a tilt or a bounce there may be a patch.
+    """
     places = np.array([push.start.pose[:2]])
     speed = float(np.hypot(*push.start.velocity[:2]))
     if push.path is not None:
         places = np.concatenate([places, push.path.knot_positions()])
         speed = max(speed, float(np.sqrt((push.path.velocities**2).sum(axis=1).max())))
     slide = speed**2 / (2.0 * GRAVITY * max(float(np.min(body.support_friction)), 0.05))
+    slide *= FURTHER if len(effects) > 1 else 1.0
     x0, y0, x1, y1 = cell.solid.underside.extent()
     margin = math.hypot(x1 - x0, y1 - y0) + min(slide, 1.0)
     return np.array([places.min(axis=0) - margin, places.max(axis=0) + margin])

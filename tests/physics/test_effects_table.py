@@ -131,6 +131,14 @@ def test_a_gradient_across_the_slide_turns_it_to_the_rough_side():
     assert got[2] == pytest.approx(want[2], rel=0.05)  # measured 0.022
 
 
+def test_a_patch_lies_where_only_another_effect_carries_the_object():
+    """On the level the object would stop a length of its own before it."""
+    tilt, patch = make("table_tilt", x=0.2), make("friction_patch", ratio=3.0, x=0.45, y=0.0, radius=0.05)
+    further, stopped = (end(slide(*effects, velocity=(1.0, 0.0, 0.0)))[0] for effects in ((tilt,), (tilt, patch)))
+    assert further > 0.4
+    assert further - stopped > 0.03
+
+
 @pytest.mark.parametrize("model", ["point", "hydroelastic"])
 def test_a_grain_is_the_same_by_its_slippery_and_by_its_rough_axis(model):
     by_slippery = slide(make("anisotropic_table", ratio=2.0, angle=0.4), model=model)
