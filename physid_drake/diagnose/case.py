@@ -38,8 +38,8 @@ MOST_SLIDE_TICK = 0.05  # s
 MOST_PUSHES = 24  # more take longer and tell little more
 UNIT_SCATTER = 0.025  # of friction, push to push: the columns' unit and the median of its prior
 LEAST_MOTION = 6.0  # standard deviations: an object that moves less in every push does not move
-# A rollout's own error acts like a start that is known no better than this [m, m, rad].
 WHY_LOST = "at any theta: the solver diverges, or no object stands so"
+# A rollout's own error acts like a start that is known no better than this [m, m, rad].
 START_FLOOR = np.array([3e-5, 3e-5, 3e-4])
 
 
