@@ -275,6 +275,8 @@ def _quality(evidence: Evidence, after: Fitted) -> FitQuality:
         rotation_before=old.rotation, rotation_after=new.rotation,
         log_score_gain=float(gains.sum()), log_score_gain_se=standard_error(gains) if len(gains) > 1 else 0.0,
         per_push=tuple((p.name, b, a) for p, b, a in zip(case.problems, old.per_push, new.per_push, strict=True)),
+        force_before=old.force if math.isfinite(old.force) else None,
+        force_after=new.force if math.isfinite(new.force) else None,
         regimes=() if after is plain else regime_gains(case, plain, after),
     )  # fmt: skip
 

@@ -242,5 +242,5 @@ def _gain_needed(pushes: int, spent: int, looks: float, alpha: float) -> float:
 
 
 def rms(values: Array) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(np.square(values))))
+    """Root mean square; NaN of nothing."""
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else math.nan

@@ -69,6 +69,16 @@ class PushFeatures:
         poses: Array = vector[: 3 * count].reshape(3, count).T * self.sigmas
         return poses
 
+    def forces(self, vector: Array) -> Array:
+        """Force components (k, 2) [N] of a vector (m,)."""
+        forces: Array = vector[3 * len(self.middles) :].reshape(2, -1).T * self.force_std[:, None]
+        return forces
+
+    @property
+    def force_sigmas(self) -> Array:
+        """Standard deviations (k, 2) [N] of force components: white, wandering, off as a whole."""
+        return self.forces(np.sqrt(np.diag(self.noise)))
+
 
 def features_of(push: Push, problem: PushProblem, noise: TrackerNoise) -> PushFeatures:
     """The features of a recorded push."""

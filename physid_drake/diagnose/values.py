@@ -104,6 +104,7 @@ class FitQuality:
         log_score_gain_se: that standard error [nats].
         per_push: name, error before and after in standard deviations, of each.
         regimes: gains where fit and test are of different kinds of pushes.
+        force_before, force_after: of the hand's force [N]; None where none was compared.
     """
 
     rms_before: float
@@ -116,6 +117,8 @@ class FitQuality:
     log_score_gain_se: float
     per_push: tuple[tuple[str, float, float], ...]
     regimes: tuple[RegimeGain, ...] = ()
+    force_before: float | None = None
+    force_after: float | None = None
 
 
 @dc.dataclass(frozen=True, kw_only=True)

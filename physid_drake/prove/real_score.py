@@ -64,6 +64,7 @@ class RealOutcome:
         chi2: reduced chi-square of the plain cell, and after.
         position: held-out errors [m], before and after.
         rotation: held-out errors [rad], before and after.
+        force: held-out errors of the hand's force [N], before and after; NaN where none was compared.
         fresh: end-point errors [m, rad] of the model on pushes that the diagnosis did not get.
         published: name to end-point errors [m, rad] of the publishers' models on the diagnosed pushes.
         pressure: the map that was found; None where none was.
@@ -78,6 +79,7 @@ class RealOutcome:
     chi2: tuple[float, float] = (math.nan, math.nan)
     position: tuple[float, float] = (math.nan, math.nan)
     rotation: tuple[float, float] = (math.nan, math.nan)
+    force: tuple[float, float] = (math.nan, math.nan)
     fresh: tuple[float, float] = (math.nan, math.nan)
     published: dict[str, tuple[float, float]] | None = None
     pressure: Pressure | None = None
@@ -108,6 +110,7 @@ def real_outcome(case: RealCase, published: Path, out: Path) -> RealOutcome:
         chi2=(number(said["reduced_chi2_before"]), number(said["reduced_chi2_after"])),
         position=(number(fit["held_out_rms_before_m"]), number(fit["held_out_rms_after_m"])),
         rotation=(number(fit["held_out_rms_before_rad"]), number(fit["held_out_rms_after_rad"])),
+        force=(number(fit.get("held_out_rms_before_n")), number(fit.get("held_out_rms_after_n"))),
         fresh=_fresh(folder / FRESH_ERRORS),
         published=published_errors(published / case.source, [p.note for p in pushes])
         if case.group == "mit"

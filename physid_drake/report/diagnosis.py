@@ -10,7 +10,7 @@ from typing import Any
 from rich.table import Table
 
 from physid_drake.diagnose import Diagnosis
-from physid_drake.diagnose.values import EffectFinding, Location, Partly
+from physid_drake.diagnose.values import EffectFinding, FitQuality, Location, Partly
 from physid_drake.effects import effect_named
 
 FORMAT = "physid-diagnosis/1"
@@ -38,6 +38,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> str:
             "held_out_rms_after_m": d.fit.position_after,
             "held_out_rms_before_rad": d.fit.rotation_before,
             "held_out_rms_after_rad": d.fit.rotation_after,
+            **_forces(d.fit),
             "log_score_gain": d.fit.log_score_gain,
             "log_score_gain_se": d.fit.log_score_gain_se,
             "per_push": [{"push": name, "before": b, "after": a} for name, b, a in d.fit.per_push],
@@ -79,6 +80,13 @@ def _effect(effect: EffectFinding) -> dict[str, Any]:
         "parameters": parameters,
         **({"beyond_the_catalogue": beyond} if beyond else {}),
     }
+
+
+def _forces(fit: FitQuality) -> dict[str, Any]:
+    """Where forces were compared."""
+    if fit.force_before is None:
+        return {}
+    return {"held_out_rms_before_n": fit.force_before, "held_out_rms_after_n": fit.force_after}
 
 
 def _partly(partly: Partly) -> dict[str, Any]:
@@ -164,13 +172,31 @@ def regime_table(diagnosis: Diagnosis) -> Table:
 def fit_table(diagnosis: Diagnosis) -> Table:
     """How well pushes are predicted that were left out, before and after."""
     table = Table(title="pushes predicted while left out (root mean square)", title_justify="left")
-    for column in ("model", "mm", "deg", "sigmas", "reduced chi-square"):
+    forced = diagnosis.fit.force_before is not None
+    for column in ("model", "mm", "deg", *(("N",) if forced else ()), "sigmas", "reduced chi-square"):
         table.add_column(column, justify="right")
-    fit = diagnosis.fit
-    rows = [("plain", fit.position_before, fit.rotation_before, fit.rms_before, diagnosis.reduced_chi2_before)]
-    if diagnosis.effects:
-        after = (fit.position_after, fit.rotation_after, fit.rms_after, diagnosis.reduced_chi2_after)
-        rows.append(("with what is missing", *after))
-    for name, position, rotation, sigmas, chi2 in rows:
-        table.add_row(name, f"{1e3 * position:.2f}", f"{math.degrees(rotation):.2f}", f"{sigmas:.2f}", f"{chi2:.2f}")
+    for name, figures in held_out_figures(diagnosis):
+        table.add_row(name, *(f"{value:.2f}" for value in figures))
     return table
+
+
+def held_out_figures(diagnosis: Diagnosis) -> list[tuple[str, list[float]]]:
+    """Errors of pushes left out, of the plain cell and of what was found: mm, deg, N if known, sigmas, misfit."""
+    d, fit = diagnosis, diagnosis.fit
+    rows = [
+        (
+            "plain cell",
+            fit.position_before,
+            fit.rotation_before,
+            fit.force_before,
+            fit.rms_before,
+            d.reduced_chi2_before,
+        )
+    ]
+    if d.effects:
+        after = (fit.position_after, fit.rotation_after, fit.force_after, fit.rms_after, d.reduced_chi2_after)
+        rows.append(("with what is missing", *after))
+    return [
+        (name, [1e3 * position, math.degrees(rotation), *([] if force is None else [force]), sigmas, chi2])
+        for name, position, rotation, force, sigmas, chi2 in rows
+    ]

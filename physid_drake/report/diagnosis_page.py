@@ -20,6 +20,7 @@ from physid_drake.diagnose.noise import UNKNOWN
 from physid_drake.diagnose.values import Detectable, Diagnosis, EffectFinding, ParameterEstimate, ThetaEstimate
 from physid_drake.effects import effect_named
 from physid_drake.recording import Recording
+from physid_drake.report.diagnosis import held_out_figures
 from physid_drake.report.diagnosis_figures import (
     arrow_figure,
     error_figure,
@@ -213,15 +214,7 @@ def _told(theta: ThetaEstimate) -> float:
 
 def _fits(diagnosis: Diagnosis) -> list[tuple[str, list[str]]]:
     """Rows of the table of held-out errors."""
-    fit = diagnosis.fit
-    rows = [("plain cell", fit.position_before, fit.rotation_before, fit.rms_before, diagnosis.reduced_chi2_before)]
-    if diagnosis.effects:
-        after = (fit.position_after, fit.rotation_after, fit.rms_after, diagnosis.reduced_chi2_after)
-        rows.append(("with what is missing", *after))
-    return [
-        (name, [fixed(MM * position), fixed(math.degrees(rotation)), fixed(sigmas), fixed(chi2)])
-        for name, position, rotation, sigmas, chi2 in rows
-    ]
+    return [(name, [fixed(value) for value in figures]) for name, figures in held_out_figures(diagnosis)]
 
 
 def _bars(diagnosis: Diagnosis) -> list[dict[str, Any]]:

@@ -15,7 +15,7 @@ from physid_drake.prove.figures import decimals
 from physid_drake.prove.real_score import NEAR, Pressure, RealOutcome
 
 FORMAT = "physid-proof-real/1"
-COLUMNS = ("case", "pushes", "chi2 plain", "after", "verdict", "names", "held out mm", "deg", "fresh mm", "deg",
+COLUMNS = ("case", "pushes", "chi2 plain", "after", "verdict", "names", "held out mm", "deg", "N", "fresh mm", "deg",
            "ellipsoid mm", "deg", "4th order mm", "deg", "weight near the points",
            "mean arm of the weight mm")  # fmt: skip
 _LEG, _CORNER = 150.0, 50.0  # mm
@@ -36,6 +36,7 @@ def _row(outcome: RealOutcome) -> tuple[str, ...]:
         o.case.name, str(o.pushes), decimals(o.chi2[0]), decimals(o.chi2[1]), o.verdict,
         " + ".join(" or ".join(names) for names in o.classes) or "-",
         _change([1e3 * v for v in o.position]), _change([math.degrees(v) for v in o.rotation]),
+        _change(o.force) if math.isfinite(o.force[0]) else "-",
         *_errors(o.fresh), *models[0], *models[1], _near(o), _arm(o),
     )  # fmt: skip
 
@@ -82,7 +83,7 @@ def real_markdown(outcomes: Sequence[RealOutcome]) -> str:
 def real_table(outcomes: Sequence[RealOutcome]) -> Table:
     """The columns that fit a terminal."""
     table = Table(title="real recordings", title_justify="left")
-    shown = [0, 1, 2, 3, 4, 5, 6, 7]
+    shown = [0, 1, 2, 3, 4, 5, 6, 7, 8]
     for k in shown:
         table.add_column(COLUMNS[k])
     for row in real_rows(outcomes):
@@ -109,6 +110,7 @@ def _case(outcome: RealOutcome) -> dict[str, Any]:
         "reduced_chi2": _numbers(o.chi2),
         "held_out_m": _numbers(o.position),
         "held_out_rad": _numbers(o.rotation),
+        "held_out_n": _numbers(o.force),
         "fresh": _numbers(o.fresh),
         "published": None if o.published is None else {name: _numbers(e) for name, e in o.published.items()},
         "weight_near_points": None

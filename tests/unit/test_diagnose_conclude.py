@@ -7,6 +7,7 @@ import pytest
 
 from physid_drake.diagnose import conclude
 from physid_drake.diagnose.candidate import Candidate
+from physid_drake.diagnose.features import PushFeatures
 from physid_drake.diagnose.foils import Foil
 from physid_drake.diagnose.sentence import sentence
 from physid_drake.identify.misfit import FAILED
@@ -25,17 +26,17 @@ def errors(times_noise):
 
 
 def features():
-    def poses(vector):
-        return vector.reshape(3, WINDOWS).T * SIGMAS
-
-    return SimpleNamespace(poses=poses, sigmas=SIGMAS, middles=np.zeros(WINDOWS))
+    return PushFeatures(
+        averaging=np.eye(WINDOWS), middles=np.zeros(WINDOWS), sigmas=SIGMAS, recorded=np.zeros(3 * WINDOWS),
+        noise=np.eye(3 * WINDOWS), force_std=np.zeros(0), force_way=np.zeros(0), force_size=0.0,
+    )  # fmt: skip
 
 
 def evidence(*, steps=(), rejected=(), superfluous=(), final=None, after=10.0, foil=None):
     plain = model_that_leaves(100.0)
     screening = SimpleNamespace(scores=(SimpleNamespace(kind=SimpleNamespace(name="viscous_drag")),))
     return SimpleNamespace(
-        case=SimpleNamespace(features=[features()] * PUSHES, noise=SimpleNamespace(position=3e-4)),
+        case=SimpleNamespace(features=[features()] * PUSHES, noise=SimpleNamespace(position=3e-4, known=True)),
         plain=plain, nearest=plain, screening=screening,
         remaining=SimpleNamespace(scores=()), steps=steps, rejected=rejected, superfluous=superfluous,
         final=final or plain,

@@ -6,7 +6,7 @@ import json
 from test_diagnosis_page import diagnosis_with, effect, estimate
 
 from physid_drake.diagnose.values import Window
-from physid_drake.report.diagnosis import diagnosis_json
+from physid_drake.report.diagnosis import diagnosis_json, fit_table
 
 
 def written(**changes):
@@ -32,3 +32,20 @@ def test_what_the_catalogue_does_not_have_stands_apart():
     assert found["beyond_the_catalogue"]["turning"]["value"] == 0.8
     (usual,) = written()["effects"]
     assert "beyond_the_catalogue" not in usual
+
+
+def test_errors_of_forces_are_written_where_forces_were_compared():
+    assert "held_out_rms_before_n" not in written()["fit"]
+    forced = dc.replace(diagnosis_with().fit, force_before=0.3, force_after=0.1)
+    fit = written(fit=forced)["fit"]
+    assert (fit["held_out_rms_before_n"], fit["held_out_rms_after_n"]) == (0.3, 0.1)
+
+
+def test_the_table_of_errors_has_newtons_where_forces_were_compared():
+    forced = dc.replace(diagnosis_with().fit, force_before=0.3, force_after=0.1)
+    assert [column.header for column in fit_table(diagnosis_with()).columns] == [
+        "model", "mm", "deg", "sigmas", "reduced chi-square",
+    ]  # fmt: skip
+    table = fit_table(diagnosis_with(fit=forced))
+    (newtons,) = (column for column in table.columns if column.header == "N")
+    assert list(newtons.cells) == ["0.30", "0.10"]

@@ -177,7 +177,14 @@ assert sys.argv[4:] == ["--pushes", "20"]
 (pathlib.Path(sys.argv[2]) / "diagnosis.json").write_text(sys.argv[3])"""
 
 
-def test_the_command_writes_a_table_and_goes_on(published, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("forces", "held_out", "column"),
+    [
+        ({}, [None, None], " - "),
+        ({"held_out_rms_before_n": 0.3, "held_out_rms_after_n": 0.1}, [0.3, 0.1], " 0.30 to 0.10 "),
+    ],
+)
+def test_the_command_writes_a_table_and_goes_on(published, tmp_path, monkeypatch, forces, held_out, column):
     monkeypatch.setattr(
         run_prove_real, "fresh_errors", lambda diagnosis, held: np.array([[0.003, 0.1], [0.004, 0.2]])
     )
@@ -185,7 +192,8 @@ def test_the_command_writes_a_table_and_goes_on(published, tmp_path, monkeypatch
 
     def fake(recording, folder, *sealed):
         hidden.extend(sealed)
-        return (sys.executable, "-c", FAKE, str(recording), str(folder), json.dumps(ANSWER))
+        answer = ANSWER | {"fit": ANSWER["fit"] | forces}
+        return (sys.executable, "-c", FAKE, str(recording), str(folder), json.dumps(answer))
 
     words = ["prove", "--real", str(published), "--only", "mit_rect1", "square", "--out", str(tmp_path / "out")]
     arguments = build_parser().parse_args(words)
@@ -196,8 +204,11 @@ def test_the_command_writes_a_table_and_goes_on(published, tmp_path, monkeypatch
     assert cases["mit_rect1_v10"]["skipped"].startswith("left out: ")
     done = cases["mit_rect1_v20"]
     assert (done["verdict"], done["pushes"], done["held_out_m"]) == ("unexplained", 20, [0.004, 0.004])
+    assert done["held_out_n"] == held_out
     assert done["fresh"] == pytest.approx([math.sqrt(12.5e-6), math.sqrt(0.025)], rel=1e-5)
     assert set(hidden) == {published, tmp_path / "out" / "held_out"}
     first = (tmp_path / "out" / "real.md").read_bytes()
+    head, row = (next(line for line in first.decode().splitlines() if word in line) for word in ("case", "rect1_v20"))
+    assert row.split("|")[head.split("|").index(" N ")] == column
     assert run_prove_real.run_real(arguments, command=fake) == 0
     assert (tmp_path / "out" / "real.md").read_bytes() == first
