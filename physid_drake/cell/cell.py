@@ -32,7 +32,6 @@ from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]
 
-STICKING = 3e-4  # of the hand's fastest speed: slip below which a contact sticks
 EDGE_POINTS = 200  # under an object where the table's edge cuts the underside
 
 
@@ -158,7 +157,6 @@ class Cell:
             laws=laws,
             frictions=frictions,
             mount=mount,
-            stiction=self._stiction(path),
         )
         if self._table is None or not len(motion.times) or not self._overhangs(motion):
             return motion
@@ -173,17 +171,6 @@ class Cell:
             frictions=frictions,
             mount=mount,
         )
-
-    def _stiction(self, path: HandPath | None) -> float:
-        """Slip below which contacts stick [m/s], so that what they creep by is a share of the way.
-
-        A contact of Drake that bears friction slips by a part of the stiction tolerance where it sticks. A slow hand
-        takes long for its way, and its tip would leave its place on the face, which no quasi-static push does: with
-        1e-4 m/s, 60 mm beside the middle turn a box by 394 mrad at 10 mm/s and by 398 mrad at 5 mm/s.
-        """
-        fastest = 0.0 if path is None else float(np.linalg.norm(path.velocities, axis=1).max())
-        tolerance = self.config.contact.stiction_tolerance_mps
-        return min(tolerance, STICKING * fastest) if fastest > 0.0 else tolerance
 
     def _overhangs(self, motion: Motion) -> bool:
         """Whether the object's circle was beyond the table's edge anywhere on its way."""

@@ -18,8 +18,7 @@ class ContactConfig:
             Deeper leans a tall object under load transfer, shallower makes the lagged friction of a
             disturbed object wrong; 1 to 5 micrometres are within 0.1 sigma of each other on sixty pushes.
         dissipation_s_per_m: Hunt-Crossley dissipation of the support; the integrator damps enough.
-        stiction_tolerance_mps: slip below which Drake treats a contact as sticking; less where the hand is slow
-            (`STICKING` of cell/cell.py).
+        stiction_tolerance_mps: slip below which Drake treats a contact as sticking.
         hand_frequency_rad_s: natural frequency of the object on the hand's contact; stiffness = mass times
             its square.
     """

@@ -19,7 +19,9 @@ from physid_drake.cell.turning import CANCELS, Turning
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-SLOWEST = 1e-4  # m/s: below this slip friction fades, as Drake's does (the default stiction tolerance of a cell)
+# m/s: below this slip friction fades, as Drake's does (the default stiction tolerance of a cell). Where laws fade at
+# other slips than the contact that they give friction back of, slow pushes feel the difference.
+SLOWEST = 1e-4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,15 +33,12 @@ class Underside:
         weights: (n,) shares of the load.
         friction: (n,) the kinetic coefficient of each point's friction cell, without any law [-].
         radii: (n,) of a disc as large as what each point stands for [m].
-        stiction: slip below which friction fades [m/s], Drake's: where laws fade at other slips than the contact that
-            they give friction back of, slow pushes feel the difference.
     """
 
     points: Complex
     weights: Array
     friction: Array
     radii: Array
-    stiction: float = SLOWEST
 
     @cached_property
     def reach(self) -> float:
@@ -136,7 +135,7 @@ class ObjectState:
     def slip_directions(self) -> Complex:
         """Directions (n,) in which the support points slip, x + iy in W; they fade to zero at rest."""
         speeds = np.abs(self.slips)
-        directions: Complex = self.slips / np.sqrt(speeds * speeds + self.underside.stiction**2)
+        directions: Complex = self.slips / np.sqrt(speeds * speeds + SLOWEST**2)
         return directions
 
     @property
@@ -195,7 +194,7 @@ class ObjectState:
         """Direction in which support point i slips, x + iy in W: that of ``slip_directions``."""
         arm = complex(self.underside.points[i]) * cmath.exp(1j * self.yaw)
         slip = self.v_WBo + 1j * self.yaw_rate * arm
-        return slip / math.hypot(abs(slip), self.underside.stiction)
+        return slip / math.hypot(abs(slip), SLOWEST)
 
     @cached_property
     def turning(self) -> list[Turning]:
@@ -215,7 +214,7 @@ class ObjectState:
     @property
     def slow_spin(self) -> float:
         """Spin below which the base's rim slips more slowly than what the contact holds [rad/s]."""
-        return self.underside.stiction / self.underside.reach
+        return SLOWEST / self.underside.reach
 
     @property
     def _centre(self) -> complex:
@@ -296,8 +295,8 @@ class StateReader:
         return self.half_height - z, 2.0 * (w * j - i * k), -2.0 * (w * i + j * k)
 
 
-def reader_of(body: Body, scene: Scene, stiction: float = SLOWEST) -> StateReader:
-    """The reader for a body on a scene's support points, whose friction fades below a slip [m/s]."""
+def reader_of(body: Body, scene: Scene) -> StateReader:
+    """The reader for a body on a scene's support points."""
     support, solid = scene.support, scene.solid
     return StateReader(
         underside=Underside(
@@ -305,7 +304,6 @@ def reader_of(body: Body, scene: Scene, stiction: float = SLOWEST) -> StateReade
             weights=support.weights,
             friction=body.support_friction[support.cells],
             radii=support.radii,
-            stiction=stiction,
         ),
         mass=body.mass,
         weight=body.mass * scene.gravity,

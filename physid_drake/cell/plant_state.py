@@ -12,7 +12,7 @@ from pydrake.systems.framework import Context
 from physid_drake.cell.diagram import Scene
 from physid_drake.cell.lift import Lift
 from physid_drake.cell.motion import Start, planar_pose
-from physid_drake.cell.object_state import SLOWEST, ObjectState, reader_of
+from physid_drake.cell.object_state import ObjectState, reader_of
 from physid_drake.cell.setters import Body
 from physid_drake.cell.touch import Planar
 
@@ -36,13 +36,7 @@ class PlantState:
         self._v = nq + scene.object.floating_velocities_start_in_v()
         self._hand_q = [joint.position_start() for joint in scene.joints]
         self._hand_v = [nq + joint.velocity_start() for joint in scene.joints]
-        self._stiction = SLOWEST
         self._round = scene.solid.rolling_radius is not None  # a rolling one is round at every angle
-
-    def stick_below(self, slip: float) -> None:
-        """Let contacts stick below a slip [m/s]."""
-        self._plant.set_stiction_tolerance(slip)
-        self._stiction = slip
 
     def begin(self, body: Body, start: Start, rest: Array) -> None:
         """Place the object, and park the hand.
@@ -52,7 +46,7 @@ class PlantState:
             start: its pose and velocity.
             rest: (7,) the settled pose of B at the origin with yaw 0.
         """
-        reader = self._reader = reader_of(body, self._scene, self._stiction)
+        reader = self._reader = reader_of(body, self._scene)
         self._lift = Lift(reader.underside, reader.stiffness) if reader.lifted else None
         self._mass = body.mass
         self._cx, self._cy = float(body.p_BBcm[0]), float(body.p_BBcm[1])

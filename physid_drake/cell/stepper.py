@@ -73,7 +73,6 @@ class Stepper:
         laws: Sequence[ForceLaw] = (),
         frictions: Sequence[FrictionLaw] = (),
         mount: Mount | None = None,
-        stiction: float,
     ) -> Motion:
         """Simulate from ``begin`` to ``end`` [s].
 
@@ -88,9 +87,7 @@ class Stepper:
             laws: forces beyond weight, friction and hand.
             frictions: friction laws; the contact must hold their largest friction already.
             mount: what holds the tip; None where it is rigid.
-            stiction: slip below which contacts stick [m/s].
         """
-        self._state.stick_below(stiction)
         dt = self._solver.time_step_s
         count = max(1, math.ceil((end - begin) / dt - 1e-6))
         self._body, self._begin, self._height = body, begin, height
