@@ -99,7 +99,7 @@ def test_the_force_of_one_push_alone_shows_nothing():
     assert not shown_by_several(case(), old, new)
 
 
-def test_pushes_without_forces_count_for_their_poses_alone():
+def test_a_push_without_forces_takes_nothing_from_those_of_others():
     mixed = case()
     mixed.features[0] = features(0)
     old, new = with_forces(1.0, 4.0), with_forces(1.0, 1.5)
