@@ -13,7 +13,7 @@ from pydrake.systems.analysis import Simulator
 
 from physid_drake.cell.applied_laws import AppliedLaws
 from physid_drake.cell.config import SolverConfig
-from physid_drake.cell.contact_drift import ContactDrift
+from physid_drake.cell.contact_drift import ContactDrift, spare_friction
 from physid_drake.cell.diagram import HAND_MASS, Scene
 from physid_drake.cell.forces import ForceLaw, FrictionLaw
 from physid_drake.cell.hand_path import HandPath
@@ -307,7 +307,8 @@ class Stepper:
         if touching:
             force = self._hand_force(command, span)
             if self._solver.drift_feedforward:
-                self._drift.learn(before, *state.section(self._height), move, span)
+                spare = spare_friction(before, force, self._body.hand_friction)
+                self._drift.learn(before, *state.section(self._height), move, span, spare)
         else:
             self._mend_position(old, after, span)
         self._record(end, force)
