@@ -8,7 +8,7 @@ from problems import QUIET
 from runs import shipped_pushes
 
 from physid_drake.cell.hand_path import straight_path
-from physid_drake.identify.force_windows import SHARE, _touching
+from physid_drake.identify.force_windows import SHARE, _resting, _standing, _touching
 from physid_drake.identify.problem import problems_of
 from physid_drake.recording import ForceStream, PoseStream
 
@@ -89,23 +89,31 @@ def test_without_forces_there_are_no_windows(recording):
 
 
 def of_a_stop(recording, *, last_rests):
-    """The first push, its force 2 N throughout, the object standing still in the last half second or not."""
+    """The first push, the object standing still in the last half second or not."""
     push = recording.pushes[0]
     times = push.object.times
     moving = np.minimum(times, times[-1] - 0.5) if last_rests else times
     positions = np.column_stack([0.1 * (moving - times[0]), 0 * times, 0 * times + 0.03])
     positions[:, :2] += 3e-4 * np.random.default_rng(0).standard_normal((len(times), 2))
     upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1))
-    stopped = replace(push, object=PoseStream(times=times, positions=positions, quaternions=upright))
-    force = ForceStream(times=times, forces=np.tile([2.0, 0.0, 0.0], (len(times), 1)))
-    return first(replace(recording, pushes=(replace(stopped, force=force), *recording.pushes[1:])))
+    return replace(push, object=PoseStream(times=times, positions=positions, quaternions=upright))
 
 
 def test_the_force_on_an_object_at_rest_is_left_out(recording):
     """A hand that leans against it may hold any force that friction bears."""
     stopped, moving = (of_a_stop(recording, last_rests=rests) for rests in (True, False))
-    assert len(moving.force_times) - len(stopped.force_times) in (5, 6)
-    assert stopped.force_times.max() < stopped.end - 0.5
+    times = stopped.object.times
+    middles = np.arange(times[0] + 0.05, times[-1], 0.1)
+    assert not _resting(moving, middles).any()
+    resting = middles[_resting(stopped, middles)]
+    assert len(resting) in (5, 6)
+    assert resting.min() == pytest.approx(times[-1] - 0.5, abs=0.1)
+
+
+def test_the_force_of_a_hand_that_stands_is_left_out():
+    """Whether or not the tracker sees the object rest: one that stops against it leans on it with any force."""
+    stops = straight_path(np.zeros(2), np.array([0.02, 0.0]), 1.0, 4.97)
+    np.testing.assert_array_equal(_standing(stops, MIDDLES), (MIDDLES < 1.0) | (MIDDLES > 5.93))
 
 
 @pytest.mark.parametrize("rate", [100.0, 1000.0])
