@@ -122,7 +122,8 @@ class Growth:
             answer = len(steps) > 0 and not unexplained(base.fitted, model)
             return len(steps) < most and (answer or pool.count < longest)
 
-        while may_grow(last.fitted) and last.p_value < self.alpha:
+        more = may_grow(last.fitted)
+        while more and last.p_value < self.alpha:
             candidates = confirm(fitter, last.fitted, last.screening.scores, tick, most=CANDIDATES - len(steps))
             if not steps and candidates:
                 better = self.plain_from(base.fitted, candidates[0])
@@ -131,6 +132,7 @@ class Growth:
                     if better.reduced_chi2 <= EXPLAINED:
                         fresh = signatures(Fitter(fitter.case), better, self.kinds)
                         base = last = Looked.at(better, fresh, self.rng)
+                        more = may_grow(better)
                         continue
                     base = last = Looked.at(better, base.signatures, self.rng)
                     candidates = rejudged(candidates, better)
@@ -150,8 +152,9 @@ class Growth:
             model = self._model_with(state, last.fitted)
             hopeless = len(steps) > 1 and model.reduced_chi2 > HOPELESS
             more = not hopeless and may_grow(model)
+            # What these score tests find is fitted, even if they are what used the rollouts up.
             last = self._what_is_left(model, last.signatures, self.alpha if more else 0.0)
-            if hopeless or not last.leads_on:
+            if not last.leads_on:
                 break
         return Grown(base=base, last=last, steps=tuple(steps), rejected=rejected)
 

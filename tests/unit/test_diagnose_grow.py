@@ -362,3 +362,40 @@ def test_what_took_long_goes_on_only_if_it_would_be_the_answer(monkeypatch, left
     case = SimpleNamespace(pool=pool, problems=range(PUSHES))
     growing = dc.replace(growth(SimpleNamespace(case=case)), kinds=(None,) * 3)
     assert len(growing._added_to(looked(70.0)).steps) == added
+
+
+@pytest.mark.parametrize(("tests_cost", "effects"), [(1, 3), (grow.LONGEST + 1, 2)])
+def test_what_costly_score_tests_found_is_fitted_but_no_more(monkeypatch, tests_cost, effects):
+    """Two effects whose first takes long are known by the tests beside it: it would be a waste not to look."""
+    pool = SimpleNamespace(count=0)
+    case = SimpleNamespace(pool=pool, problems=[None])
+    names = ["tether", "actuator_lag", "sloshing"]
+
+    def looked(count):
+        model = fitted(names[:count], -50.0).state
+        return SimpleNamespace(
+            fitted=SimpleNamespace(state=model, reduced_chi2=4.0), p_value=0.0, leads_on=True,
+            signatures=(), screening=SimpleNamespace(scores=[len(model.effects)]),
+        )  # fmt: skip
+
+    def next_one(fitter, model, scores, tick, most):
+        state = fitted(names[: scores[0] + 1], -40.0).state
+        return [dc.replace(step(names[scores[0]])[0], fitted=SimpleNamespace(state=state))]
+
+    def tests(self, model, before, alpha):
+        pool.count += tests_cost if alpha > 0.0 else 0
+        return looked(len(model.state.effects))
+
+    monkeypatch.setattr(grow, "confirm", next_one)
+    monkeypatch.setattr(grow, "worth_adding", lambda base, last, candidates: tuple(candidates))
+    monkeypatch.setattr(grow, "unexplained", lambda base, model: True)
+    monkeypatch.setattr(grow.Growth, "plain_from", lambda self, plain, candidate: None)
+    monkeypatch.setattr(
+        grow.Growth, "_model_with", lambda self, state, before: SimpleNamespace(state=state, reduced_chi2=4.0)
+    )
+    monkeypatch.setattr(grow.Growth, "_what_is_left", tests)
+    growth = grow.Growth(
+        fitter=SimpleNamespace(case=case), kinds=range(24), alpha=0.01, rng=None, tick=lambda *stage: None
+    )
+    steps = growth._added_to(looked(0)).steps
+    assert [one[0].name for one in steps] == names[:effects]
