@@ -368,7 +368,7 @@ def test_what_took_long_goes_on_only_if_it_would_be_the_answer(monkeypatch, left
 def test_what_costly_score_tests_found_is_fitted_but_no_more(monkeypatch, tests_cost, effects):
     """Two effects whose first takes long are known by the tests beside it: it would be a waste not to look."""
     pool = SimpleNamespace(count=0)
-    case = SimpleNamespace(pool=pool, problems=[None])
+    fitter = SimpleNamespace(case=SimpleNamespace(pool=pool, problems=[None]))
     names = ["tether", "actuator_lag", "sloshing"]
 
     def looked(count):
@@ -394,8 +394,6 @@ def test_what_costly_score_tests_found_is_fitted_but_no_more(monkeypatch, tests_
         grow.Growth, "_model_with", lambda self, state, before: SimpleNamespace(state=state, reduced_chi2=4.0)
     )
     monkeypatch.setattr(grow.Growth, "_what_is_left", tests)
-    growth = grow.Growth(
-        fitter=SimpleNamespace(case=case), kinds=range(24), alpha=0.01, rng=None, tick=lambda *stage: None
-    )
+    growth = grow.Growth(fitter=fitter, kinds=range(24), alpha=0.01, rng=None, tick=lambda *stage: None)
     steps = growth._added_to(looked(0)).steps
     assert [one[0].name for one in steps] == names[:effects]
