@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses as dc
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,7 +11,7 @@ from physid_drake.diagnose.candidate import EXPLAINED, FAR_OFF, Candidate, push_
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint, Fitted
 from physid_drake.diagnose.screen import Score
-from physid_drake.diagnose.starts import elsewhere, in_place, scanned_start, start_of
+from physid_drake.diagnose.starts import elsewhere, in_place, nearer_start, scanned_start, start_of
 from physid_drake.progress import Progress
 
 Array = NDArray[np.float64]
@@ -293,10 +292,12 @@ def fit_afresh(fitter: Fitter, u: Array, effects: tuple[EffectPoint, ...]) -> Fi
 
 def _fit(fitter: Fitter, before: Fitted, one: Score) -> Fitted:
     """The model with an effect, from where the score test says, with the derivatives of the model before."""
-    effects = (*before.state.effects, start_of(fitter, one))
     if before.reduced_chi2 > FAR_OFF:
+        effects = (*before.state.effects, start_of(fitter, one))
         return fitter.fit(fitter.start(before.state.u, effects), rounds=AFRESH, careful=CAREFUL, like=before)
-    return fitter.fit(dc.replace(before.state, effects=effects), rounds=4, like=before)
+    # Frictions that differ by a half are not what the derivatives of the pushes' own say.
+    like = None if one.in_order else before
+    return fitter.fit(nearer_start(fitter, before, one), rounds=4, like=like)
 
 
 def takes_most(before: Fitted, after: Fitted) -> bool:

@@ -230,6 +230,14 @@ class Fitter:
         )
         return self._fitted(fitted.state, pushes, fitted.predicted, learn_scatter=True)
 
+    def relieved(self, fitted: Fitted, explained: Sequence[Array]) -> Fitted:
+        """A model as it would be if something else explained so much (m_i,) of each push."""
+        pushes = tuple(
+            dc.replace(push, residual=push.residual - much)
+            for push, much in zip(fitted.pushes, explained, strict=True)
+        )
+        return self._fitted(fitted.state, pushes, fitted.predicted, learn_scatter=True)
+
     # Iteration.
 
     def fit(

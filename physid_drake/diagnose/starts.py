@@ -33,6 +33,26 @@ def start_of(fitter: Fitter, one: Score) -> EffectPoint:
     return _started(fitter, one, 1.0)
 
 
+def nearer_start(fitter: Fitter, before: Fitted, one: Score) -> State:
+    """The model ``before`` with an effect as its score test says; all else as it was or, if better, moved along.
+
+    Theta and the pushes' unknowns may have made up for the effect. A friction that falls from push to push was in the
+    pushes' own frictions, and would count twice beside them.
+    """
+    point = start_of(fitter, one)
+    held = dc.replace(point, free=())
+    starts = [dc.replace(s, effects=(*s.effects, point)) for s in (before.state, _moved_along(fitter, before, one))]
+    seen = [fitter.seen_from(before, dc.replace(s, effects=(*s.effects[:-1], held))) for s in starts]
+    return starts[int(np.argmax([model.score for model in seen]))]
+
+
+def _moved_along(fitter: Fitter, before: Fitted, one: Score) -> State:
+    """Where the score test of an effect takes the model that it is added to."""
+    kept = list(one.kept)
+    explained = [columns[:, kept] @ one.coefficients[kept] for columns in one.signature.columns]
+    return fitter.stepped(fitter.relieved(before, explained))
+
+
 def scanned_start(
     fitter: Fitter, before: Fitted, one: Score, beside: tuple[EffectPoint, ...] = ()
 ) -> tuple[EffectPoint, Array, float]:

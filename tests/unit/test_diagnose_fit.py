@@ -12,10 +12,12 @@ from physid_drake.diagnose import case_of
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint
 from physid_drake.diagnose.plain import coarse, search_theta
-from physid_drake.diagnose.screen import signatures
+from physid_drake.diagnose.screen import score, signatures
+from physid_drake.diagnose.starts import nearer_start
 from physid_drake.effects.body import ComOffset
 from physid_drake.effects.drag import QuadraticDrag
 from physid_drake.effects.fields import Tether
+from physid_drake.effects.friction import FrictionDrift
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.identify.misfit import FAILED, difference
 
@@ -195,3 +197,22 @@ def test_the_step_that_releases_the_pushes_unknowns_leads_to_no_worse_place(monk
     monkeypatch.setattr(one, "_tried", lambda best, *, cautious, released: models[best.state + 1])
     for careful in (1, 2, 3):
         assert one.fit(0, rounds=3, careful=careful).state == 0
+
+
+def test_a_friction_that_falls_from_push_to_push_does_not_count_twice(fitter):
+    """A model without the drift has it in its pushes' own frictions; its score test starts without them."""
+    case, state = fitter.case, fitter.start(np.full(3, 0.5))
+    falling = FrictionDrift(per_push=-0.08)
+    seen = fitter.vectors([fitter.task(state, i, effects=[falling]) for i in range(len(case.problems))])
+    features = tuple(dc.replace(f, recorded=vector) for f, vector in zip(case.features, seen, strict=True))
+    told = Fitter(dc.replace(case, features=features))
+    before = told.fit(state, rounds=3)
+    (signature,) = signatures(told, before, [FrictionDrift])
+    start = nearer_start(told, before, score(before, signature))
+
+    def frictions(state):
+        return np.array([own[n.index("friction")] for own, n in zip(state.own, case.nuisances, strict=True)])
+
+    assert np.ptp(frictions(before.state)) > 2.0
+    assert np.ptp(frictions(start)) < 0.5 * np.ptp(frictions(before.state))
+    assert start.effects[0].effect(told.case).per_push == pytest.approx(-0.08, rel=0.3)

@@ -1,0 +1,171 @@
+"""Diagnoses of MuJoCo worlds whose hand moves otherwise: hand_worlds.py MANNER [--seeds 11 12] [--effect NAME].
+
+Hands of the proof's worlds come from afar, go on at 0.05 to 0.5 m/s, brake and stay. Here the same scenes are pushed
+by hands that are slow (10 to 60 mm/s, with a force sensor), that go and brake as gently as people's arms do, that go
+round a bend, that halt on their way, or that begin where they touch and withdraw; or by ones low on the object.
+Prints what was put in and what is said of it.
+"""
+
+import argparse
+import dataclasses as dc
+import math
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from physid_drake.diagnose import case_of, cell_config, diagnose
+from physid_drake.identify.config import ThetaConfig
+from physid_drake.prove.knobs import draw_knob
+from physid_drake.prove.make import simulate
+from physid_drake.prove.scene import DrawnPush, Rng, Scene, draw_scene
+from physid_drake.prove.sensing import record, recording_of
+from physid_drake.prove.world_plan import HandPath
+from physid_drake.recording import Recording
+
+SPEEDS = (0.01, 0.06)  # m/s, of slow hands
+BRAKE = 0.1  # s
+FORCE, RATE = 0.02, 100.0  # N, Hz
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("manner", choices=MANNERS)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[11, 12, 13])
+    parser.add_argument("--effect", help="of the catalogue; none without")
+    parser.add_argument("--share", type=float, default=0.5, help="of the strongest that the proof draws")
+    parser.add_argument("--jobs", type=int, default=2)
+    given = parser.parse_args()
+    console = Console(width=118)
+    table = Table("seed", "put in", "noise [mm]", "said", "p", "held out [mm]", "[N]", "misfit")
+    for seed in given.seeds:
+        recording, noise = world(given.manner, seed, given.effect, given.share)
+        case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=given.jobs)
+        said, _ = diagnose(case)
+        names = " and ".join(" or ".join([e.name, *e.indistinguishable_from]) for e in said.effects)
+        table.add_row(
+            str(seed), given.effect or "none", f"{1e3 * noise:.2f}", names or said.verdict, f"{said.p_value:.2g}",
+            f"{1e3 * said.fit.position_before:.2f} to {1e3 * said.fit.position_after:.2f}",
+            "" if said.fit.force_before is None else f"{said.fit.force_before:.3f} to {said.fit.force_after:.3f}",
+            f"{said.reduced_chi2_before:.2f}",
+        )  # fmt: skip
+        console.print(f"{seed}: {said.sentence}")
+    console.print(table)
+
+
+def world(manner: str, seed: int, effect: str | None, share: float) -> tuple[Recording, float]:
+    """A recording, and its tracker's noise [m]."""
+    rng = np.random.default_rng([seed, 77])
+    scene = MANNERS[manner](rng, draw_scene(rng))
+    effects = [] if effect is None else [strong(rng, scene, effect, share)]
+    motions = simulate(scene, effects)
+    pushes = [record(rng, scene, k, motion)[0] for k, motion in enumerate(motions)]
+    return recording_of(f"{manner} {seed}", scene, pushes, effect == "actuator_lag"), scene.noise.position
+
+
+def slow(rng: Rng, scene: Scene) -> Scene:
+    """The same way of the hand, but for the brake, at another speed; with a force sensor."""
+    measured = dc.replace(scene, noise=dc.replace(scene.noise, force=FORCE), rate=RATE)
+    return along(measured, lambda push: slowed(rng, push.path))
+
+
+def slowed(rng: Rng, path: HandPath) -> HandPath:
+    slower = speed_of(path) / math.exp(rng.uniform(*np.log(SPEEDS)))
+    spans = slower * np.diff(path.times)
+    spans[-1] = BRAKE
+    times = path.times[0] + np.concatenate([[0.0], np.cumsum(spans)])
+    return dc.replace(path, times=times, velocities=path.velocities / slower)
+
+
+def gentle(rng: Rng, scene: Scene) -> Scene:
+    """A straight way at a speed that rises and falls like that of least jerk, 30 s^2 (1 - s)^2."""
+    s = np.linspace(0.0, 1.0, 41)
+    shape = 30.0 * (s * (1.0 - s)) ** 2  # of mean 1, peak 1.875
+
+    def path(push: DrawnPush) -> HandPath:
+        old, ahead = push.path, heading_of(push.path)
+        length = float(np.linalg.norm(old.position(old.times[-1:])[0] - old.start))
+        lasts = 1.875 * length / speed_of(old)
+        return dc.replace(old, times=old.times[0] + lasts * s, velocities=length / lasts * shape[:, None] * ahead)
+
+    return along(scene, path)
+
+
+def curved(rng: Rng, scene: Scene) -> Scene:
+    """From the touch on, the heading swings by up to 40 deg to one side and back."""
+
+    def path(push: DrawnPush) -> HandPath:
+        old, speed, swing = push.path, speed_of(push.path), math.radians(rng.uniform(-40.0, 40.0))
+        s = np.linspace(0.0, 1.0, 31)
+        angles = math.atan2(*heading_of(old)[::-1]) + swing * np.sin(math.pi * s)
+        touch, end = old.times[2], old.times[3]
+        times = np.concatenate([old.times[:2], touch + (end - touch) * s, old.times[4:]])
+        bends = speed * np.column_stack([np.cos(angles), np.sin(angles)])
+        return dc.replace(old, times=times, velocities=np.concatenate([old.velocities[:2], bends, [[0.0, 0.0]]]))
+
+    return along(scene, path)
+
+
+def halting(rng: Rng, scene: Scene) -> Scene:
+    """Half way from the touch to the brake the hand stands for 0.1 to 0.5 s."""
+
+    def path(push: DrawnPush) -> HandPath:
+        old, ahead = push.path, speed_of(push.path) * heading_of(push.path)
+        half, last, wait = (old.times[3] - old.times[2]) / 2.0, old.times[4] - old.times[3], rng.uniform(0.1, 0.5)
+        spans = [*np.diff(old.times[:3]), half, last, wait, last, half, last]
+        still = np.zeros(2)
+        return dc.replace(
+            old, times=old.times[0] + np.concatenate([[0.0], np.cumsum(spans)]),
+            velocities=np.array([still, ahead, ahead, ahead, still, still, ahead, ahead, still]),
+        )  # fmt: skip
+
+    return along(scene, path)
+
+
+def touching(rng: Rng, scene: Scene) -> Scene:
+    """The hand begins 0.2 mm from the object, speeds up in 0.1 s, and goes back after the brake."""
+
+    def path(push: DrawnPush) -> HandPath:
+        old, ahead = push.path, heading_of(push.path)
+        forth, back, still = speed_of(old) * ahead, -0.1 * ahead, np.zeros(2)
+        spans = [0.1, old.times[3] - old.times[2], old.times[4] - old.times[3], 0.1, 0.1, 0.3, 0.1]
+        return dc.replace(
+            old, start=old.position(old.times[2:3])[0] - 2e-4 * ahead,
+            times=old.times[0] + np.concatenate([[0.0], np.cumsum(spans)]),
+            velocities=np.array([still, forth, forth, still, still, back, back, still]),
+        )  # fmt: skip
+
+    return along(scene, path)
+
+
+def low(rng: Rng, scene: Scene) -> Scene:
+    """The tip is at a quarter to a half of the object's height, instead of at a half."""
+    height = float(rng.uniform(0.5, 1.0)) * scene.plan.tip_height
+    return dc.replace(scene, plan=dc.replace(scene.plan, tip_height=height))
+
+
+MANNERS = {"slow": slow, "gentle": gentle, "curved": curved, "halting": halting, "touching": touching, "low": low}
+
+
+def along(scene: Scene, path) -> Scene:
+    """The scene with another path of each push."""
+    return dc.replace(scene, pushes=tuple(dc.replace(push, path=path(push)) for push in scene.pushes))
+
+
+def speed_of(path: HandPath) -> float:
+    return float(np.linalg.norm(path.velocities, axis=1).max())
+
+
+def heading_of(path: HandPath):
+    """Unit vector (2,) of the way to the object."""
+    return path.velocities[1] / np.linalg.norm(path.velocities[1])
+
+
+def strong(rng: Rng, scene: Scene, effect: str, share: float):
+    """An effect, at a share of its strongest."""
+    knob = draw_knob(effect, rng, scene)
+    return knob.at(share * knob.limit)
+
+
+if __name__ == "__main__":
+    main()
