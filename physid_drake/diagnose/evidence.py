@@ -148,6 +148,11 @@ def _more_likely(fitted: Fitted, pushes: Sequence[LinearPush], seen: float, most
     return float(free - held)
 
 
+def takes_enough(plain: Fitted, final: Fitted) -> bool:
+    """Whether a model takes as large a share of a mismatch away as one that explains it does, whatever it leaves."""
+    return final.reduced_chi2 - 1.0 <= MOST_SHARE * (plain.reduced_chi2 - 1.0)
+
+
 def unexplained(plain: Fitted, final: Fitted) -> bool:
     """Whether a model leaves more than noise, the cell's error and what two honest laws of an effect differ by.
 

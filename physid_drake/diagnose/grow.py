@@ -18,7 +18,7 @@ from physid_drake.diagnose.confirm import (
     takes_most,
     worthwhile,
 )
-from physid_drake.diagnose.evidence import mismatch, unexplained
+from physid_drake.diagnose.evidence import mismatch, takes_enough, unexplained
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.left_out import comes_nearer
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
@@ -30,7 +30,7 @@ from physid_drake.effects import Effect
 from physid_drake.progress import Progress
 
 MOST_EFFECTS = 3
-LONGEST = 450  # rollouts per push, after the first score tests, after which only an answer is grown further
+LONGEST = 450  # rollouts per push, after the first score tests, after which only what may be right is grown further
 CANDIDATES = 4  # fitted in the first step, one less in each that follows
 WIDE = 2.0  # times the usual scatter of friction: it may be what is missing in disguise
 HOPELESS = 6.0  # cost per degree of freedom: two effects that leave as much are not made right by a third one
@@ -118,9 +118,10 @@ class Growth:
         most = min(MOST_EFFECTS, len(self.kinds))
 
         def may_grow(model: Fitted) -> bool:
-            # The first of two effects may take long to find its place: what would be the answer is looked at again.
-            answer = len(steps) > 0 and not unexplained(base.fitted, model)
-            return len(steps) < most and (answer or pool.count < longest)
+            # The first of two effects may take long to find its place: what would be the answer is looked at again,
+            # and what would be if the pushes were noisier.
+            near = takes_enough(base.fitted, model) or not unexplained(base.fitted, model)
+            return len(steps) < most and ((len(steps) > 0 and near) or pool.count < longest)
 
         more = may_grow(last.fitted)
         while more and last.p_value < self.alpha:

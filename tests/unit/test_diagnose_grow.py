@@ -337,8 +337,10 @@ def test_a_model_that_is_far_off_goes_to_a_better_theta_beside_its_effects(monke
     assert beside == [effects] and found.state.effects == effects
 
 
-@pytest.mark.parametrize(("left", "added"), [(2.0, 2), (4.0, 1)])
-def test_what_took_long_goes_on_only_if_it_would_be_the_answer(monkeypatch, left, added):
+@pytest.mark.parametrize(("left", "added"), [(2.0, 2), (11.0, 2), (15.0, 1)])
+def test_what_took_long_goes_on_only_if_it_would_be_the_answer_or_leaves_little_of_a_large_mismatch(
+    monkeypatch, left, added
+):
     pool = SimpleNamespace(count=0)
     costs = iter([left, 1.0])
 
