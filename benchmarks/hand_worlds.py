@@ -2,7 +2,8 @@
 
 Hands of the proof's worlds come from afar, go on at 0.05 to 0.5 m/s, brake and stay. Here the same scenes are pushed
 by hands that are slow (10 to 60 mm/s, with a force sensor), that go and brake as gently as people's arms do, that go
-round a bend, that halt on their way, or that begin where they touch and withdraw; or by ones low on the object.
+round a bend, that halt on their way, or that begin where they touch and withdraw; by ones low on the object; or by
+ones that are tracked no better than the object.
 Prints what was put in and what is said of it.
 """
 
@@ -144,7 +145,15 @@ def low(rng: Rng, scene: Scene) -> Scene:
     return dc.replace(scene, plan=dc.replace(scene.plan, tip_height=height))
 
 
-MANNERS = {"slow": slow, "gentle": gentle, "curved": curved, "halting": halting, "touching": touching, "low": low}
+def noisy(rng: Rng, scene: Scene) -> Scene:
+    """The hand is tracked no better than the object."""
+    return dc.replace(scene, noise=dc.replace(scene.noise, hand=scene.noise.position))
+
+
+MANNERS = {
+    "slow": slow, "gentle": gentle, "curved": curved, "halting": halting, "touching": touching, "low": low,
+    "noisy": noisy,
+}  # fmt: skip
 
 
 def along(scene: Scene, path) -> Scene:
