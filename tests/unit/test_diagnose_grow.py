@@ -338,9 +338,7 @@ def test_a_model_that_is_far_off_goes_to_a_better_theta_beside_its_effects(monke
 
 
 @pytest.mark.parametrize(("left", "added"), [(2.0, 2), (11.0, 2), (15.0, 1)])
-def test_what_took_long_goes_on_only_if_it_would_be_the_answer_or_leaves_little_of_a_large_mismatch(
-    monkeypatch, left, added
-):
+def test_what_took_long_goes_on_only_if_it_may_be_right(monkeypatch, left, added):
     pool = SimpleNamespace(count=0)
     costs = iter([left, 1.0])
 
