@@ -223,3 +223,14 @@ def test_far_off_the_best_fits_go_on_before_one_is_chosen(monkeypatch, step_of, 
     assert made == list(left)[:gone_on_with]
     assert len(step.found) == len(found) and step.found[0].name == first
     assert step.found[0].fitted.score == max(one.fitted.score for one in step.found)
+
+
+@pytest.mark.parametrize("in_order", [True, False])
+def test_frictions_that_follow_an_order_are_fitted_with_fresh_derivatives(monkeypatch, in_order):
+    """They may differ by a half, where the derivatives of the model before are those of a few percent."""
+    monkeypatch.setattr(confirm, "nearer_start", lambda fitter, before, one: "start")
+    made = []
+    fitter = SimpleNamespace(fit=lambda state, *, rounds, like: made.append((state, like)))
+    before = SimpleNamespace(reduced_chi2=1.0)
+    confirm._fit(fitter, before, SimpleNamespace(in_order=in_order))
+    assert made == [("start", None if in_order else before)]
