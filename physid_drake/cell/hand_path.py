@@ -89,6 +89,19 @@ class HandPath:
         return (falls[-1] * self.pieces, (falls[-1] + 1) * self.pieces) if falls and top > 0.0 else None
 
 
+@dataclass(frozen=True, kw_only=True)
+class PathError:
+    """One of the independent errors of a path that was fitted to a noisy stream.
+
+    Attributes:
+        path: the path with that error.
+        stds: so many standard deviations of it, at most 1: less where more would carry knots past each other.
+    """
+
+    path: HandPath
+    stds: float
+
+
 def subdivided(times: Array, pieces: int) -> Array:
     """Times (k,) with each interval cut into equal pieces: ((k - 1) pieces + 1,)."""
     inner = np.arange((len(times) - 1) * pieces + 1) / pieces

@@ -113,6 +113,25 @@ def numerics(case: Case, state: State) -> tuple[Array, ...]:
     return tuple(np.column_stack(own) for own in columns)
 
 
+def path_errors(case: Case, state: State, tick: Progress) -> tuple[Array, ...]:
+    """Per push (m, e): how the case's rollout changes with each of the errors that its hand's path may have.
+
+    By one standard deviation of the path, so that each push has an unknown multiple of them, as of ``numerics``.
+    """
+    fitter, count = Fitter(case), len(case.problems)
+    columns = []
+    for i, features in enumerate(case.features):
+        task = fitter.task(state, i)
+        errors = task.problem.path_errors
+        if errors:
+            tick("errors of the hand's path", i, count)
+        others = [dc.replace(task, problem=dc.replace(task.problem, path=error.path)) for error in errors]
+        base, *moved = fitter.vectors([task, *others]) if errors else [features.recorded]
+        own = [difference(base, one) / error.stds for one, error in zip(moved, errors, strict=True)]
+        columns.append(np.column_stack([np.zeros((len(base), 0)), *own]))
+    return tuple(columns)
+
+
 def _other_contact(config: CellConfig) -> CellConfig:
     other = "point" if config.contact.model == "hydroelastic" else "hydroelastic"
     return dc.replace(config, contact=dc.replace(config.contact, model=other))

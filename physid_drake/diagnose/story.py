@@ -21,7 +21,7 @@ from physid_drake.diagnose.loudness import as_loud_as_left, quieter
 from physid_drake.diagnose.memory import Memory
 from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.next_push import next_push
-from physid_drake.diagnose.plain import coarse, fit_plain, lost_pushes, nearest, numerics
+from physid_drake.diagnose.plain import coarse, fit_plain, lost_pushes, nearest, numerics, path_errors
 from physid_drake.diagnose.screen import (
     Screening,
     Signature,
@@ -206,7 +206,8 @@ def _looks(
     guard_kept, kept = memory.recall("guard"), memory.recall("signatures")
     if guard_kept is None:
         tick("numerics guard", 0, 0)
-        guard_kept = list(numerics(case, first.state))
+        own, of_path = numerics(case, first.state), path_errors(case, first.state, tick)
+        guard_kept = [np.column_stack(pair) for pair in zip(own, of_path, strict=True)]
         memory.keep("guard", guard_kept)
     fitter = Fitter(case)
     blank = empty_signatures(fitter, kinds)

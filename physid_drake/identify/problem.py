@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import CellConfig, HandPath, Start
-from physid_drake.cell.hand_fit import fit_hand_paths, stream_std
+from physid_drake.cell.hand_fit import fit_uncertain_paths, stream_std
+from physid_drake.cell.hand_path import PathError
 from physid_drake.identify.force_windows import force_windows
 from physid_drake.identify.frames import FEWEST_FREE, checks_of, push_checks_of
 from physid_drake.identify.hand_stream import beside_object, vertical_reach
@@ -32,6 +33,7 @@ DEFAULT_HAND_STD = 1e-4  # m
 DEFAULT_FORCE_STD = 0.05  # N
 LARGEST_CORRELATION = 0.98
 STANDING = 0.3  # area that the x and y axes of the tip span in the plane: less, and the tip lies
+NOTABLE_ERROR = 0.05  # of the tracker's deviation: what less of the hand does to the object is not seen
 DISPROVED = 2.0  # times what is stated of hand or force: noise that is seen to be louder is believed
 # A simulation without noise, or a tracker that is quiet at rest: below these the cell's own error is what differs.
 FINEST_POSITION = 1e-5  # m
@@ -136,6 +138,8 @@ class PushProblem:
         start: state at ``begin``.
         start_std: (3,) of the start pose [m, m, rad]; (6,) with the velocity where nothing pushes.
         path: the hand's; None without a hand.
+        path_errors: independent ones, which the noise of the hand's stream may have caused; without what is too small
+            to be seen.
         hand_height: of the contact above the table [m].
         hand_axes: (2, 2) the axes of P, as columns, along x and y of W; their mean over the push.
         times: (n,) of the compared poses [s].
@@ -164,6 +168,7 @@ class PushProblem:
     hand_axes: Array = field(default_factory=lambda: np.eye(2))
     pace: float = 1.0
     tip_height: float | None = None
+    path_errors: tuple[PathError, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -203,14 +208,21 @@ def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[Push
         check()
     hands = {k: beside_object(recording, push, height, noise.position) for k, push in enumerate(recording.pushes)}
     moving = {k: hand for k, hand in hands.items() if hand is not None}
-    fitted = fit_hand_paths([(hand.times, hand.positions[:, :2]) for hand in moving.values()], noise.hand)
+    streams = [(hand.times, hand.positions[:, :2]) for hand in moving.values()]
+    fitted = fit_uncertain_paths(streams, noise.hand, least=NOTABLE_ERROR * noise.position)
     paths = dict(zip(moving, fitted, strict=True))
-    return tuple(_problem(recording, k, hands[k], paths.get(k), noise, height) for k in hands)
+    return tuple(_problem(recording, k, hands[k], paths.get(k, (None, ())), noise, height) for k in hands)
 
 
 def _problem(
-    recording: Recording, order: int, hand: PoseStream | None, path: HandPath | None, noise: Noise, height: float
+    recording: Recording,
+    order: int,
+    hand: PoseStream | None,
+    fitted: tuple[HandPath | None, tuple[PathError, ...]],
+    noise: Noise,
+    height: float,
 ) -> PushProblem:
+    path, path_errors = fitted
     push = recording.pushes[order]
     for check in push_checks_of(recording, push):
         check()
@@ -227,6 +239,7 @@ def _problem(
         start=start,
         start_std=start_std,
         path=path,
+        path_errors=path_errors,
         hand_height=_contact_height(recording, hand, height),
         hand_axes=np.eye(2) if hand is None else _plane_axes(hand.quaternions),
         times=push.object.times[compared].copy(),

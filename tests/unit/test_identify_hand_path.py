@@ -4,14 +4,8 @@ import numpy as np
 import pytest
 
 from physid_drake.cell import HandPath, hand_fit
-from physid_drake.cell.hand_fit import (
-    MOST_KNOTS,
-    SMOOTH_RAMPS,
-    STRAIGHT,
-    fit_hand_path,
-    fit_hand_paths,
-    stream_std,
-)
+from physid_drake.cell.hand_curves import MOST_KNOTS, STRAIGHT
+from physid_drake.cell.hand_fit import SMOOTH_RAMPS, fit_hand_path, fit_hand_paths, stream_std
 
 STD = 5e-5  # m, of a good tracker of the hand
 

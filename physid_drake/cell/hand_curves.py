@@ -1,0 +1,301 @@
+"""Curves through the stream of a hand, by least squares: few knots, placed where they explain most."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import ClassVar, Final, NamedTuple
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from physid_drake.cell.hand_path import HandPath, subdivided
+
+Array = NDArray[np.float64]
+
+MOST_KNOTS, KNOTS_PER_SECOND = 24, 12.0  # whichever is more: an approach, a push and a retreat take twelve
+SHORTEST_PIECE = 2e-3  # s between knots
+PIECES = 24  # of a smooth ramp: speeds to 0.2 % of its height
+WIDER = 0.2  # at either end: where the fit of a smooth ramp starts
+HAIR = 1e-4  # s: for differences
+
+STRAIGHT: Final = Polynomial([0, 1])
+
+
+class Curve(NamedTuple):
+    """The best curve with given knots: its coefficients (m, 2), chi-square, and their space, columns of (m, f)."""
+
+    coefficients: Array
+    chi2: float
+    space: Array
+
+    @property
+    def rests(self) -> bool:
+        """Whether it was made to rest after its last knot."""
+        return bool(self.space.shape[1] < len(self.space))
+
+
+class StraightFit:
+    """Least squares of truncated parabolas: position = p0 + v0 t + sum c_j (t - k_j)_+^2."""
+
+    rest_worth: ClassVar[float] = 3.0  # prices of a knot: what rest after the last knot may cost
+
+    def __init__(self, times: Array, positions: Array, sigmas: Array) -> None:
+        self._take(times, positions, sigmas)
+        self._moving = self._starts_moving()
+        self.knots = self._settle(self._prune(self._place(self._grow())))
+
+    def _take(self, times: Array, positions: Array, sigmas: Array) -> None:
+        """Times (n,) from 0, positions (n, 2) and the standard deviations (n,) in units of which all is fitted."""
+        self.times, self._p, self._sigmas = times, positions, sigmas
+        self._scaled = positions / sigmas[:, None]
+        self._span = float(times[-1])
+        # One knot costs its place and two coefficients.
+        self._price = 3.0 * np.log(len(times)) + 4.0
+
+    @property
+    def criterion(self) -> float:
+        """Chi-square and the knots' price."""
+        return float(self.curve().chi2 + self._price * len(self.knots))
+
+    def curve(self) -> Curve:
+        """The best one with the knots that were found."""
+        return self._solve(self.knots, ended=True)
+
+    def path(self, origin: float) -> HandPath:
+        """The path, ``origin`` being the time of the stream's first sample [s]."""
+        return self.as_path(self.knots, self.curve().coefficients, origin)
+
+    def residuals(self) -> NDArray[np.complex128]:
+        """Recorded less fitted (n,), x + iy [m]."""
+        left = (self._scaled - self.design(self.knots) @ self.curve().coefficients) * self._sigmas[:, None]
+        return np.asarray(left[:, 0] + 1j * left[:, 1])
+
+    def velocities(self) -> NDArray[np.complex128]:
+        """Of the fit at the samples (n,), x + iy [m/s]."""
+        path = self.path(0.0)
+        moved = path.positions(self.times + HAIR) - path.positions(self.times - HAIR)
+        return np.asarray((moved[:, 0] + 1j * moved[:, 1]) / (2.0 * HAIR))
+
+    def with_jitter(self, jitter: float) -> StraightFit:
+        """The stream fitted again, its time stamps being late or early by a standard deviation [s]."""
+        return StraightFit(self.times, self._p, np.hypot(self._sigmas, jitter * np.abs(self.velocities())))
+
+    def _starts_moving(self) -> bool:
+        """Whether the stream begins in motion: a line through its first samples rises above the noise."""
+        n = min(len(self.times), 12)
+        t = self.times[:n] - self.times[:n].mean()
+        slope = t @ (self._p[:n] - self._p[:n].mean(axis=0)) / (t @ t)
+        return bool(np.linalg.norm(slope) > 5.0 * self._sigmas[:n].max() / np.sqrt(t @ t))
+
+    def design(self, knots: Array) -> Array:
+        """What each coefficient does to the samples (n, m), in their standard deviations."""
+        columns = [np.ones_like(self.times)]
+        if self._moving:
+            columns += [self.times / self._span]
+        columns += [np.maximum(self.times - k, 0.0) ** 2 / self._span**2 for k in knots]
+        return np.column_stack(columns) / self._sigmas[:, None]
+
+    def at_rest(self, knots: Array) -> Array:
+        """The space (m, m - 2) of coefficients with which velocity and acceleration vanish after the last knot."""
+        lead = 2 if self._moving else 1
+        rows = np.zeros((2, lead + len(knots)))
+        rows[0, lead:] = 1.0
+        rows[1, lead:] = -2.0 * knots / self._span
+        if self._moving:
+            rows[1, 1] = 1.0
+        return np.asarray(np.linalg.svd(rows)[2][2:].T, dtype=np.float64)
+
+    def _solve(self, knots: Array, *, ended: bool) -> Curve:
+        """The best curve; with rest after the last knot if the stream allows it."""
+        design = self.design(knots)
+        free = self._within(design, np.eye(design.shape[1]))
+        if not ended or len(knots) < 3:
+            return free
+        held = self._within(design, self.at_rest(knots))
+        return held if self._may_rest(held, free) else free
+
+    def _may_rest(self, held: Curve, free: Curve) -> bool:
+        """Whether a curve that rests after its last knot is good enough, beside one that goes on."""
+        return bool(held.chi2 - free.chi2 < 4.0 + self.rest_worth * self._price)
+
+    def _within(self, design: Array, space: Array) -> Curve:
+        """The best curve with coefficients in a space (m, f)."""
+        inner, *_ = np.linalg.lstsq(design @ space, self._scaled, rcond=1e-13)
+        coefficients: Array = space @ inner
+        return Curve(coefficients, float(((self._scaled - design @ coefficients) ** 2).sum()), space)
+
+    def _grow(self) -> Array:
+        candidates = self.times[1:-1]
+        columns = np.maximum(self.times[:, None] - candidates, 0.0) ** 2 / self._span**2 / self._sigmas[:, None]
+        knots = np.array([], dtype=np.float64)
+        while len(knots) < max(MOST_KNOTS, KNOTS_PER_SECOND * self._span):
+            design = self.design(knots)
+            q, _ = np.linalg.qr(design)
+            residual = self._scaled - q @ (q.T @ self._scaled)
+            if float((residual**2).sum()) < 2.0 * len(self.times):
+                break
+            free = columns - q @ (q.T @ columns)
+            norms = np.einsum("ij,ij->j", free, free)
+            gains = ((free.T @ residual) ** 2).sum(axis=1) / np.where(norms > 1e-18, norms, np.inf)
+            if len(knots):
+                gains[np.abs(candidates[:, None] - knots).min(axis=1) < SHORTEST_PIECE] = 0.0
+            best = int(np.argmax(gains))
+            if gains[best] < self._price:
+                break
+            knots = np.sort(np.append(knots, candidates[best]))
+            if len(knots) % 2 == 0:
+                placed = self._place(knots, evaluations=8)
+                # Two knots that merged would be added and merged again without end.
+                knots = placed if len(placed) == len(knots) else knots
+        return knots
+
+    def _place(self, knots: Array, evaluations: int = 40) -> Array:
+        """Move the knots to where the residual is least."""
+        if not len(knots):
+            return knots
+        moved = self._least(knots, evaluations, ended=False)
+        # Knots that merged must have been worth less than their price, or both are needed where they were.
+        allowed = (len(knots) - len(moved)) * self._price
+        if self._solve(moved, ended=False).chi2 > self._solve(knots, ended=False).chi2 + allowed:
+            return knots
+        return moved
+
+    def _settle(self, knots: Array) -> Array:
+        """Knots of a hand that rests at the end where they are best for that.
+
+        Where one that goes on would like them, rest takes the difference out of the speed before.
+        """
+        if len(knots) < 3:
+            return knots
+        moved = self._least(knots, 40, ended=True)
+        held, free = self._within(self.design(moved), self.at_rest(moved)), self._solve(knots, ended=False)
+        better = held.chi2 < self._within(self.design(knots), self.at_rest(knots)).chi2
+        return moved if len(moved) == len(knots) and better and self._may_rest(held, free) else knots
+
+    def _least(self, knots: Array, evaluations: int, *, ended: bool) -> Array:
+        """Knots of the least residual near others (variable projection, numerical Jacobian); fewer if some meet."""
+
+        def residual(places: Array) -> Array:
+            design = self.design(np.sort(places))
+            space = self.at_rest(np.sort(places)) if ended else np.eye(design.shape[1])
+            return np.asarray((self._scaled - design @ self._within(design, space).coefficients).ravel())
+
+        found = least_squares(
+            residual, knots, bounds=(-0.5 * SHORTEST_PIECE, self._span), x_scale=0.01, max_nfev=evaluations
+        )
+        return self._separate(np.sort(found.x))
+
+    def _separate(self, knots: Array) -> Array:
+        kept = [float(knots[0])]
+        for k in knots[1:]:
+            if k - kept[-1] >= SHORTEST_PIECE:
+                kept.append(float(k))
+        return np.array(kept)
+
+    def _prune(self, knots: Array) -> Array:
+        """Take away knots that are not worth their price."""
+        while len(knots) > 2:
+            chi2 = self._solve(knots, ended=True).chi2
+            trials = [np.delete(knots, j) for j in range(len(knots))]
+            values = [self._solve(trial, ended=True).chi2 for trial in trials]
+            best = int(np.argmin(values))
+            if values[best] - chi2 > self._price:
+                moved = self._place(trials[best], evaluations=15)
+                if self._solve(moved, ended=True).chi2 - chi2 > self._price:
+                    return knots
+                knots = moved
+            else:
+                knots = self._place(trials[best], evaluations=15)
+        return knots
+
+    def as_path(self, knots: Array, coefficients: Array, origin: float) -> HandPath:
+        """The path of any knots and coefficients, ``origin`` being the time of the stream's first sample [s]."""
+        lead = 2 if self._moving else 1
+        v0 = coefficients[1] / self._span if self._moving else np.zeros(2)
+        ends = np.array([0.0, *knots, max(self._span, float(knots[-1]) + SHORTEST_PIECE if len(knots) else 0.0)])
+        grid = np.unique(np.maximum(ends, 0.0))
+        slopes = 2.0 * np.maximum(grid[:, None] - knots, 0.0) / self._span**2
+        velocities = v0 + slopes @ coefficients[lead:]
+        velocities[np.linalg.norm(velocities, axis=1) < 1e-6] = 0.0
+        shift = np.maximum(0.0 - knots, 0.0) ** 2 / self._span**2 @ coefficients[lead:]
+        return HandPath(times=origin + grid, velocities=velocities, start=coefficients[0] + shift)
+
+
+class SmoothFit(StraightFit):
+    """The same where the hand starts and brakes along smooth ramps of speed: position = p0 + sum v_k Phi_k(t)."""
+
+    rest_worth: ClassVar[float] = 1.0
+
+    def __init__(self, straight: StraightFit, ramp: Polynomial) -> None:
+        self._take(straight.times, straight._p, straight._sigmas)
+        self._moving = straight._moving
+        self._ramp = ramp
+        self._straight_way, self._smooth_way = STRAIGHT.integ(), ramp.integ()
+        self.knots = self._settle(self._prune(self._place(np.clip(_widened(straight.knots), 0.0, self._span))))
+
+    def _ramp_after(self, k: int, count: int) -> Polynomial:
+        """The shape of the speed between knots k and k + 1: smooth from and to rest, else straight."""
+        return self._ramp if self._is_smooth(k, count) else STRAIGHT
+
+    def _is_smooth(self, k: int, count: int) -> bool:
+        return (k == 0 and not self._moving) or k == count - 2
+
+    def design(self, knots: Array) -> Array:
+        """As of straight ramps; the coefficients are speeds at the knots."""
+        spans = pairwise(knots.tolist())
+        count = len(knots)
+        rises = [self._rise(*span, smooth=self._is_smooth(k, count)) for k, span in enumerate(spans)]
+        # The way of a hand whose speed is 1 at a knot and 0 at the others; before and after them it does not change.
+        ups, downs = [self.times, *rises], [*rises, np.zeros_like(self.times)]
+        columns = [up - down for up, down in zip(ups, downs, strict=True)] if len(knots) else []
+        # A hand that rests before the first knot has no speed there.
+        columns = [np.ones_like(self.times), *(columns if self._moving else columns[1:])]
+        return np.column_stack(columns) / self._sigmas[:, None]
+
+    def _rise(self, begin: float, end: float, *, smooth: bool) -> Array:
+        """Way (n,) of a hand that is at rest before ``begin`` and has the speed 1 after ``end``."""
+        x = np.clip((self.times - begin) / max(end - begin, 1e-9), 0.0, 1.0)
+        along = self._smooth_way if smooth else self._straight_way
+        way: Array = (end - begin) * along(x) + np.maximum(self.times - end, 0.0)
+        return way
+
+    def at_rest(self, knots: Array) -> Array:
+        """The space of coefficients with which the hand has no speed at the last knot."""
+        return np.eye(len(knots) + (1 if self._moving else 0))[:, :-1]
+
+    def as_path(self, knots: Array, coefficients: Array, origin: float) -> HandPath:
+        """As of straight ramps; those that are smooth are short straight pieces.
+
+        Before the first knot and after the last the speed does not change.
+        """
+        speeds = coefficients[1:] if self._moving else np.vstack([np.zeros(2), coefficients[1:]])
+        ramps = [STRAIGHT, *(self._ramp_after(k, len(knots)) for k in range(len(knots) - 1))]
+        ends, speeds = np.array([min(0.0, knots[0] - SHORTEST_PIECE), *knots]), np.vstack([speeds[:1], speeds])
+        if self._span > knots[-1]:
+            ends, speeds = np.append(ends, self._span), np.vstack([speeds, speeds[-1:]])
+            ramps.append(STRAIGHT)
+        parts = np.arange(PIECES) / PIECES
+        inner = [a + (b - a) * ramp(parts)[:, None] for ramp, (a, b) in zip(ramps, pairwise(speeds), strict=True)]
+        velocities = np.vstack([*inner, speeds[-1:]])
+        velocities[np.linalg.norm(velocities, axis=1) < 1e-6] = 0.0
+        path = HandPath(times=subdivided(ends, PIECES), velocities=velocities, start=coefficients[0], pieces=PIECES)
+        # The coefficients say where the hand is at time 0.
+        start = 2.0 * path.start - path.positions(np.zeros(1))[0]
+        return replace(path, times=origin + path.times, start=start)
+
+
+def _widened(knots: Array) -> Array:
+    """Knots (k,) with longer first and last pieces: straight ones lie along the steep part of a smooth ramp."""
+    wide = knots.copy()
+    if len(knots) < 4:
+        return wide
+    for first, last in ((0, 1), (-2, -1)):
+        more = WIDER * (knots[last] - knots[first])
+        wide[first], wide[last] = knots[first] - more, knots[last] + more
+    inner = 0.25 * (knots[-2] - knots[1])  # what stands between the ramps keeps half of its length
+    wide[1], wide[-2] = min(wide[1], knots[1] + inner), max(wide[-2], knots[-2] - inner)
+    wide[2:-2] = np.clip(wide[2:-2], wide[1] + SHORTEST_PIECE, wide[-2] - SHORTEST_PIECE)
+    return np.asarray(np.sort(wide))

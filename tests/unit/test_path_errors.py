@@ -1,0 +1,90 @@
+"""What a fitted path may be off by, against what fits of one path under many noises are off by."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from physid_drake.cell import HandPath
+from physid_drake.cell.hand_curves import STRAIGHT
+from physid_drake.cell.hand_fit import SMOOTH_RAMPS, fit_uncertain_paths
+from physid_drake.cell.hand_path import subdivided
+
+STD = 3e-4  # m
+TIMES = np.arange(0.0, 1.2, 0.01)
+PIECES = 24
+
+
+def path_of(ramp, speed=0.3):
+    """At rest, a ramp, a cruise, a brake, at rest."""
+    ends, speeds = np.array([0.2, 0.4, 0.8, 1.0]), [0.0, speed, speed, 0.0]
+    parts = ramp(np.arange(PIECES) / PIECES)
+    along = np.concatenate([a + (b - a) * parts for a, b in pairwise(speeds)] + [[0.0]])
+    velocities = np.outer(along, [0.8, 0.6])
+    return HandPath(times=subdivided(ends, PIECES), velocities=velocities, start=np.array([0.1, 0.2]))
+
+
+def fitted(path, seeds, least=0.0):
+    """Fits of one robot that goes the same way again and again."""
+    noises = (np.random.default_rng(seed).standard_normal((len(TIMES), 2)) for seed in seeds)
+    streams = [(TIMES, path.positions(TIMES) + STD * noise) for noise in noises]
+    return fit_uncertain_paths(streams, STD, least=least)
+
+
+def changes(path, errors, of):
+    """What one standard deviation of each error does to a feature (f,) of a path: (e, f)."""
+    return np.array([(of(error.path) - of(path)) / error.stds for error in errors])
+
+
+RAMPS = {"straight": STRAIGHT, "smooth": SMOOTH_RAMPS[0]}
+ENOUGH = 12  # streams: their ramps are seen
+LEAST = 6e-5  # m
+
+
+def features(path):
+    """Where the hand is under way and in the end, and its speed: (8,)."""
+    places = path.positions(np.array([0.5, 0.7, 1.15]))
+    return np.concatenate([places.ravel(), (places[1] - places[0]) / 0.2])
+
+
+@pytest.mark.parametrize("ramp", RAMPS)
+def test_each_error_is_one_standard_deviation_of_the_stream_and_independent_of_the_others(ramp):
+    for path, errors in fitted(path_of(RAMPS[ramp]), range(ENOUGH)):
+        moved = changes(path, errors, lambda p: p.positions(TIMES).ravel() / STD)
+        # 0.09 where ramps are smooth; a corner of straight ones moves in a straight line for a part of its way only.
+        np.testing.assert_allclose(moved @ moved.T, np.eye(len(errors)), atol=0.15 if ramp == "smooth" else 0.6)
+        assert len(errors) == 10  # three coefficients each for x and y, and four knots
+
+
+@pytest.mark.parametrize("ramp", RAMPS)
+def test_fits_are_off_by_as_much_as_their_errors_say(ramp):
+    truth = path_of(RAMPS[ramp])
+    off = [
+        (features(path) - features(truth)) / np.linalg.norm(changes(path, errors, features), axis=0)
+        for path, errors in fitted(truth, range(60))
+    ]
+    assert np.abs(np.sqrt(np.mean(np.square(off), axis=0)) - 1.0).max() < 0.3  # of standard deviations; 0.19
+
+
+def test_the_place_of_a_hand_that_stands_is_known():
+    path = HandPath(times=np.array([0.0, 1.0]), velocities=np.zeros((2, 2)), start=np.array([0.1, 0.2]))
+    [(found, errors)] = fitted(path, [0])
+    assert errors == ()
+    assert np.linalg.norm(found.positions(TIMES) - path.start, axis=1).max() < STD
+
+
+def test_errors_that_hardly_move_the_hand_are_left_out():
+    path = path_of(STRAIGHT)
+    [(found, all_of_them)], [(_, large)] = fitted(path, [0]), fitted(path, [0], least=LEAST)
+    sizes = [
+        np.linalg.norm(error.path.positions(TIMES) - found.positions(TIMES), axis=1).max() / error.stds
+        for error in all_of_them
+    ]
+    assert 0 < len(large) < len(all_of_them)
+    assert len(large) == sum(size >= LEAST for size in sizes)
+
+
+def test_of_a_few_samples_no_error_is_known():
+    [(path, errors)] = fit_uncertain_paths([(TIMES[:3], np.zeros((3, 2)))], STD, least=0.0)
+    assert errors == ()
+    assert len(path.times) == 4
