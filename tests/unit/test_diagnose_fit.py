@@ -8,10 +8,11 @@ import pytest
 from runs import shipped_pushes
 
 from physid_drake.cell import CellConfig
+from physid_drake.cell.hand_path import PathError
 from physid_drake.diagnose import case_of
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint
-from physid_drake.diagnose.plain import coarse, search_theta
+from physid_drake.diagnose.plain import coarse, path_errors, search_theta
 from physid_drake.diagnose.screen import score, signatures
 from physid_drake.diagnose.starts import nearer_start
 from physid_drake.effects.body import ComOffset
@@ -216,3 +217,22 @@ def test_a_friction_that_falls_from_push_to_push_does_not_count_twice(fitter):
     assert np.ptp(frictions(before.state)) > 2.0
     assert np.ptp(frictions(start)) < 0.5 * np.ptp(frictions(before.state))
     assert start.effects[0].effect(told.case).per_push == pytest.approx(-0.08, rel=0.3)
+
+
+def test_what_errors_of_the_path_do_is_how_much_further_the_object_goes():
+    """Of a push that does not turn it, as much as the hand: by 0.2 mm per deviation, of which half was rolled out."""
+    central, std = 7, 2e-4
+    config = CellConfig()
+    config.contact.model = "point"
+    case = coarse(case_of(shipped_pushes(central + 1), config, ThetaConfig(), jobs=1))
+    path = case.problems[central].path
+    ahead = np.array([np.cos(path.heading), np.sin(path.heading)])
+    further = PathError(path=dc.replace(path, start=path.start + 0.5 * std * ahead), stds=0.5)
+    problems = tuple(
+        dc.replace(p, path_errors=(further,) if i == central else ()) for i, p in enumerate(case.problems)
+    )
+    case = dc.replace(case, problems=problems)
+    columns = path_errors(case, Fitter(case).start(np.full(3, 0.5)), lambda *_: None)
+    assert [c.shape[1] for c in columns] == [0] * central + [1]
+    end = case.features[central].poses(columns[central][:, 0])[-1]
+    assert end[:2] @ ahead == pytest.approx(std, rel=0.02)  # 0.998 of it
