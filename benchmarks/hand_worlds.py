@@ -3,7 +3,7 @@
 Hands of the proof's worlds come from afar, go on at 0.05 to 0.5 m/s, brake and stay. Here the same scenes are pushed
 by hands that are slow (10 to 60 mm/s, with a force sensor), that go and brake as gently as people's arms do, that go
 round a bend, that halt on their way, or that begin where they touch and withdraw; by ones low on the object; or by
-ones that are tracked no better than the object.
+ones that are tracked no better than the object, or with a slow noise.
 Prints what was put in and what is said of it.
 """
 
@@ -14,6 +14,7 @@ import math
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from scipy import signal
 
 from physid_drake.diagnose import case_of, cell_config, diagnose
 from physid_drake.identify.config import ThetaConfig
@@ -22,10 +23,11 @@ from physid_drake.prove.make import simulate
 from physid_drake.prove.scene import DrawnPush, Rng, Scene, draw_scene
 from physid_drake.prove.sensing import record, recording_of
 from physid_drake.prove.world_plan import HandPath
-from physid_drake.recording import Recording
+from physid_drake.recording import Push, Recording
 
 SPEEDS = (0.01, 0.06)  # m/s, of slow hands
 BRAKE = 0.1  # s
+WANDERS, MEMORY = 3e-4, 0.05  # m, s: a slow noise of the hand
 FORCE, RATE = 0.02, 100.0  # N, Hz
 
 
@@ -61,6 +63,8 @@ def world(manner: str, seed: int, effect: str | None, share: float) -> tuple[Rec
     effects = [] if effect is None else [strong(rng, scene, effect, share)]
     motions = simulate(scene, effects)
     pushes = [record(rng, scene, k, motion)[0] for k, motion in enumerate(motions)]
+    if manner == "wandering":
+        pushes = [wandered(rng, push, 1.0 / scene.rate) for push in pushes]
     return recording_of(f"{manner} {seed}", scene, pushes, effect == "actuator_lag"), scene.noise.position
 
 
@@ -150,9 +154,22 @@ def noisy(rng: Rng, scene: Scene) -> Scene:
     return dc.replace(scene, noise=dc.replace(scene.noise, hand=scene.noise.position))
 
 
+def wandering(rng: Rng, scene: Scene) -> Scene:
+    """The hand's noise remembers 50 ms (``wandered``), and nothing is stated of it."""
+    return dc.replace(scene, sensors_stated=False, noise=dc.replace(scene.noise, hand=1e-5))
+
+
+def wandered(rng: Rng, push: Push, interval: float) -> Push:
+    """A push with a first-order autoregressive noise of the hand."""
+    keeps, steps = math.exp(-interval / MEMORY), rng.standard_normal(push.hand.positions.shape)
+    steps[1:] *= math.sqrt(1.0 - keeps**2)
+    noise = WANDERS * signal.lfilter([1.0], [1.0, -keeps], steps, axis=0)
+    return dc.replace(push, hand=dc.replace(push.hand, positions=push.hand.positions + noise))
+
+
 MANNERS = {
     "slow": slow, "gentle": gentle, "curved": curved, "halting": halting, "touching": touching, "low": low,
-    "noisy": noisy,
+    "noisy": noisy, "wandering": wandering,
 }  # fmt: skip
 
 

@@ -42,15 +42,16 @@ class StraightFit:
 
     rest_worth: ClassVar[float] = 3.0  # prices of a knot: what rest after the last knot may cost
 
-    def __init__(self, times: Array, positions: Array, sigmas: Array) -> None:
-        self._take(times, positions, sigmas)
+    def __init__(self, times: Array, positions: Array, sigmas: Array, memory: float = 0.0) -> None:
+        self._take(times, positions, sigmas, memory)
         self._moving = self._starts_moving()
         self.knots = self._settle(self._prune(self._place(self._grow())))
 
-    def _take(self, times: Array, positions: Array, sigmas: Array) -> None:
-        """Times (n,) from 0, positions (n, 2) and the standard deviations (n,) in units of which all is fitted."""
-        self.times, self._p, self._sigmas = times, positions, sigmas
-        self._scaled = positions / sigmas[:, None]
+    def _take(self, times: Array, positions: Array, sigmas: Array, memory: float) -> None:
+        """Times (n,) from 0, positions (n, 2), and their noise: standard deviations (n,) and correlation time [s]."""
+        self.times, self._p, self._sigmas, self._memory = times, positions, sigmas, memory
+        self._keeps = np.exp(-np.diff(times) / memory) if memory > 0.0 else np.zeros(len(times) - 1)
+        self._scaled = self._white(positions)
         self._span = float(times[-1])
         # One knot costs its place and two coefficients.
         self._price = 3.0 * np.log(len(times)) + 4.0
@@ -59,6 +60,14 @@ class StraightFit:
     def criterion(self) -> float:
         """Chi-square and the knots' price."""
         return float(self.curve().chi2 + self._price * len(self.knots))
+
+    def _white(self, columns: Array) -> Array:
+        """Samples (n, c) in standard deviations, less what each keeps of the noise of the one before."""
+        scaled: Array = columns / self._sigmas[:, None]
+        if self._memory <= 0.0:
+            return scaled
+        keeps = self._keeps[:, None]
+        return np.vstack([scaled[:1], (scaled[1:] - keeps * scaled[:-1]) / np.sqrt(1.0 - keeps**2)])
 
     def curve(self) -> Curve:
         """The best one with the knots that were found."""
@@ -70,7 +79,7 @@ class StraightFit:
 
     def residuals(self) -> NDArray[np.complex128]:
         """Recorded less fitted (n,), x + iy [m]."""
-        left = (self._scaled - self.design(self.knots) @ self.curve().coefficients) * self._sigmas[:, None]
+        left = self._p - self._columns(self.knots) @ self.curve().coefficients
         return np.asarray(left[:, 0] + 1j * left[:, 1])
 
     def velocities(self) -> NDArray[np.complex128]:
@@ -81,22 +90,26 @@ class StraightFit:
 
     def with_jitter(self, jitter: float) -> StraightFit:
         """The stream fitted again, its time stamps being late or early by a standard deviation [s]."""
-        return StraightFit(self.times, self._p, np.hypot(self._sigmas, jitter * np.abs(self.velocities())))
+        sigmas = np.hypot(self._sigmas, jitter * np.abs(self.velocities()))
+        return StraightFit(self.times, self._p, sigmas, self._memory)
 
     def _starts_moving(self) -> bool:
         """Whether the stream begins in motion: a line through its first samples rises above the noise."""
-        n = min(len(self.times), 12)
-        t = self.times[:n] - self.times[:n].mean()
-        slope = t @ (self._p[:n] - self._p[:n].mean(axis=0)) / (t @ t)
-        return bool(np.linalg.norm(slope) > 5.0 * self._sigmas[:n].max() / np.sqrt(t @ t))
+        line = self._white(np.column_stack([np.ones_like(self.times), self.times]))[:12]
+        spread = np.linalg.inv(line.T @ line)
+        slope = spread[1] @ line.T @ self._scaled[:12]
+        return bool(np.linalg.norm(slope) > 5.0 * np.sqrt(spread[1, 1]))
 
     def design(self, knots: Array) -> Array:
         """What each coefficient does to the samples (n, m), in their standard deviations."""
+        return self._white(self._columns(knots))
+
+    def _columns(self, knots: Array) -> Array:
         columns = [np.ones_like(self.times)]
         if self._moving:
             columns += [self.times / self._span]
         columns += [np.maximum(self.times - k, 0.0) ** 2 / self._span**2 for k in knots]
-        return np.column_stack(columns) / self._sigmas[:, None]
+        return np.column_stack(columns)
 
     def at_rest(self, knots: Array) -> Array:
         """The space (m, m - 2) of coefficients with which velocity and acceleration vanish after the last knot."""
@@ -129,7 +142,7 @@ class StraightFit:
 
     def _grow(self) -> Array:
         candidates = self.times[1:-1]
-        columns = np.maximum(self.times[:, None] - candidates, 0.0) ** 2 / self._span**2 / self._sigmas[:, None]
+        columns = self._white(np.maximum(self.times[:, None] - candidates, 0.0) ** 2 / self._span**2)
         knots = np.array([], dtype=np.float64)
         while len(knots) < max(MOST_KNOTS, KNOTS_PER_SECOND * self._span):
             design = self.design(knots)
@@ -230,7 +243,7 @@ class SmoothFit(StraightFit):
     rest_worth: ClassVar[float] = 1.0
 
     def __init__(self, straight: StraightFit, ramp: Polynomial) -> None:
-        self._take(straight.times, straight._p, straight._sigmas)
+        self._take(straight.times, straight._p, straight._sigmas, straight._memory)
         self._moving = straight._moving
         self._ramp = ramp
         self._straight_way, self._smooth_way = STRAIGHT.integ(), ramp.integ()
@@ -243,7 +256,7 @@ class SmoothFit(StraightFit):
     def _is_smooth(self, k: int, count: int) -> bool:
         return (k == 0 and not self._moving) or k == count - 2
 
-    def design(self, knots: Array) -> Array:
+    def _columns(self, knots: Array) -> Array:
         """As of straight ramps; the coefficients are speeds at the knots."""
         spans = pairwise(knots.tolist())
         count = len(knots)
@@ -253,7 +266,7 @@ class SmoothFit(StraightFit):
         columns = [up - down for up, down in zip(ups, downs, strict=True)] if len(knots) else []
         # A hand that rests before the first knot has no speed there.
         columns = [np.ones_like(self.times), *(columns if self._moving else columns[1:])]
-        return np.column_stack(columns) / self._sigmas[:, None]
+        return np.column_stack(columns)
 
     def _rise(self, begin: float, end: float, *, smooth: bool) -> Array:
         """Way (n,) of a hand that is at rest before ``begin`` and has the speed 1 after ``end``."""

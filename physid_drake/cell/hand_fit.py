@@ -34,14 +34,16 @@ MEDIAN_OF_NORMAL = 0.6745  # of the absolute value, over the standard deviation
 SMOOTH_RAMPS: Final = (Polynomial([0, 0, 3, -2]), Polynomial([0, 0, 0, 10, -15, 6]))
 
 
-def fit_hand_paths(streams: Sequence[tuple[Array, Array]], std: float | None) -> tuple[HandPath, ...]:
+def fit_hand_paths(
+    streams: Sequence[tuple[Array, Array]], std: float | None, *, memory: float = 0.0
+) -> tuple[HandPath, ...]:
     """The paths of ``fit_uncertain_paths``, taken for exact."""
-    fits = _fits_of(streams, std)
+    fits = _fits_of(streams, std, memory)
     return tuple(_path_of(fits.get(k), stream) for k, stream in enumerate(streams))
 
 
 def fit_uncertain_paths(
-    streams: Sequence[tuple[Array, Array]], std: float | None, *, least: float
+    streams: Sequence[tuple[Array, Array]], std: float | None, *, least: float, memory: float = 0.0
 ) -> tuple[tuple[HandPath, tuple[PathError, ...]], ...]:
     """The paths with the fewest knots that explain the streams of one robot.
 
@@ -54,12 +56,13 @@ def fit_uncertain_paths(
         streams: per push times (n,) [s], n >= 2, and positions (n, 2) [m].
         std: standard deviation of one position [m]; None estimates it from third differences.
         least: errors that move the hand by less [m] are left out.
+        memory: correlation time of the noise [s], a first-order autoregressive process; 0 is white.
 
     Returns:
         Per push its path and the independent errors that the noise of its stream lets it have. Of a stream of fewer
         than six samples none are known.
     """
-    fits = _fits_of(streams, std)
+    fits = _fits_of(streams, std, memory)
     errors = {k: path_errors(fit, float(streams[k][0][0]), least) for k, fit in fits.items()}
     return tuple((_path_of(fits.get(k), stream), errors.get(k, ())) for k, stream in enumerate(streams))
 
@@ -68,9 +71,9 @@ def _path_of(fit: StraightFit | None, stream: tuple[Array, Array]) -> HandPath:
     return _polygon_path(*stream) if fit is None else fit.path(float(stream[0][0]))
 
 
-def _fits_of(streams: Sequence[tuple[Array, Array]], std: float | None) -> dict[int, StraightFit]:
+def _fits_of(streams: Sequence[tuple[Array, Array]], std: float | None, memory: float) -> dict[int, StraightFit]:
     """Of the streams that are long enough, by their number."""
-    best = {k: _fit_of(*stream, std) for k, stream in enumerate(streams) if len(stream[0]) >= 6}
+    best = {k: _fit_of(*stream, std, memory) for k, stream in enumerate(streams) if len(stream[0]) >= 6}
     jitter = _jitter_of(list(best.values()))
     if jitter > 0.0:
         best = {k: fit.with_jitter(jitter) for k, fit in best.items()}
@@ -117,9 +120,9 @@ def fit_hand_path(times: Array, positions: Array, std: float | None) -> HandPath
     return fit_hand_paths([(times, positions)], std)[0]
 
 
-def _fit_of(times: Array, positions: Array, std: float | None) -> StraightFit:
+def _fit_of(times: Array, positions: Array, std: float | None, memory: float = 0.0) -> StraightFit:
     sigma = max(std if std is not None else stream_std(positions), SMALLEST_STD)
-    return StraightFit(times - times[0], positions, np.full(len(times), sigma))
+    return StraightFit(times - times[0], positions, np.full(len(times), sigma), memory)
 
 
 def stream_std(positions: Array) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -24,6 +25,8 @@ from physid_drake.recording import (
     estimate_noise,
     rest_segments,
 )
+from physid_drake.recording.rest_noise import SILENT, seen_noise
+from physid_drake.recording.rests import rests_of
 
 Array = NDArray[np.float64]
 
@@ -34,13 +37,15 @@ DEFAULT_FORCE_STD = 0.05  # N
 LARGEST_CORRELATION = 0.98
 STANDING = 0.3  # area that the x and y axes of the tip span in the plane: less, and the tip lies
 NOTABLE_ERROR = 0.05  # of the tracker's deviation: what less of the hand does to the object is not seen
+SLOW_NOISE = 1.5  # samples: a hand's noise that remembers less is white, as one of robots' joints nearly is
+CLEAR = 0.3  # of the logarithm of its variance: noise that is known so well may be slow
+ROUGHER = 1.3  # times the third differences of the noise at rest
 DISPROVED = 2.0  # times what is stated of hand or force: noise that is seen to be louder is believed
 # A simulation without noise, or a tracker that is quiet at rest: below these the cell's own error is what differs.
 FINEST_POSITION = 1e-5  # m
 FINEST_ROTATION = 1e-4  # rad
 FINEST_HAND = 1e-6  # m
 FINEST_FORCE = 1e-3  # N
-SILENT = 0.1  # of the finest: a rest that is quieter than that tells no noise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +56,7 @@ class Noise:
         position: of the object's x and y [m].
         rotation: of its yaw [rad].
         hand: of the hand's x and y [m].
+        hand_memory: correlation time of that [s]; 0 is white.
         force: of a force component [N].
         position_correlation, rotation_correlation: of either noise between neighbouring samples [-].
         source: where each figure comes from: ``stated``, ``seen`` or ``assumed``.
@@ -63,6 +69,7 @@ class Noise:
     position_correlation: float
     rotation_correlation: float
     source: dict[str, str]
+    hand_memory: float = 0.0
 
     @property
     def sigmas(self) -> Array:
@@ -84,6 +91,7 @@ def noise_of(recording: Recording) -> Noise:
     """The recording's noise: what its sensors state, else what is seen at rest, else an assumption."""
     seen: NoiseEstimate = estimate_noise(recording)
     stated = recording.sensors
+    hand_std, hand_memory = _hand_noise(recording)
     source: dict[str, str] = {}
 
     def choose(name: str, said: float | None, estimate: float | None, assumed: float, finest: float) -> float:
@@ -105,10 +113,11 @@ def noise_of(recording: Recording) -> Noise:
     return Noise(
         position=choose("position", *place, DEFAULT_POSITION_STD, FINEST_POSITION),
         rotation=choose("rotation", *turn, DEFAULT_ROTATION_STD, FINEST_ROTATION),
-        hand=choose("hand", stated.hand_position_std, _hand_std(recording), DEFAULT_HAND_STD, FINEST_HAND),
+        hand=choose("hand", stated.hand_position_std, hand_std, DEFAULT_HAND_STD, FINEST_HAND),
         force=choose("force", stated.force_std, seen.force_std, DEFAULT_FORCE_STD, FINEST_FORCE),
         position_correlation=_correlation(seen.position_autocorrelation, seen.rotation_autocorrelation),
         rotation_correlation=_correlation(seen.rotation_autocorrelation, seen.position_autocorrelation),
+        hand_memory=hand_memory,
         source=source,
     )
 
@@ -119,12 +128,24 @@ def _correlation(own: float | None, other: float | None) -> float:
     return 0.0 if seen is None else float(np.clip(seen, 0.0, LARGEST_CORRELATION))
 
 
-def _hand_std(recording: Recording) -> float | None:
-    """Noise of the hand's stream, also where it creeps so slowly that it looks at rest [m]."""
-    streams = [
-        push.hand.positions[:, :2] for push in recording.pushes if push.hand is not None and len(push.hand) > 6
-    ]
-    return float(np.median([stream_std(positions) for positions in streams])) if streams else None
+def _hand_noise(recording: Recording) -> tuple[float | None, float]:
+    """Standard deviation [m] and correlation time [s] of the hand's noise.
+
+    Taken for white, as it shows where a hand creeps so slowly that it looks at rest, unless rests clearly tell more.
+    """
+    hands = [push.hand for push in recording.pushes if push.hand is not None and len(push.hand) > 6]
+    if not hands:
+        return None, 0.0
+    white = float(np.median([stream_std(hand.positions[:, :2]) for hand in hands]))
+    rests = [(hand.times[r], hand.positions[r, k]) for hand in hands for r in rests_of(hand) for k in (0, 1)]
+    seen = seen_noise(rests, FINEST_HAND)
+    interval = float(np.median(np.concatenate([np.diff(hand.times) for hand in hands])))
+    if seen is None or seen.doubt > CLEAR or seen.correlation_time < SLOW_NOISE * interval:
+        return white, 0.0
+    # What such noise makes of third differences: a hand that moves may be noisier than one that rests.
+    kept = math.exp(-interval / seen.correlation_time)
+    rough = seen.std * math.sqrt(max(0.0, 1.0 - 1.5 * kept + 0.6 * kept**2 - 0.1 * kept**3))
+    return (seen.std, seen.correlation_time) if white < ROUGHER * rough else (white, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -209,7 +230,9 @@ def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[Push
     hands = {k: beside_object(recording, push, height, noise.position) for k, push in enumerate(recording.pushes)}
     moving = {k: hand for k, hand in hands.items() if hand is not None}
     streams = [(hand.times, hand.positions[:, :2]) for hand in moving.values()]
-    fitted = fit_uncertain_paths(streams, noise.hand, least=NOTABLE_ERROR * noise.position)
+    fitted = fit_uncertain_paths(
+        streams, noise.hand, least=NOTABLE_ERROR * noise.position, memory=noise.hand_memory
+    )  # fmt: skip
     paths = dict(zip(moving, fitted, strict=True))
     return tuple(_problem(recording, k, hands[k], paths.get(k, (None, ())), noise, height) for k in hands)
 

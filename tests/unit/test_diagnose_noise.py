@@ -11,9 +11,10 @@ from scipy import stats
 from physid_drake.diagnose import noise as noise_module
 from physid_drake.diagnose.evidence import SLACK
 from physid_drake.diagnose.features import features_of
-from physid_drake.diagnose.noise import SeenNoise, _jitter, _roughness, seen_noise, tracker_noise
+from physid_drake.diagnose.noise import _jitter, _roughness, tracker_noise
 from physid_drake.identify.problem import problems_of
 from physid_drake.recording import PoseStream, Push, rest_segments
+from physid_drake.recording.rest_noise import SeenNoise, seen_noise
 
 RNG = np.random.default_rng(7)
 

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from physid_drake.cell import HandPath
 from physid_drake.cell.hand_curves import STRAIGHT
@@ -24,11 +25,13 @@ def path_of(ramp, speed=0.3):
     return HandPath(times=subdivided(ends, PIECES), velocities=velocities, start=np.array([0.1, 0.2]))
 
 
-def fitted(path, seeds, least=0.0):
-    """Fits of one robot that goes the same way again and again."""
+def fitted(path, seeds, least=0.0, memory=0.0, told=True):
+    """Fits of one robot that goes the same way again and again, its noise slow or white."""
+    keeps = np.exp(-0.01 / memory) if memory else 0.0
     noises = (np.random.default_rng(seed).standard_normal((len(TIMES), 2)) for seed in seeds)
-    streams = [(TIMES, path.positions(TIMES) + STD * noise) for noise in noises]
-    return fit_uncertain_paths(streams, STD, least=least)
+    slow = (np.vstack([noise[:1], np.sqrt(1.0 - keeps**2) * noise[1:]]) for noise in noises)
+    streams = [(TIMES, path.positions(TIMES) + STD * lfilter([1.0], [1.0, -keeps], s, axis=0)) for s in slow]
+    return fit_uncertain_paths(streams, STD if told else None, least=least, memory=memory if told else 0.0)
 
 
 def changes(path, errors, of):
@@ -56,14 +59,28 @@ def test_each_error_is_one_standard_deviation_of_the_stream_and_independent_of_t
         assert len(errors) == 10  # three coefficients each for x and y, and four knots
 
 
-@pytest.mark.parametrize("ramp", RAMPS)
-def test_fits_are_off_by_as_much_as_their_errors_say(ramp):
-    truth = path_of(RAMPS[ramp])
-    off = [
+def off(truth, fits):
+    """Root mean squares (8,) of what features are off by, in standard deviations as the errors tell them."""
+    ratios = [
         (features(path) - features(truth)) / np.linalg.norm(changes(path, errors, features), axis=0)
-        for path, errors in fitted(truth, range(60))
+        for path, errors in fits
     ]
-    assert np.abs(np.sqrt(np.mean(np.square(off), axis=0)) - 1.0).max() < 0.3  # of standard deviations; 0.19
+    return np.sqrt(np.mean(np.square(ratios), axis=0))
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.05])  # s
+@pytest.mark.parametrize("ramp", RAMPS)
+def test_fits_are_off_by_as_much_as_their_errors_say(ramp, memory):
+    truth = path_of(RAMPS[ramp])
+    assert np.abs(off(truth, fitted(truth, range(60), memory=memory)) - 1.0).max() < 0.3
+
+
+def test_a_slow_noise_that_is_taken_for_white_passes_for_motion():
+    truth = path_of(STRAIGHT)
+    told, untold = (fitted(truth, range(12), memory=0.05, told=told) for told in (True, False))
+    assert max(len(path.times) for path, _ in told) <= 7  # four knots and the ends
+    assert np.median([len(path.times) for path, _ in untold]) > 10
+    assert off(truth, untold).max() > 2.0
 
 
 def test_the_place_of_a_hand_that_stands_is_known():
