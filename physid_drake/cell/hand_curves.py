@@ -245,8 +245,7 @@ class SmoothFit(StraightFit):
     def __init__(self, straight: StraightFit, ramp: Polynomial) -> None:
         self._take(straight.times, straight._p, straight._sigmas, straight._memory)
         self._moving = straight._moving
-        self._ramp = ramp
-        self._straight_way, self._smooth_way = STRAIGHT.integ(), ramp.integ()
+        self._ramp, self._way = ramp, ramp.integ()
         self.knots = self._settle(self._prune(self._place(np.clip(_widened(straight.knots), 0.0, self._span))))
 
     def _ramp_after(self, k: int, count: int) -> Polynomial:
@@ -258,22 +257,20 @@ class SmoothFit(StraightFit):
 
     def _columns(self, knots: Array) -> Array:
         """As of straight ramps; the coefficients are speeds at the knots."""
-        spans = pairwise(knots.tolist())
-        count = len(knots)
-        rises = [self._rise(*span, smooth=self._is_smooth(k, count)) for k, span in enumerate(spans)]
+        rises, still = self._rises(knots), np.zeros((len(self.times), 1))
         # The way of a hand whose speed is 1 at a knot and 0 at the others; before and after them it does not change.
-        ups, downs = [self.times, *rises], [*rises, np.zeros_like(self.times)]
-        columns = [up - down for up, down in zip(ups, downs, strict=True)] if len(knots) else []
+        ways = np.hstack([self.times[:, None], rises]) - np.hstack([rises, still]) if len(knots) else still[:, :0]
         # A hand that rests before the first knot has no speed there.
-        columns = [np.ones_like(self.times), *(columns if self._moving else columns[1:])]
-        return np.column_stack(columns)
+        return np.hstack([still + 1.0, ways if self._moving else ways[:, 1:]])
 
-    def _rise(self, begin: float, end: float, *, smooth: bool) -> Array:
-        """Way (n,) of a hand that is at rest before ``begin`` and has the speed 1 after ``end``."""
-        x = np.clip((self.times - begin) / max(end - begin, 1e-9), 0.0, 1.0)
-        along = self._smooth_way if smooth else self._straight_way
-        way: Array = (end - begin) * along(x) + np.maximum(self.times - end, 0.0)
-        return way
+    def _rises(self, knots: Array) -> Array:
+        """Ways (n, k - 1) of hands at rest before a knot, whose speed rises to 1 until the next."""
+        begins, spans = knots[:-1], np.diff(knots)
+        x = np.clip((self.times[:, None] - begins) / np.maximum(spans, 1e-9), 0.0, 1.0)
+        ways = 0.5 * x**2
+        smooth = [k for k in range(len(spans)) if self._is_smooth(k, len(knots))]
+        ways[:, smooth] = self._way(x[:, smooth])
+        return np.asarray(spans * ways + np.maximum(self.times[:, None] - knots[1:], 0.0))
 
     def at_rest(self, knots: Array) -> Array:
         """The space of coefficients with which the hand has no speed at the last knot."""
