@@ -31,6 +31,9 @@ SMALLEST_STEP = 1e-7  # s
 # s: a sprung tip knows the table's friction from the tick before. In ticks of 20 ms, which suit a slow hand, a stiff
 # tip was 6 standard deviations off in yaw; in these as far as in ticks of 1 ms.
 SOFT_TICK = 2e-3
+# Longer ones will do for a slow hand on a spring that is soft enough: within 0.03 mm and 0.4 mrad for 40 mm.
+SOFT_TRAVEL = 1e-4  # m: of the hand in one
+SOFT_SWING = 2.0  # times the root of mass over stiffness
 SLOWEST_HAND = 1e-6  # m/s: no path moves slower
 FALLEN = 0.05  # m below the table top: it does not come back
 FASTEST = 50.0  # m/s: beyond it a rollout has diverged
@@ -94,7 +97,9 @@ class Stepper:
         self._laws, self._mount, self._log = AppliedLaws(laws, frictions), mount, Log()
         times = np.asarray(begin + dt * np.arange(count + 1), dtype=np.float64)
         self._hand = None if path is None else path.positions(times).tolist()
-        self._hand_mass = HAND_MASS if path is None else self._mass_of_hand(body, path)
+        speed = 0.0 if path is None else float(np.linalg.norm(path.velocities, axis=1).max())
+        self._hand_mass = self._mass_of_hand(body, max(speed, SLOWEST_HAND))
+        self._longest_soft = self._soft_tick_of(body, max(speed, SLOWEST_HAND))
         k = 0
         try:
             self._begin_at(start, rest)
@@ -107,11 +112,15 @@ class Stepper:
             return self._log.motion(Outcome.DIVERGED)
         return self._log.motion(Outcome.COMPLETED)
 
-    def _mass_of_hand(self, body: Body, path: HandPath) -> float:
+    def _mass_of_hand(self, body: Body, speed: float) -> float:
         """What contact hardly slows, and what does not hide the contact [kg]."""
         friction = float(body.support_friction.min()) * body.mass * self._gravity
-        fastest = float(np.linalg.norm(path.velocities, axis=1).max())
-        return min(HAND_MASS, friction * self._solver.time_step_s / (SLOWED * max(fastest, SLOWEST_HAND)))
+        return min(HAND_MASS, friction * self._solver.time_step_s / (SLOWED * speed))
+
+    def _soft_tick_of(self, body: Body, speed: float) -> float:
+        """The longest tick of a sprung tip whose mount goes at most so fast [s]."""
+        swing = math.sqrt(body.mass / self._mount.stiffness) if self._mount is not None else 0.0
+        return max(SOFT_TICK, min(SOFT_SWING * swing, SOFT_TRAVEL / speed))
 
     def _begin_at(self, start: Start, rest: Array) -> None:
         """Place object and hand; a sprung tip is no body of Drake's, whose hand stays parked then."""
@@ -224,7 +233,7 @@ class Stepper:
         apart = self._apart(self._touch(soft.place, soft.velocity), k, count)
         m = min(k + self._slide_ticks, count) if apart else k + 1
         move, (x, y) = self._move(k, m), self._move(k, m).start
-        parts = 1 if apart or self._discrete else math.ceil(dt / SOFT_TICK - 1e-6)
+        parts = 1 if apart or self._discrete else math.ceil(dt / self._longest_soft - 1e-6)
         times = np.linspace(k * dt, m * dt, parts + 1).tolist()
         for begin, end in pairwise(times):
             held, gone = soft.held, end - k * dt
