@@ -124,6 +124,8 @@ def _diverged(case: Case, shown: Fitted) -> tuple[str, ...]:
 def _noise_of_sensors(case: Case) -> dict[str, float]:
     """Of the hand and of a force component, where they were recorded."""
     hand = {} if case.recording.hand is None else {"hand_m": case.sensors.hand}
+    if case.sensors.hand_memory > 0.0:
+        hand["hand_correlation_time_s"] = case.sensors.hand_memory
     compared = any(len(problem.force_times) for problem in case.problems)
     return hand | ({"force_n": case.sensors.force} if compared else {})
 

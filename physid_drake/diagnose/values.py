@@ -229,7 +229,8 @@ class Diagnosis:
         reduced_chi2_before, reduced_chi2_after: cost per degree of freedom, plain and with what was found.
         friction_scatter: of the last model's friction, push to push, relative.
         noise: ``position_m``, ``rotation_rad``, ``correlation_time_s`` (of both), ``jitter_s`` that were used, and
-            ``hand_m`` and ``force_n`` (of a component) where hand and force were.
+            ``hand_m`` and ``force_n`` (of a component) where hand and force were, ``hand_correlation_time_s`` where
+            the hand's noise is slow.
         warnings: what was found odd, one line each.
         rollouts: how many were made.
         pushes: of the whole recording, looked at or not.

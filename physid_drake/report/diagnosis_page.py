@@ -276,6 +276,7 @@ def _noise(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         ("rotation", "rotation_rad", math.degrees(1.0), "°"),
         ("jitter of time stamps", "jitter_s", MM, " ms"),
         ("hand", "hand_m", MM, " mm"),
+        ("hand's correlated over", "hand_correlation_time_s", MM, " ms"),
         ("force", "force_n", 1.0, " N"),
     ]
     told = [(name, f"{number(scale * noise[key])}{unit}") for name, key, scale, unit in rows if key in noise]

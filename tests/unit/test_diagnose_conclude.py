@@ -232,3 +232,11 @@ def test_pushes_that_the_model_cannot_simulate_are_said():
     assert conclude._diverged(case, SimpleNamespace(predicted=(simulated,) * 3)) == ()
     (said,) = conclude._diverged(case, SimpleNamespace(predicted=(fallen, simulated, fallen)))
     assert said.endswith(": 001, 003")
+
+
+@pytest.mark.parametrize(("memory", "said"), [(0.0, {"hand_m"}), (0.05, {"hand_m", "hand_correlation_time_s"})])
+def test_a_slow_noise_of_the_hand_is_said(memory, said):
+    case = SimpleNamespace(
+        recording=SimpleNamespace(hand=object()), sensors=SimpleNamespace(hand=3e-4, hand_memory=memory), problems=()
+    )
+    assert conclude._noise_of_sensors(case).keys() == said
