@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 NUDGE = 1e-5  # s: of a knot, for differences
 FARTHEST = 0.4  # of the smallest gap between knots: so far one may be moved
-SMALLEST = 0.05  # standard deviations: that small a step is a tangent
+SMALLEST = 0.05  # standard deviations: a way that leaves its tangent sooner is none
 CROOKED = 1.25  # times as far as its tangent: a step that is shortened
 UNSEEN = 1e-7  # of the largest singular value: ways of which a stream says nothing, as of two knots in one place
 
@@ -21,7 +21,8 @@ def path_errors(fit: StraightFit, origin: float, least: float) -> tuple[PathErro
     """The independent errors of a path that move the hand by at least so much.
 
     The linearised fit, its samples in units of their noise, is off by one standard deviation along each of its right
-    singular vectors, and these are independent.
+    singular vectors, and these are independent. A knot that may stand nearly anywhere, since the hand goes straight on
+    there, moves the hand by less than its noise, but along no tangent: such a way is left out.
 
     Args:
         fit: of one stream.
@@ -35,21 +36,22 @@ def path_errors(fit: StraightFit, origin: float, least: float) -> tuple[PathErro
     for way in _ways(fit, curve):
         farthest = FARTHEST * gap / max(np.abs(way[curve.coefficients.size :]).max(), 1e-12)
         error = _step(fit, curve, way, float(min(1.0, farthest)), origin)
+        if error is None:
+            continue
         moved = error.path.positions(origin + fit.times) - fit.path(origin).positions(origin + fit.times)
         if np.linalg.norm(moved, axis=1).max() >= error.stds * least:
             found.append(error)
     return tuple(found)
 
 
-def _step(fit: StraightFit, curve: Curve, way: Array, stds: float, origin: float) -> PathError:
-    """So many standard deviations along a way, or less where the samples would leave its tangent.
-
-    A knot that is hardly known, since the hand goes nearly straight on there, has no tangent that goes far.
-    """
+def _step(fit: StraightFit, curve: Curve, way: Array, stds: float, origin: float) -> PathError | None:
+    """So many standard deviations along a way, or less where the samples would leave its tangent; None if far less."""
+    if stds < SMALLEST:
+        return None
     of_coefficients, of_knots = np.split(way, [curve.coefficients.size])
     coefficients, knots = curve.coefficients + stds * of_coefficients.reshape(-1, 2), fit.knots + stds * of_knots
     moved = fit.design(knots) @ coefficients - fit.design(fit.knots) @ curve.coefficients
-    if np.linalg.norm(moved) > CROOKED * stds and stds > SMALLEST:
+    if np.linalg.norm(moved) > CROOKED * stds:
         return _step(fit, curve, way, 0.5 * stds, origin)
     return PathError(path=fit.as_path(knots, coefficients, origin), stds=stds)
 

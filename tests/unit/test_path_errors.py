@@ -105,3 +105,18 @@ def test_of_a_few_samples_no_error_is_known():
     [(path, errors)] = fit_uncertain_paths([(TIMES[:3], np.zeros((3, 2)))], STD, least=0.0)
     assert errors == ()
     assert len(path.times) == 4
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_no_error_moves_the_hand_by_more_than_its_noise(seed):
+    """Of a hand whose speed hardly changes, so that knots may stand nearly anywhere."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(0.0, 2.0, 0.01)
+    speeds = 0.02 + 2e-3 * rng.standard_normal(10)
+    path = HandPath(times=np.linspace(0.0, 2.0, 10), velocities=np.outer(speeds, [0.8, 0.6]), start=np.zeros(2))
+    noise = 3e-5 * rng.standard_normal((len(times), 2))
+    [(found, errors)] = fit_uncertain_paths([(times, path.positions(times) + noise)], 3e-5, least=0.0)
+    assert errors
+    for error in errors:
+        moved = np.linalg.norm(error.path.positions(times) - found.positions(times), axis=1).max()
+        assert moved <= 1.3 * error.stds * 3e-5
