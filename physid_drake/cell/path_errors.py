@@ -21,8 +21,8 @@ def path_errors(fit: StraightFit, origin: float, least: float) -> tuple[PathErro
     """The independent errors of a path that move the hand by at least so much.
 
     The linearised fit, its samples in units of their noise, is off by one standard deviation along each of its right
-    singular vectors, and these are independent. A knot that may stand nearly anywhere, since the hand goes straight on
-    there, moves the hand by less than its noise, but along no tangent: such a way is left out.
+    singular vectors, and these are independent. A knot that may stand nearly anywhere, since the hand goes straight
+    on there, moves the hand by less than its noise, but along no tangent: such a way is left out.
 
     Args:
         fit: of one stream.
@@ -45,7 +45,7 @@ def path_errors(fit: StraightFit, origin: float, least: float) -> tuple[PathErro
 
 
 def _step(fit: StraightFit, curve: Curve, way: Array, stds: float, origin: float) -> PathError | None:
-    """So many standard deviations along a way, or less where the samples would leave its tangent; None if far less."""
+    """So many standard deviations along a way, or less where samples would leave its tangent; None if far less."""
     if stds < SMALLEST:
         return None
     of_coefficients, of_knots = np.split(way, [curve.coefficients.size])
