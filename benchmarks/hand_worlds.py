@@ -3,7 +3,8 @@
 Hands of the proof's worlds come from afar, go on at 0.05 to 0.5 m/s, brake and stay. Here the same scenes are pushed
 by hands that are slow (10 to 60 mm/s, with a force sensor), that go and brake as gently as people's arms do, that go
 round a bend, that halt on their way, or that begin where they touch and withdraw; by ones low on the object; or by
-ones that are tracked no better than the object, or with a slow noise.
+ones that are tracked no better than the object, or with a slow noise. Of `camera`, hands and noise are the proof's,
+but the object is seen 31 times a second, between samples of the hand, stamps count from 1970, nothing is stated.
 Prints what was put in and what is said of it.
 """
 
@@ -23,12 +24,14 @@ from physid_drake.prove.make import simulate
 from physid_drake.prove.scene import DrawnPush, Rng, Scene, draw_scene
 from physid_drake.prove.sensing import record, recording_of
 from physid_drake.prove.world_plan import HandPath
-from physid_drake.recording import Push, Recording
+from physid_drake.recording import PoseStream, Push, Recording
 
 SPEEDS = (0.01, 0.06)  # m/s, of slow hands
 BRAKE = 0.1  # s
 WANDERS, MEMORY = 3e-4, 0.05  # m, s: a slow noise of the hand
 FORCE, RATE = 0.02, 100.0  # N, Hz
+CAMERA_RATE, FRAMES = 250.0, 8  # Hz; one picture in so many samples
+EPOCH = 1.7e9  # s
 
 
 def main() -> None:
@@ -65,6 +68,8 @@ def world(manner: str, seed: int, effect: str | None, share: float) -> tuple[Rec
     pushes = [record(rng, scene, k, motion)[0] for k, motion in enumerate(motions)]
     if manner == "wandering":
         pushes = [wandered(rng, push, 1.0 / scene.rate) for push in pushes]
+    if manner == "camera":
+        pushes = [filmed(push) for push in pushes]
     return recording_of(f"{manner} {seed}", scene, pushes, effect == "actuator_lag"), scene.noise.position
 
 
@@ -167,9 +172,26 @@ def wandered(rng: Rng, push: Push, interval: float) -> Push:
     return dc.replace(push, hand=dc.replace(push.hand, positions=push.hand.positions + noise))
 
 
+def camera(rng: Rng, scene: Scene) -> Scene:
+    """Nothing is stated, nor weighed; every sample is made, most are taken away by ``filmed``."""
+    noise = dc.replace(scene.noise, dropout=0.0)
+    return dc.replace(scene, sensors_stated=False, stated_mass=None, noise=noise, rate=CAMERA_RATE)
+
+
+def filmed(push: Push) -> Push:
+    """The object in one sample of eight, the hand in every other one, never in the same."""
+    return dc.replace(push, object=thinned(push.object, 0, FRAMES), hand=thinned(push.hand, 1, 2))
+
+
+def thinned(stream: PoseStream, first: int, step: int) -> PoseStream:
+    keep = slice(first, None, step)
+    times = EPOCH + stream.times[keep]
+    return PoseStream(times=times, positions=stream.positions[keep], quaternions=stream.quaternions[keep])
+
+
 MANNERS = {
     "slow": slow, "gentle": gentle, "curved": curved, "halting": halting, "touching": touching, "low": low,
-    "noisy": noisy, "wandering": wandering,
+    "noisy": noisy, "wandering": wandering, "camera": camera,
 }  # fmt: skip
 
 

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.identify.misfit import Whitener, difference, diverged, model_error_columns, whitened_residual
+from physid_drake.identify.misfit import Whitener, difference, diverged, whitened_residual
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
-from physid_drake.identify.polish import NUISANCE_STEP, THETA_STEP, first_motion, prior_rows, rescaled
+from physid_drake.identify.own_columns import own_columns, own_tasks
+from physid_drake.identify.polish import THETA_STEP, prior_rows, rescaled
 from physid_drake.identify.problem import Noise, PushProblem
-from physid_drake.identify.rollouts import RolloutPool, Task
+from physid_drake.identify.rollouts import RolloutPool
 from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
@@ -28,7 +29,7 @@ class PushTerm:
         u: (d,) where, in the unit cube of theta.
         residual: (m,) whitened misfit there, in standard deviations.
         slope: (m, d) of the misfit with respect to the unit cube.
-        own: (m, k) with respect to its own unknowns, in units of their priors.
+        own: (m, k) with respect to its own unknowns, in units of their priors, and to errors of path and cell.
         scatter: of friction from push to push that ``own`` was scaled with.
     """
 
@@ -68,47 +69,40 @@ class PushTerm:
 def linearised(
     pool: RolloutPool, problems: Sequence[PushProblem], noise: Noise, u: Array, scatter: float
 ) -> list[PushTerm]:
-    """Terms of pushes at a point u (d,) of the unit cube, by 1 + k + 2 d rollouts each.
+    """Terms of pushes at a point u (d,) of the unit cube, by 1 + k + e + 2 d rollouts each.
 
     A step whose rollout diverges counts as one that changes nothing.
     """
     space = pool.thetas.space
-    centre = np.asarray(space.from_unit(u))
     low, high = np.maximum(0.0, u - THETA_STEP), np.minimum(1.0, u + THETA_STEP)
-    tasks: list[Task] = []
-    for problem in problems:
-        nuisance = nuisance_of(problem, scatter)
-        rest = np.zeros(len(nuisance.names))
-        tasks += [
-            Task(problem=problem, theta=centre, nuisance=nuisance, values=step)
-            for step in [rest, *(NUISANCE_STEP * np.diag(nuisance.stds))]
-        ]
-        for j in range(len(u)):
-            for side in (low, high):
-                point = u.copy()
-                point[j] = side[j]
-                theta = np.asarray(space.from_unit(point))
-                tasks.append(Task(problem=problem, theta=theta, nuisance=nuisance, values=rest))
-    rows = [whitened_residual(task.problem, noise, p) for task, p in zip(tasks, pool.run(tasks), strict=True)]
-    terms, first = [], 0
-    for problem in problems:
-        nuisance = nuisance_of(problem, scatter)
-        own, steps = len(nuisance.names), 2 * len(u)
-        stack = rows[first : first + 1 + own + steps]
-        first += len(stack)
-        here = stack[0]
-        slopes = [
-            difference(stack[1 + own + 2 * j], stack[2 + own + 2 * j]) / (high[j] - low[j]) for j in range(len(u))
-        ]
-        columns = [difference(here, row) / NUISANCE_STEP for row in stack[1 : 1 + own]]
-        errors = model_error_columns(problem, noise, first_motion(problem, noise))
+    thetas = [
+        space.from_unit(point) for sides in zip(_moved(u, low), _moved(u, high), strict=True) for point in sides
+    ]
+    nuisances = [nuisance_of(problem, scatter) for problem in problems]
+    stacks = []
+    for problem, nuisance in zip(problems, nuisances, strict=True):
+        own = own_tasks(problem, nuisance, np.asarray(space.from_unit(u)))
+        stacks.append([*own, *(replace(own[0], theta=np.asarray(theta)) for theta in thetas)])
+    tasks = [task for stack in stacks for task in stack]
+    pairs = zip(tasks, pool.run(tasks), strict=True)
+    rows = iter([whitened_residual(task.problem, noise, prediction) for task, prediction in pairs])
+    terms = []
+    for problem, nuisance, stack in zip(problems, nuisances, stacks, strict=True):
+        residuals = [next(rows) for _ in stack]
+        own_rows, sides = residuals[: -len(thetas)], residuals[-len(thetas) :]
+        slopes = [difference(*pair) for pair in zip(sides[::2], sides[1::2], strict=True)]
         terms.append(
             PushTerm(
-                problem=problem, nuisance=nuisance, u=u.copy(), scatter=scatter,
-                residual=here, slope=np.column_stack(slopes), own=np.column_stack([*columns, errors]),
+                problem=problem, nuisance=nuisance, u=u.copy(), scatter=scatter, residual=residuals[0],
+                slope=np.column_stack(slopes) / (high - low), own=own_columns(problem, noise, own_rows),
             )
         )  # fmt: skip
     return terms
+
+
+def _moved(u: Array, goal: Array) -> list[Array]:
+    """The point u (d,) with each of its entries in turn moved to that of a goal."""
+    return [np.where(np.arange(len(u)) == j, goal, u) for j in range(len(u))]
 
 
 def prior_slope(space: ParameterSpace) -> Array:

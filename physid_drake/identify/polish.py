@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from physid_drake.identify.misfit import Whitener, difference, diverged, model_error_columns, whitened_residual
+from physid_drake.identify.misfit import Whitener, difference, diverged, whitened_residual
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
+from physid_drake.identify.own_columns import own_columns, own_tasks
 from physid_drake.identify.problem import Noise, PushProblem
 from physid_drake.identify.rollouts import RolloutPool, Task
 from physid_drake.space import ParameterSpace
@@ -18,11 +19,9 @@ from physid_drake.space import ParameterSpace
 Array = NDArray[np.float64]
 
 THETA_STEP = 0.004  # of the unit cube, for differences; rollouts are repeatable to the bit, so small is safe
-NUISANCE_STEP = 0.5  # of the prior standard deviation
 ROUNDS = 2  # of linearising the pushes' own unknowns
 LARGEST_SCATTER = 0.2
 SMALLEST_SCATTER = 2e-3
-FIRST_SIGMAS = 4.0  # of the tracker: motion that is surely none of its noise
 SCATTER_STEPS = 2
 SCATTER_WEIGHT = 4.0
 SCATTER_PUSHES = 4  # fewer pushes than this do not tell their scatter
@@ -144,22 +143,14 @@ class Polisher:
 
     def _linearise(self, theta: Array) -> list[Whitener]:
         """Jacobians of each push with respect to its own unknowns, by one extra rollout per unknown."""
-        nuisances = self._nuisances()
-        tasks, owners = [], []
-        for i, (problem, nuisance) in enumerate(zip(self._problems, nuisances, strict=True)):
-            steps = [np.zeros(len(nuisance.names)), *(NUISANCE_STEP * np.diag(nuisance.stds))]
-            tasks += [Task(problem=problem, theta=theta, nuisance=nuisance, values=step) for step in steps]
-            owners += [i] * len(steps)
-        rows: list[list[Array]] = [[] for _ in self._problems]
-        for i, row in zip(owners, self._residuals(tasks), strict=True):
-            rows[i].append(row)
-        self._lost = frozenset(i for i, stack in enumerate(rows) if diverged(stack[0]))
-        return [self._whitener(problem, stack) for problem, stack in zip(self._problems, rows, strict=True)]
-
-    def _whitener(self, problem: PushProblem, stack: list[Array]) -> Whitener:
-        columns = [difference(stack[0], row) / NUISANCE_STEP for row in stack[1:]]
-        touched = first_motion(problem, self._noise)
-        return Whitener.of(np.column_stack([*columns, model_error_columns(problem, self._noise, touched)]))
+        stacks = [own_tasks(p, n, theta) for p, n in zip(self._problems, self._nuisances(), strict=True)]
+        rows = iter(self._residuals([task for stack in stacks for task in stack]))
+        residuals = [[next(rows) for _ in stack] for stack in stacks]
+        self._lost = frozenset(i for i, own in enumerate(residuals) if diverged(own[0]))
+        return [
+            Whitener.of(own_columns(problem, self._noise, own))
+            for problem, own in zip(self._problems, residuals, strict=True)
+        ]
 
     def _fit(self, theta: Array, whiteners: list[Whitener]) -> tuple[Array, Array]:
         """Theta (d,) of least cost, and the slope (m, d) there; pushes that diverge where it starts say nothing."""
@@ -294,12 +285,3 @@ def rescaled(whitener: Whitener, k: int, factor: float) -> Whitener:
     jacobian = whitener.jacobian.copy()
     jacobian[:, k] *= factor
     return Whitener.of(jacobian)
-
-
-def first_motion(problem: PushProblem, noise: Noise) -> float:
-    """Roughly when the object starts to move: the model error begins there [s]. A tracker's noise is no motion."""
-    if len(problem.times) < 3:
-        return problem.begin
-    moved = np.linalg.norm(problem.poses[:, :2] - problem.poses[0, :2], axis=1)
-    beyond = np.flatnonzero(moved > max(0.05 * float(moved.max(initial=0.0)), FIRST_SIGMAS * noise.position))
-    return float(problem.times[max(0, beyond[0] - 1)]) if len(beyond) else problem.begin

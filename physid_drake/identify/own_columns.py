@@ -1,0 +1,57 @@
+"""What a push's misfit does with all that the push has for itself: columns that are marginalised over."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.identify.misfit import difference, model_error_columns
+from physid_drake.identify.nuisance import Nuisance
+from physid_drake.identify.problem import Noise, PushProblem
+from physid_drake.identify.rollouts import Task
+
+Array = NDArray[np.float64]
+
+NUISANCE_STEP = 0.5  # of the prior standard deviation
+FIRST_SIGMAS = 4.0  # of the tracker: motion that is surely none of its noise
+
+
+def own_tasks(problem: PushProblem, nuisance: Nuisance, theta: Array) -> list[Task]:
+    """Rollouts of a push at theta (d,): with nothing known of it, then one for each column.
+
+    They are steps of its k unknowns, and the e errors that the path of its hand may have.
+    """
+    rest = np.zeros(len(nuisance.names))
+    others = [replace(problem, path=error.path) for error in problem.path_errors]
+    made = [(problem, step) for step in (rest, *(NUISANCE_STEP * np.diag(nuisance.stds)))]
+    made += [(other, rest) for other in others]
+    return [Task(problem=one, theta=theta, nuisance=nuisance, values=values) for one, values in made]
+
+
+def own_columns(problem: PushProblem, noise: Noise, residuals: Sequence[Array]) -> Array:
+    """How the misfit (m,) changes by one standard deviation of each: columns (m, k + e + 3).
+
+    The unknowns come first, in their order; then the errors of the path, and of the cell.
+
+    Args:
+        problem: the push.
+        noise: its noise.
+        residuals: (m,) of the rollouts of ``own_tasks``.
+    """
+    base, *moved = residuals
+    of_path = [error.stds for error in problem.path_errors]
+    steps = [NUISANCE_STEP] * (len(moved) - len(of_path)) + of_path
+    columns = [difference(base, one) / step for one, step in zip(moved, steps, strict=True)]
+    return np.column_stack([*columns, model_error_columns(problem, noise, first_motion(problem, noise))])
+
+
+def first_motion(problem: PushProblem, noise: Noise) -> float:
+    """Roughly when the object starts to move: the model error begins there [s]. A tracker's noise is no motion."""
+    if len(problem.times) < 3:
+        return problem.begin
+    moved = np.linalg.norm(problem.poses[:, :2] - problem.poses[0, :2], axis=1)
+    beyond = np.flatnonzero(moved > max(0.05 * float(moved.max(initial=0.0)), FIRST_SIGMAS * noise.position))
+    return float(problem.times[max(0, beyond[0] - 1)]) if len(beyond) else problem.begin
