@@ -1,4 +1,4 @@
-"""How far a computation is: a bar in a terminal, else a line on standard error for every stage that begins."""
+"""How far a computation is: a bar in a terminal, else lines on standard error: of every stage, and every minute."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainin
 from rich.progress import Progress as Bar
 
 from physid_drake.progress import Progress
+
+AGAIN = 60.0  # s: a stage that lasts so long says how far it is
 
 
 @contextmanager
@@ -37,12 +39,15 @@ def progress_bar(console: Console) -> Iterator[Progress]:
 
 def _in_lines() -> Progress:
     """For a log, where a bar cannot be redrawn; results stay alone on standard output."""
-    since, last = time.monotonic(), ""
+    since, said, last = time.monotonic(), 0.0, ""
 
     def show(stage: str, done: int, total: int) -> None:
-        nonlocal last
-        if stage != last:
-            last = stage
-            print(f"{time.monotonic() - since:5.0f} s  {stage}", file=sys.stderr, flush=True)
+        nonlocal said, last
+        after = time.monotonic() - since
+        if stage == last and (not total or after - said < AGAIN):
+            return
+        how_far = f", {done} of {total}" if stage == last else ""
+        said, last = after, stage
+        print(f"{after:5.0f} s  {stage}{how_far}", file=sys.stderr, flush=True)
 
     return show

@@ -36,3 +36,14 @@ def test_a_log_says_every_stage_once_and_apart_from_the_results(capsys):
     printed = capsys.readouterr()
     assert [line.split(" s  ")[1] for line in printed.err.splitlines()] == ["search", WORDS[1]]
     assert printed.out == ""
+
+
+def test_a_log_says_once_a_minute_how_far_a_long_stage_is(capsys, monkeypatch):
+    clock = iter([100.0, 100.0, 130.0, 170.0, 200.0, 231.0, 300.0])
+    monkeypatch.setattr("time.monotonic", lambda: next(clock))
+    with progress_bar(terminal()) as tick:
+        for done in range(5):
+            tick("search", done, 9)
+        tick("search", 0, 0)  # nobody knows how far
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.strip() for line in lines] == ["0 s  search", "70 s  search, 2 of 9", "131 s  search, 4 of 9"]
