@@ -142,7 +142,7 @@ class Polisher:
         return [whitened_residual(task.problem, self._noise, prediction) for task, prediction in pairs]
 
     def _linearise(self, theta: Array) -> list[Whitener]:
-        """Jacobians of each push with respect to its own unknowns, by one extra rollout per unknown."""
+        """Jacobians of each push with respect to what it has for itself, by one extra rollout each."""
         stacks = [own_tasks(p, n, theta) for p, n in zip(self._problems, self._nuisances(), strict=True)]
         rows = iter(self._residuals([task for stack in stacks for task in stack]))
         residuals = [[next(rows) for _ in stack] for stack in stacks]
