@@ -302,9 +302,9 @@ class Growth:
     def _what_is_left(self, model: Fitted, before: Sequence[Signature], alpha: float) -> Looked:
         """The score tests of what a model leaves; signatures are taken anew only if something is missing at alpha."""
         present = {e.kind for e in model.state.effects}
-        # Those of the model before are near enough to ask whether anything is left.
+        # Those of the model before are near enough to ask whether anything is left, unless frictions hide it.
         looked = Looked.at(model, [s for s in before if s.kind not in present], self.rng)
-        if looked.p_value >= alpha:
+        if alpha == 0.0 or (looked.p_value >= alpha and model.state.scatter <= WIDE):
             return looked
         self.tick("score tests of what is left", 0, 0)
         fresh = signatures(Fitter(self.fitter.case), model, [k for k in self.kinds if k not in present])

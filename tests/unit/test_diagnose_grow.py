@@ -397,3 +397,24 @@ def test_what_costly_score_tests_found_is_fitted_but_no_more(monkeypatch, tests_
     growth = grow.Growth(fitter=fitter, kinds=range(24), alpha=0.01, rng=None, tick=lambda *stage: None)
     steps = growth._added_to(looked(0)).steps
     assert [one[0].name for one in steps] == names[:effects]
+
+
+@pytest.mark.parametrize(
+    ("p_value", "scatter", "alpha", "anew"),
+    [(0.5, 1.0, 0.01, False), (1e-9, 1.0, 0.01, True), (0.5, 1.5 * grow.WIDE, 0.01, True), (1e-9, 9.0, 0.0, False)],
+)
+def test_score_tests_are_taken_anew_where_something_is_left_or_frictions_may_hide_it(
+    monkeypatch, p_value, scatter, alpha, anew
+):
+    """Beside a tether, frictions of 7 % hid a drag whose change of the plain cell's pushes says nothing there."""
+    monkeypatch.setattr(grow, "signatures", lambda fitter, model, kinds: ["anew"])
+    monkeypatch.setattr(grow, "Fitter", lambda case: None)
+    monkeypatch.setattr(
+        grow.Looked,
+        "at",
+        classmethod(lambda cls, model, found, rng: SimpleNamespace(signatures=found, p_value=p_value)),
+    )
+    model = SimpleNamespace(state=State(u=np.zeros(2), effects=(), own=(), scatter=scatter))
+    before = [SimpleNamespace(kind=None)]
+    looked = growth(SimpleNamespace(case=None))._what_is_left(model, before, alpha)
+    assert looked.signatures == (["anew"] if anew else before)
