@@ -84,8 +84,12 @@ def test_a_push_teaches_less_to_who_knows_it(taught):
     assert again.gains[0] < 0.7 * lesson.gains[lesson.best]
 
 
-def test_the_chosen_push_leaves_less_open_than_random_ones_when_they_are_made(taught):
-    """Made in the planar integrator's world, and learned from without knowing the truth."""
+def test_the_chosen_push_leaves_less_open_than_random_ones_when_they_are_made(taught, monkeypatch):
+    """Made in the planar integrator's world, and learned from without knowing the truth.
+
+    A push that is only planned has no noisy stream: its hand's path is exact, and so it is in what is learned here.
+    """
+    monkeypatch.setattr("physid_drake.identify.problem.NOTABLE_ERROR", np.inf)
     one, pushes, lesson = taught
     order = np.argsort(-lesson.gains)
     some = [int(order[0]), int(order[3]), int(order[-1])]
@@ -95,9 +99,8 @@ def test_the_chosen_push_leaves_less_open_than_random_ones_when_they_are_made(ta
         gained[k] = 0.5 * (np.linalg.slogdet(belief.information)[1] - np.linalg.slogdet(12.0 * np.eye(2))[1])
     random = np.mean([gained[k] for k in some[1:]])
     assert gained[lesson.best] > random + 0.3
-    # The expectation was made at the truth, and of a hand whose path is exact; what was learned counts what the noisy
-    # stream leaves open of it, and is up to 1.03 nats below (0.7 while that was not counted).
-    np.testing.assert_allclose([gained[k] for k in some], lesson.gains[some], atol=1.3)
+    # The expectation was made at the truth; what was learned agrees with it to 0.7 nats.
+    np.testing.assert_allclose([gained[k] for k in some], lesson.gains[some], atol=1.0)
     variance = [np.trace(np.linalg.inv(12.0 * np.eye(2) + told)) for told in lesson.informations]
     assert variance[lesson.best] < 0.5 * np.mean(variance)
 
