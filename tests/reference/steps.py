@@ -265,6 +265,47 @@ def _gap_at(q, t, com, polygon, radius, tip_radius, kt, kp, kv):
 
 
 @njit(cache=True)
+def _part_until_touch(q, mean, t, h, new_q, com, polygon, radius, tip_radius, kt, kp, kv):
+    """Share of a step after which the tip touches, by bisection along the straight step; new_q is left nearby."""
+    low, high = 0.0, 1.0
+    for _ in range(45):
+        mid = (low + high) / 2
+        for i in range(3):
+            new_q[i] = q[i] + mid * h * mean[i]
+        gap, _, _, _, _ = _gap_at(new_q, t + mid * h, com, polygon, radius, tip_radius, kt, kp, kv)
+        low, high = (mid, high) if gap > 0 else (low, mid)
+    return low
+
+
+@njit(cache=True)
+def _struck(v, contact, tip, m, inertia, mu_hand, restitution):
+    """Changes v by the impact of a first touch; the speeds before it, its impulse, and whether they stay in touch."""
+    _, nx, ny, rx, ry = contact
+    _, _, hvx, hvy = tip
+    ux, uy = v[0] - v[2] * ry - hvx, v[1] + v[2] * rx - hvy
+    un, ut = ux * nx + uy * ny, -ux * ny + uy * nx
+    if un >= 0.0:
+        return un, ut, 0.0, 0.0, True
+    e = restitution if -un > RESTITUTION_FLOOR else 0.0
+    rn, rt = rx * ny - ry * nx, rx * nx + ry * ny
+    pn, pt = routh_impact(m, inertia, rn, rt, un, ut, mu_hand, e)
+    v[0] += (nx * pn - ny * pt) / m
+    v[1] += (ny * pn + nx * pt) / m
+    v[2] += (rn * pn + rt * pt) / inertia
+    return un, ut, pn, pt, e == 0.0
+
+
+@njit(cache=True)
+def _write_pose(row, q, new_q, part, com):
+    """Pose of Bo into the first three of row, where part of the step from q to new_q (of Bcm) is done."""
+    yaw = q[2] + part * (new_q[2] - q[2])
+    c, s = math.cos(yaw), math.sin(yaw)
+    row[0] = q[0] + part * (new_q[0] - q[0]) - c * com[0] + s * com[1]
+    row[1] = q[1] + part * (new_q[1] - q[1]) - s * com[0] - c * com[1]
+    row[2] = yaw
+
+
+@njit(cache=True)
 def integrate(px, py, w, mu, frame, polygon, kt, kp, kv, tip, pose, velocity, times, time_step, eps):
     m, inertia, hc, radius = frame[0], frame[1], frame[2], frame[3]
     com, fext = frame[4:6], frame[6:8]
@@ -340,18 +381,15 @@ def integrate(px, py, w, mu, frame, polygon, kt, kp, kv, tip, pose, velocity, ti
                 gap, nx, ny, rx, ry = _gap_at(new_q, t + h, com, polygon, radius, tip_radius, kt, kp, kv)
                 if gap >= 0.0:
                     break
-                low, high = 0.0, 1.0  # the touch, by bisection along the straight step
                 start_gap, _, _, _, _ = _gap_at(q, t, com, polygon, radius, tip_radius, kt, kp, kv)
                 if start_gap <= gap:  # already leaving
                     break
                 struck = True
-                for _ in range(45 if start_gap > 0 else 0):
-                    mid = (low + high) / 2
-                    for i in range(3):
-                        new_q[i] = q[i] + mid * h * mean[i]
-                    gap, _, _, _, _ = _gap_at(new_q, t + mid * h, com, polygon, radius, tip_radius, kt, kp, kv)
-                    low, high = (mid, high) if gap > 0 else (low, mid)
-                h = max(low * h, 1e-12)
+                if start_gap > 0:
+                    h *= _part_until_touch(q, mean, t, h, new_q, com, polygon, radius, tip_radius, kt, kp, kv)
+                else:
+                    h = 0.0
+                h = max(h, 1e-12)
             tipped = tipped or solved[6] > 0
             unconverged += 0 if good else 1
             lifted = solved[5]
@@ -360,27 +398,15 @@ def integrate(px, py, w, mu, frame, polygon, kt, kp, kv, tip, pose, velocity, ti
                 touching = False
             v[0], v[1], v[2] = wx, wy, solved[2]
             if struck:
-                _, nx, ny, rx, ry = _gap_at(new_q, t + h, com, polygon, radius, tip_radius, kt, kp, kv)
-                _, _, hvx, hvy = tip_at(t + h, kt, kp, kv)
-                ux, uy = v[0] - v[2] * ry - hvx, v[1] + v[2] * rx - hvy
-                un, ut = ux * nx + uy * ny, -ux * ny + uy * nx
-                touching = True
+                contact = _gap_at(new_q, t + h, com, polygon, radius, tip_radius, kt, kp, kv)
+                un, ut, pn, pt, touching = _struck(
+                    v, contact, tip_at(t + h, kt, kp, kv), m, inertia, mu_hand, restitution
+                )
                 if un < 0.0:
-                    e = restitution if -un > RESTITUTION_FLOOR else 0.0
-                    rn, rt = rx * ny - ry * nx, rx * nx + ry * ny
-                    pn, pt = routh_impact(m, inertia, rn, rt, un, ut, mu_hand, e)
-                    v[0] += (nx * pn - ny * pt) / m
-                    v[1] += (ny * pn + nx * pt) / m
-                    v[2] += (rn * pn + rt * pt) / inertia
                     impacts.append((t + h, -un, ut, pn, pt))
-                    touching = e == 0.0
         while done < len(times) and (times[done] <= t + h + 1e-12):
             part = min(1.0, max(0.0, (times[done] - t) / h)) if h < np.inf else 0.0
-            yaw = q[2] + part * (new_q[2] - q[2])
-            c, s = math.cos(yaw), math.sin(yaw)
-            out[done, 0] = q[0] + part * (new_q[0] - q[0]) - c * com[0] + s * com[1]
-            out[done, 1] = q[1] + part * (new_q[1] - q[1]) - s * com[0] - c * com[1]
-            out[done, 2] = yaw
+            _write_pose(out[done], q, new_q, part, com)
             out[done, 3:6] = v
             out[done, 6], out[done, 7], out[done, 8], out[done, 9] = fx, fy, 1.0 if touching else 0.0, lifted
             done += 1
