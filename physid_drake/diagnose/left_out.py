@@ -88,7 +88,7 @@ def _streams(case: Case, before: Sequence[Array], after: Sequence[Array]) -> lis
     old, new = errors_of(case, before), errors_of(case, after)
     streams = [(np.square(old.per_push), np.square(new.per_push))]
     forced = np.isfinite(old.force_per_push)
-    if case.noise.known and max(old.rms, new.rms) < BETTER and forced.any():
+    if case.noise.known and max(old.rms, new.rms) < BETTER and forced.sum() > 1:  # one is left out
         streams.append((np.square(old.force_per_push)[forced], np.square(new.force_per_push)[forced]))
     return streams
 

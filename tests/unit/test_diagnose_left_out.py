@@ -99,6 +99,16 @@ def test_the_force_of_one_push_alone_shows_nothing():
     assert not shown_by_several(case(), old, new)
 
 
+def test_forces_of_one_push_are_none_that_may_come_nearer():
+    """One push is left out of what decides: nothing of the others' would be left to speak against an effect."""
+    mixed = case()
+    mixed.features[1:] = [features(0)] * 9
+    old = [with_forces(1.0, 1.5)[0], *errors(1.0)[1:]]
+    new = [1.05 * vector for vector in old]
+    assert not comes_nearer(mixed, old, new)
+    assert not shown_by_several(mixed, old, new)
+
+
 def test_a_push_without_forces_takes_nothing_from_those_of_others():
     mixed = case()
     mixed.features[0] = features(0)
