@@ -223,9 +223,9 @@ class OnlineIdentifier:
         if not stale:
             return belief
         problems = [belief.terms[k].problem for k in stale]
-        fresh = dict(
-            zip(stale, linearised(self.pool, problems, belief.noise, belief.mean, belief.scatter), strict=True)
-        )
+        anew = linearised(self.pool, problems, belief.noise, belief.mean, belief.scatter)
+        # A push that does not simulate there still says what it said where it did.
+        fresh = {k: term for k, term in zip(stale, anew, strict=True) if not term.diverged}
         terms = tuple(fresh.get(k, term) for k, term in enumerate(belief.terms))
         return _solved(dc.replace(belief, terms=terms))
 

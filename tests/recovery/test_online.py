@@ -145,6 +145,15 @@ def test_a_push_whose_rollouts_diverge_changes_nothing_but_is_counted(recording,
     assert [a.diverged for a in belief.foreseen] == [0, 0, 1]
 
 
+def test_an_old_push_that_does_not_simulate_at_what_is_believed_now_keeps_what_it_said(learned, monkeypatch):
+    one, beliefs = learned
+    moved = dc.replace(beliefs[3], mean=beliefs[3].mean + 20.0 * stds(beliefs[3]))
+    monkeypatch.setattr(one.pool, "run", lambda tasks: [None] * len(tasks))
+    again = one._refreshed(moved)
+    assert all(new is old for new, old in zip(again.terms, moved.terms, strict=True))
+    np.testing.assert_allclose(again.mean, beliefs[3].mean, atol=1e-9)
+
+
 def test_an_interrupt_in_the_search_is_not_taken_for_its_end(recording, monkeypatch):
     one = learner(recording)
     run = one.pool.run
