@@ -29,12 +29,10 @@ def path_errors(fit: StraightFit, origin: float, least: float) -> tuple[PathErro
         origin: the time of the stream's first sample [s].
         least: of the hand, at the samples [m].
     """
-    if not len(fit.knots):
-        return ()
     curve, gap = fit.curve(), np.diff(fit.knots).min(initial=np.inf)
     found = []
     for way in _ways(fit, curve):
-        farthest = FARTHEST * gap / max(np.abs(way[curve.coefficients.size :]).max(), 1e-12)
+        farthest = FARTHEST * gap / max(np.abs(way[curve.coefficients.size :]).max(initial=0.0), 1e-12)
         error = _step(fit, curve, way, float(min(1.0, farthest)), origin)
         if error is None:
             continue

@@ -85,11 +85,22 @@ def test_a_slow_noise_that_is_taken_for_white_passes_for_motion():
     assert off(truth, untold).max() > 2.0
 
 
-def test_the_place_of_a_hand_that_stands_is_known():
-    path = HandPath(times=np.array([0.0, 1.0]), velocities=np.zeros((2, 2)), start=np.array([0.1, 0.2]))
+@pytest.mark.parametrize(("speed", "unknowns"), [(0.0, 1), (0.1, 2)])
+def test_a_hand_that_stands_or_goes_straight_on_is_off_as_a_straight_line_is(speed, unknowns):
+    """By sigma / sqrt(n) in the middle of n samples, and there only while the hand stands; along x and along y."""
+    path = HandPath(times=np.array([0.0, 1.2]), velocities=np.full((2, 2), speed), start=np.array([0.1, 0.2]))
     [(found, errors)] = fitted(path, [0])
-    assert errors == ()
-    assert np.linalg.norm(found.positions(TIMES) - path.start, axis=1).max() < STD
+    assert np.linalg.norm(found.positions(TIMES) - path.positions(TIMES), axis=1).max() < STD
+    assert len(errors) == 2 * unknowns
+
+    def places(one):
+        return one.positions(np.array([TIMES[0], TIMES.mean()]))
+
+    at_first, in_the_middle = np.linalg.norm(changes(found, errors, places), axis=0)
+    mean = STD / np.sqrt(len(TIMES))
+    np.testing.assert_allclose(in_the_middle, mean, rtol=0.01)
+    np.testing.assert_allclose(at_first, mean * (1.0 if unknowns == 1 else 2.0), rtol=0.01)
+    assert fitted(path, [0], least=STD)[0][1] == ()
 
 
 def test_errors_that_hardly_move_the_hand_are_left_out():
