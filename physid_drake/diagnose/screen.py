@@ -29,6 +29,7 @@ Tick = Callable[[int, int], None]
 DRAWS = 1000
 FEWEST_FOR_A_TREND = 6  # pushes
 IN_ORDER = 1e-4  # p-value
+STRIDE = 0.01  # m: an object is somewhere at least so often
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -201,7 +202,7 @@ def by_trend(fitted: Fitted, one: Score) -> Score:
     """
     told, frictions = told_frictions(fitted.pushes, fitted.state.scatter, fitted.solution.beta)
     changes = np.array(one.signature.friction_changes)[told] / UNIT_SCATTER
-    if len(frictions) < FEWEST_FOR_A_TREND or np.ptp(frictions) == 0.0:
+    if len(frictions) < FEWEST_FOR_A_TREND or np.ptp(frictions) == 0.0 or np.ptp(changes) == 0.0:
         return one
     by_rank = math.log(max(1e-300, float(stats.kendalltau(frictions, changes).pvalue)))
     slope = float(stats.theilslopes(frictions, changes).slope)
@@ -246,7 +247,16 @@ def _reaches(fitter: Fitter, kind: type[Effect], family: Family, i: int) -> bool
     """Whether an effect in one place can be felt in a push."""
     problem, around = fitter.case.problems[i], fitter.case.around
     places = np.vstack([np.array(problem.start.pose[:2]), problem.poses[:, :2]])
-    return kind.at(np.array(family.point), around).reaches(places, around)
+    return kind.at(np.array(family.point), around).reaches(_on_the_way(places), around)
+
+
+def _on_the_way(places: Array) -> Array:
+    """Places (n, 2) [m] and those between them on straight lines: of some pushes only both ends are known."""
+    ways = np.diff(places, axis=0)
+    counts = np.ceil(np.linalg.norm(ways, axis=1) / STRIDE).astype(int)
+    parts = np.concatenate([np.arange(count) / count for count in counts if count] or [np.zeros(0)])
+    between = np.repeat(places[:-1], counts, axis=0) + parts[:, None] * np.repeat(ways, counts, axis=0)
+    return np.vstack([between, places[-1:]])
 
 
 def tolerances(case: Case, found: Sequence[Signature]) -> tuple[Array, ...]:

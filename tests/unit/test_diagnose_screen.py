@@ -10,7 +10,16 @@ from scipy import stats
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve
 from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.pairs import promising
-from physid_drake.diagnose.screen import Signature, by_trend, cosine, log_probability, projected, score
+from physid_drake.diagnose.screen import (
+    STRIDE,
+    Signature,
+    _on_the_way,
+    by_trend,
+    cosine,
+    log_probability,
+    projected,
+    score,
+)
 from physid_drake.effects import Family
 
 PUSHES, NUMBERS = 12, 20
@@ -118,6 +127,28 @@ def test_frictions_in_order_are_seen_by_their_ranks(columns):
     assert not trend.in_order and not plain.in_order  # one in ten thousand is asked for
     # Its gain is that of a score test which is as unlikely.
     assert log_probability(trend.gain, 1, PUSHES, 1) == pytest.approx(trend.log_p)
+
+
+def test_frictions_that_an_effect_does_not_change_have_no_order(columns):
+    fitted = fitted_to(ORDER[:, None] * columns["own"], columns["own"])
+    one = score(fitted, signature_of("friction_drift", columns["own"], friction_changes=np.ones(PUSHES)))
+    assert by_trend(fitted, one) is one
+
+
+def test_of_a_push_whose_ends_are_known_the_way_between_them_is_a_straight_line():
+    ends = np.array([[0.1, 0.0], [0.4, 0.4]])
+    found = _on_the_way(ends)
+    np.testing.assert_allclose(found[[0, -1]], ends)
+    steps = np.diff(found, axis=0)
+    np.testing.assert_allclose(steps / STRIDE, np.tile(0.02 * (ends[1] - ends[0]) / STRIDE, (50, 1)), atol=1e-9)
+    assert np.linalg.norm(steps, axis=1).max() <= STRIDE * (1.0 + 1e-9)
+
+
+def test_places_that_are_near_each_other_stay_as_they_are():
+    seen = np.cumsum(np.random.default_rng(1).uniform(-0.4, 0.4, (50, 2)) * STRIDE, axis=0)
+    np.testing.assert_array_equal(_on_the_way(seen), seen)
+    np.testing.assert_array_equal(_on_the_way(seen[:1]), seen[:1])
+    np.testing.assert_array_equal(_on_the_way(np.repeat(seen[:1], 3, axis=0)), seen[:1])
 
 
 def test_a_perfect_order_of_few_pushes_is_no_certainty(columns):
