@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
@@ -29,6 +30,8 @@ FAST = 0.3  # of the largest speed: samples that show whether time stamps are la
 FEWEST_FAST = 40  # of them
 NOTABLE = 1.3  # times as far off along the way as across it
 MEDIAN_OF_NORMAL = 0.6745  # of the absolute value, over the standard deviation
+DIFFERENCES = (3, 5)  # orders that show a stream's noise
+LONG = 12  # samples, of which fifth differences are enough to tell
 
 # Speeds s(x) from 0 to 1 over a ramp, x from 0 to 1: limited jerk, and least jerk (Flash and Hogan 1985).
 SMOOTH_RAMPS: Final = (Polynomial([0, 0, 3, -2]), Polynomial([0, 0, 0, 10, -15, 6]))
@@ -77,7 +80,8 @@ def _fits_of(streams: Sequence[tuple[Array, Array]], std: float | None, memory: 
     jitter = _jitter_of(list(best.values()))
     if jitter > 0.0:
         best = {k: fit.with_jitter(jitter) for k, fit in best.items()}
-    asked = list(best.values())[:: max(1, len(best) // VOTERS)]
+    ramped = [fit for fit in best.values() if len(fit.knots) > 1]  # others have no ramps to judge
+    asked = ramped[:: max(1, len(ramped) // VOTERS)]
     votes = [sum(_vote(fit, SmoothFit(fit, ramp)) for fit in asked) for ramp in SMOOTH_RAMPS]
     if max(votes) > SURE:
         ramp = SMOOTH_RAMPS[int(np.argmax(votes))]
@@ -121,14 +125,29 @@ def fit_hand_path(times: Array, positions: Array, std: float | None) -> HandPath
 
 
 def _fit_of(times: Array, positions: Array, std: float | None, memory: float = 0.0) -> StraightFit:
-    sigma = max(std if std is not None else stream_std(positions), SMALLEST_STD)
+    sigma = max(std if std is not None else stream_std(times, positions), SMALLEST_STD)
     return StraightFit(times - times[0], positions, np.full(len(times), sigma), memory)
 
 
-def stream_std(positions: Array) -> float:
-    """Noise of a stream (n, 2) [m] from its third differences, which a path hardly has: variance 20 sigma^2."""
-    third = np.diff(positions, 3, axis=0)
-    return float(np.median(np.abs(third)) / MEDIAN_OF_NORMAL / np.sqrt(20.0))
+def stream_std(times: Array, positions: Array) -> float:
+    """Noise of a stream, times (n,) [s] and positions (n, 2) [m], from high differences, which a path hardly has.
+
+    The least of what third and, of long streams, fifth differences say, the samples taken as they are stamped and as
+    evenly spaced: at few samples a second, third ones have the path's own jerk, and stamps may be uneven or late.
+    """
+    orders = DIFFERENCES if len(times) >= LONG else DIFFERENCES[:1]
+    even = np.arange(len(times), dtype=np.float64)
+    return min(_rough(when, positions, order) for order in orders for when in (times, even))
+
+
+def _rough(times: Array, positions: Array, order: int) -> float:
+    """Standard deviation of white noise that makes the divided differences (n - order, 2) of a stream."""
+    windows = sliding_window_view(times, order + 1)
+    gaps = windows[:, :, None] - windows[:, None, :] + np.eye(order + 1)
+    weights = 1.0 / np.prod(gaps / np.ptp(windows, axis=1)[:, None, None], axis=2)
+    weights /= np.linalg.norm(weights, axis=1, keepdims=True)
+    differences = np.einsum("ij,ikj->ik", weights, sliding_window_view(positions, order + 1, axis=0))
+    return float(np.median(np.abs(differences)) / MEDIAN_OF_NORMAL)
 
 
 def _polygon_path(times: Array, positions: Array) -> HandPath:

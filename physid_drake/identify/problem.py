@@ -136,7 +136,7 @@ def _hand_noise(recording: Recording) -> tuple[float | None, float]:
     hands = [push.hand for push in recording.pushes if push.hand is not None and len(push.hand) > 6]
     if not hands:
         return None, 0.0
-    white = float(np.median([stream_std(hand.positions[:, :2]) for hand in hands]))
+    white = float(np.median([stream_std(hand.times, hand.positions[:, :2]) for hand in hands]))
     rests = [(hand.times[r], hand.positions[r, k]) for hand in hands for r in rests_of(hand) for k in (0, 1)]
     seen = seen_noise(rests, FINEST_HAND)
     interval = float(np.median(np.concatenate([np.diff(hand.times) for hand in hands])))

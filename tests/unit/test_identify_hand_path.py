@@ -107,8 +107,32 @@ def test_the_origin_of_time_does_not_matter():
 
 def test_the_noise_of_a_stream_is_seen_through_its_motion():
     for std in (1e-5, 1e-4):
-        _, stream = sampled(trapezoid(), 0.9, std=std, seed=3)
-        assert stream_std(stream) == pytest.approx(std, rel=0.35)
+        times, stream = sampled(trapezoid(), 0.9, std=std, seed=3)
+        assert stream_std(times, stream) == pytest.approx(std, rel=0.35)
+
+
+@pytest.mark.parametrize("spacing", ["uneven", "gaps", "late"])
+def test_uneven_or_late_stamps_are_no_noise_of_the_hand(spacing):
+    """At 0.2 m/s, 5 ms are 1 mm, a hundred times the noise."""
+    rng, n = np.random.default_rng(5), 90
+    even = np.arange(n) * 0.01
+    true = {
+        "uneven": np.cumsum(np.where(np.arange(n) % 2, 0.005, 0.015)), "gaps": even[np.arange(n) % 4 > 0],
+        "late": even,
+    }[spacing]  # fmt: skip
+    stamps = true + (rng.uniform(0.0, 0.004, len(true)) if spacing == "late" else 0.0)
+    stream = np.outer(true, [0.2, 0.1]) + 1e-5 * rng.standard_normal((len(true), 2))
+    assert stream_std(stamps, stream) == pytest.approx(1e-5, rel=0.35)
+
+
+@pytest.mark.parametrize(("rate", "lasts"), [(20.0, 0.8), (15.0, 0.8), (10.0, 1.5)])
+def test_a_smooth_hand_that_is_seen_seldom_is_not_taken_for_noisy(rate, lasts):
+    """Least jerk over 0.12 m: third differences alone say two and a half to five times the noise."""
+    x = np.linspace(0.0, 1.0, 65)
+    speeds = 0.12 / lasts * SMOOTH_RAMPS[1].deriv()(x)
+    path = HandPath(times=0.2 + lasts * x, velocities=np.outer(speeds, [1.0, 0.0]), start=np.zeros(2))
+    found = [stream_std(*sampled(path, 0.3 + lasts, rate=rate, std=1e-4, seed=seed)) for seed in range(12)]
+    assert 0.5e-4 < np.median(found) < 2e-4
 
 
 @pytest.mark.parametrize("rate", [100.0, 250.0, 1000.0])
@@ -166,6 +190,16 @@ def test_a_smooth_robots_hand_may_rest_or_be_seen_too_seldom_for_a_fit():
     assert all(fit.pieces > 1 for fit in moving)
     assert np.linalg.norm(resting.positions(times) - stream[0], axis=1).max() < STD
     assert len(seldom.times) == 4
+
+
+def test_hands_that_go_straight_on_say_nothing_of_ramps():
+    """Their streams are cut to where the speed is constant."""
+    pushes = robot(SMOOTH_RAMPS[0], 0)
+    straight = HandPath(times=np.array([0.0, 1.0]), velocities=np.tile([0.2, 0.1], (2, 1)), start=np.zeros(2))
+    cut = [sampled(straight, 0.5, rate=120.0, seed=seed) for seed in range(8)]
+    fits = fit_hand_paths([stream for _, stream in pushes] + cut, STD)
+    assert all(fit.pieces > 1 for fit in fits[: len(pushes)])
+    assert all(fit.pieces == 1 for fit in fits[len(pushes) :])
 
 
 @pytest.mark.parametrize("seed", range(3))
