@@ -52,6 +52,6 @@ def first_motion(problem: PushProblem, noise: Noise) -> float:
     """Roughly when the object starts to move: the model error begins there [s]. A tracker's noise is no motion."""
     if len(problem.times) < 3:
         return problem.begin
-    moved = np.linalg.norm(problem.poses[:, :2] - problem.poses[0, :2], axis=1)
+    moved = np.linalg.norm(problem.poses[:, :2] - np.array(problem.start.pose[:2]), axis=1)
     beyond = np.flatnonzero(moved > max(0.05 * float(moved.max(initial=0.0)), FIRST_SIGMAS * noise.position))
     return float(problem.times[max(0, beyond[0] - 1)]) if len(beyond) else problem.begin
