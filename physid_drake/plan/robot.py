@@ -40,7 +40,9 @@ class SimulatedRobot:
         ending: how the last push ended; AT_REST before the first.
     """
 
-    def __init__(self, hidden: Model, *, start: Pose, sensors: Sensors, rng: np.random.Generator) -> None:
+    def __init__(
+        self, hidden: Model, *, start: Pose, sensors: Sensors, rng: np.random.Generator, pushes: int = 0
+    ) -> None:
         """Put the object on the table.
 
         Args:
@@ -48,9 +50,10 @@ class SimulatedRobot:
             start: of the object.
             sensors: standard deviations of its white noise; None is none.
             rng: draws the noise.
+            pushes: how many were made before: the friction of a hidden world may drift with them.
         """
         self._hidden, self._pose, self._sensors, self._rng = hidden, start, sensors, rng
-        self._pushes = 0
+        self._pushes = pushes
         self.ending = Ending.AT_REST
 
     def see(self) -> Pose:

@@ -59,8 +59,9 @@ def most_informative_push(
     """Of planned pushes, the one that is expected to teach most about theta.
 
     A push's information is that of a recording at 100 Hz with the stated noise, its own unknowns marginalised as in
-    the fit: simulated Jacobians, no approximation of the mechanics. The gain is half the rise of the log-determinant
-    of the Gaussian information, averaged over ``thetas``: what a Gaussian belief is expected to lose in entropy.
+    the fit: simulated Jacobians, no approximation of the mechanics. But the hand's path is taken for exact: a noisy
+    hand teaches less than is expected. The gain is half the rise of the log-determinant of the Gaussian information,
+    averaged over ``thetas``: what a Gaussian belief is expected to lose in entropy.
 
     Args:
         pushes: to choose from, for instance ``policy.pushes(settings)[0]`` of drawn settings.

@@ -41,7 +41,9 @@ def test_a_robot_that_knows_nothing_learns_and_comes_nearer_to_the_goal_push_by_
 
     def robot(number):
         sensors = dc.replace(template.sensors, object_position_std=3e-4, object_rotation_std=3e-3)
-        return SimulatedRobot(hidden, start=START, sensors=sensors, rng=np.random.default_rng([5, number]))
+        return SimulatedRobot(
+            hidden, start=START, sensors=sensors, rng=np.random.default_rng([5, number]), pushes=number
+        )
 
     builder = DiagramBuilder()
     arm = builder.AddSystem(RobotSystem(robot, first=PlannedPush(direction=0.0, speed=0.1, travel=0.04)))
