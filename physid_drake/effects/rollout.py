@@ -20,6 +20,8 @@ from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]
 
+LEAST_FRICTION = 0.02  # of theta's bounds
+FARTHEST = 1.0  # m beyond the hand's way: a slide is hardly ever longer
 FURTHER = 4.0  # times: a bounce doubles the speed, a tilt takes three quarters of the friction
 SHORT = 1e-4  # s: for differences
 
@@ -177,8 +179,9 @@ def _region(cell: Cell, body: Body, push: Rollout, effects: Sequence[Effect]) ->
     if push.path is not None:
         places = np.concatenate([places, push.path.knot_positions()])
         speed = max(speed, float(np.sqrt((push.path.velocities**2).sum(axis=1).max())))
-    slide = speed**2 / (2.0 * GRAVITY * max(float(np.min(body.support_friction)), 0.05))
+    slide = speed**2 / (2.0 * GRAVITY * max(float(np.min(body.support_friction)), LEAST_FRICTION))
     slide *= FURTHER if len(effects) > 1 else 1.0
+    slide = FARTHEST if cell.solid.rolling_radius is not None else min(slide, FARTHEST)
     x0, y0, x1, y1 = cell.solid.underside.extent()
-    margin = math.hypot(x1 - x0, y1 - y0) + min(slide, 1.0)
+    margin = math.hypot(x1 - x0, y1 - y0) + slide
     return np.array([places.min(axis=0) - margin, places.max(axis=0) + margin])

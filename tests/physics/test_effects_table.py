@@ -90,6 +90,14 @@ def test_inside_a_patch_friction_is_its_ratio(ratio):
     assert end(outside)[0] == pytest.approx(0.5**2 / (2 * MU * G), rel=2e-4)  # measured 1.2e-5
 
 
+def test_a_slide_on_ice_ends_in_a_rough_patch():
+    """0.41 m on at a friction of 0.02; the patch begins after 0.32 m."""
+    free, stopped = (end(slide(*patch, velocity=(0.4, 0.0, 0.0), friction=0.02, seconds=2.5))[0]
+                     for patch in ((), (make("friction_patch", ratio=8.0, x=0.42, radius=0.1),)))  # fmt: skip
+    assert free == pytest.approx(0.4**2 / (2 * 0.02 * G), rel=1e-3)
+    assert 0.32 - 0.5 * SIZE[0] < stopped < free - 0.02
+
+
 @pytest.mark.parametrize("ratio", [0.4, 2.0])
 def test_a_slide_into_a_patch_is_that_of_the_points_that_have_entered(ratio):
     patch = make("friction_patch", ratio=ratio, x=0.15, y=0.0, radius=0.1)
