@@ -51,14 +51,16 @@ def test_a_force_that_is_off_is_off_over_the_whole_push():
     assert noise[0, 0] == pytest.approx(1.0 + noise[0, 2])
 
 
+@pytest.mark.parametrize("left_out", [0, 1])
 @pytest.mark.parametrize("count", [4, 5, 9, 40, 41, 200])
-def test_the_last_sample_of_a_stream_that_ends_in_motion_counts(count):
-    """A slide without a hand: no rest at either end."""
+def test_the_last_sample_of_a_stream_that_ends_in_motion_counts(count, left_out):
+    """A slide without a hand: no rest at either end, and its first sample is where it starts from."""
     times = 0.01 * np.arange(count)
     places = np.column_stack([times * (1.0 + times), 0.0 * times, 0.0 * times])
     stream = PoseStream(times=times, positions=places, quaternions=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)))
     push = Push(name="slide", object=stream, hand=None, force=None)
-    averaging = _averaging(push, SimpleNamespace(times=times, path=None))
+    averaging = _averaging(push, SimpleNamespace(times=times[left_out:], path=None))
+    assert (averaging[-1] > 0.0).sum() > 1 or count < 10  # no rest of a single sample
     np.testing.assert_allclose(averaging.sum(axis=1), 1.0)
     assert (averaging[:, -1] > 0.0).sum() == 1
     assert (averaging > 0.0).any(axis=0).all()
