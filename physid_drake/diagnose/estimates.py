@@ -213,6 +213,8 @@ def smallest(evidence: Evidence, alpha: float, least: float) -> tuple[Detectable
             coordinate = signature.kind.chart(case.around)[j]
             point = np.array(signature.family.point)
             point[j] += steps * signature.family.size * coordinate.step
+            if not coordinate.lower <= point[j] <= coordinate.upper:
+                continue  # not even the strongest would have shown
             one = _detectable(case, signature.kind, point, j, steps * a_step)
             if one.name not in best or one.sigmas < best[one.name].sigmas:
                 best[one.name] = one

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from physid_drake.diagnose import estimates
 from physid_drake.diagnose.estimates import correlation_of, parameters_of, theta_of
 from physid_drake.diagnose.model import EffectPoint
-from physid_drake.effects import Surroundings
-from physid_drake.effects.body import UnevenSupport
+from physid_drake.effects import Family, Surroundings
+from physid_drake.effects.body import Restitution, UnevenSupport
 from physid_drake.effects.drag import QuadraticDrag
 from physid_drake.effects.fields import TableTilt
 from physid_drake.effects.friction import FrictionPatch
@@ -107,3 +108,21 @@ def test_what_does_not_vary_or_is_no_single_number_is_left_out():
     names, found = correlation_of(CASE, fitted(support, covariance=1e-4 * np.eye(2)))
     assert names == ("theta.support_friction",)
     np.testing.assert_allclose(found, 1.0)
+
+
+@pytest.mark.parametrize(("column", "shows"), [(0.2, True), (0.02, False)])
+def test_what_would_not_show_at_its_strongest_is_not_among_what_would(column, shows, monkeypatch):
+    """Of a square of the restitution in steps of 0.01, up to 0.9: twelve steps would show, or 119."""
+    monkeypatch.setattr(estimates, "projected", lambda plain, blocks: (None, [np.full((3, 1), column)]))
+    evidence = SimpleNamespace(
+        plain=SimpleNamespace(pushes=[None] * 12, own_dimension=2), screening=SimpleNamespace(looks=10.0),
+        case=SimpleNamespace(around=AROUND, features=[SimpleNamespace(middles=np.zeros(1))]),
+        signatures=[SimpleNamespace(kind=Restitution, family=Family(point=(0.0,), free=(0,)), one_sided=(True,),
+                                    columns=[np.full((3, 1), column)])],
+    )  # fmt: skip
+    found = estimates.smallest(evidence, 0.01, 1.0)
+    assert [one.name for one in found] == (["restitution"] if shows else [])
+    if shows:
+        steps = np.sqrt(estimates._gain_needed(12, 2, 10.0, 0.01)) / (column * np.sqrt(3.0))
+        assert found[0].value == pytest.approx(Restitution.at(np.array([0.01 * steps]), AROUND).coefficient)
+        assert found[0].sigmas == pytest.approx(steps * column)
