@@ -49,6 +49,12 @@ class HandPath:
         result: Array = self.knot_positions()[k] + into * (self.velocities[k] + 0.5 * into * slope)
         return result
 
+    def top_speed(self, begin: float = -math.inf, end: float = math.inf) -> float:
+        """The largest speed between two times [m/s]; 0 where it stands all the while."""
+        inner = self.times[(self.times > begin) & (self.times < end)]
+        times = np.clip(np.array([begin, *inner, end]), self.times[0], self.times[-1])
+        return float(np.hypot(*(np.interp(times, self.times, v) for v in self.velocities.T)).max())
+
     def faster(self, share: float) -> HandPath:
         """All velocities larger by ``share``; the middle of the path keeps its place.
 

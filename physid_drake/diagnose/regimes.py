@@ -8,6 +8,7 @@ from physid_drake.diagnose.candidate import push_scores, standard_error
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import RegimeGain
+from physid_drake.identify.own_columns import first_motion
 
 FEWEST = 3  # pushes of a regime
 FASTER = 2.0  # the median of the fast over that of the slow pushes: less is one regime
@@ -52,10 +53,10 @@ def _by_speed(case: Case) -> Halves | None:
 
 
 def speed_of(case: Case, i: int) -> float:
-    """Largest speed of the hand [m/s], of the object where there is none."""
-    path = case.problems[i].path
-    if path is not None:
-        return float(np.linalg.norm(path.velocities, axis=1).max())
+    """Largest speed of the hand once the object moves [m/s], of the object where there is no hand."""
+    problem = case.problems[i]
+    if problem.path is not None:
+        return problem.path.top_speed(first_motion(problem, case.noise.position))
     return float(np.hypot(*case.problems[i].start.velocity[:2]))
 
 

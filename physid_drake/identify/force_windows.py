@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import HandPath
-from physid_drake.recording import Push, rest_segments
+from physid_drake.recording import Push, motion_span
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -20,7 +20,7 @@ LOADED = 0.3  # of the largest force: a window with more has contact
 TOUCH_SIGMAS = 3.0  # of the start pose
 STRIKE = 5e-3  # s: longer than two hard bodies touch
 STRIKE_SIGMAS = 3.0  # of a window's mean
-STANDS = 0.05  # of its largest speed: a hand that is slower stands
+STANDS = 0.05  # of its largest speed while the object moves: a hand that is slower stands
 STRIKE_SHARE = 0.1  # of the largest force: ten samples, of which one has all of it, saw no strike but the touch
 
 
@@ -57,7 +57,7 @@ def force_windows(push: Push, path: HandPath | None, sensor_std: float, start_st
     white = sensor_std / np.sqrt([len(part) for part in parts])
     silent = _struck([forces[part] for part in parts], means, white) | _resting(push, middles)
     if path is not None:
-        silent |= _touching(path, middles, means, white, start_std) | _standing(path, middles)
+        silent |= _touching(path, middles, means, white, start_std) | _standing(push, path, middles)
     told = ~silent
     largest = float(np.linalg.norm(means[told], axis=1).max(initial=0.0))
     return ForceWindows(middles=middles[told], means=means[told], stds=np.hypot(white[told], SHARE * largest))
@@ -101,22 +101,18 @@ def _resting(push: Push, middles: Array) -> Mask:
 
     A hand that stops against it may hold any force between none and what starts it again: friction holds as much.
     """
-    rests = rest_segments(push)
-    if not rests or rests[-1].start == 0 or rests[-1].stop < len(push.object.times):
-        return np.zeros(len(middles), dtype=bool)
-    resting: Mask = middles + 0.5 * WINDOW > push.object.times[rests[-1].start]
+    resting: Mask = middles + 0.5 * WINDOW > motion_span(push)[1]
     return resting
 
 
-def _standing(path: HandPath, middles: Array) -> Mask:
+def _standing(push: Push, path: HandPath, middles: Array) -> Mask:
     """Windows (k,) that reach into a standstill of the hand.
 
     What it has stopped pushing holds it as any object at rest does, which a noisy tracker does not always see.
     """
     ends = middles + 0.5 * WINDOW
     speeds = np.linalg.norm(path.positions(ends) - path.positions(ends - 0.1 * WINDOW), axis=1) / (0.1 * WINDOW)
-    fastest = float(np.linalg.norm(path.velocities, axis=1).max())
-    standing: Mask = speeds < STANDS * fastest
+    standing: Mask = speeds < STANDS * path.top_speed(*motion_span(push))
     return standing
 
 

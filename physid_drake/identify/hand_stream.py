@@ -1,4 +1,4 @@
-"""Which part of a hand's stream is a push: where its tip is beside the object."""
+"""Which part of a hand's stream is a push: where its tip is beside the object, and between two standstills."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import RecordingError
 from physid_drake.identify.frames import from_object
-from physid_drake.recording import Hand, PoseStream, Push, Recording
+from physid_drake.recording import Hand, PoseStream, Push, Recording, motion_span
+from physid_drake.recording.rests import rests_of
 
 Array = NDArray[np.float64]
 
@@ -18,6 +19,8 @@ MOVED = 5e-3  # m, beside the tracker's noise: an object that moves
 SPREAD = 8.0  # deviations between the outermost of a stream's samples, in two dimensions
 LONGEST_SLIDE = 1.5  # s: after it a released object rests
 BLINK = 0.1  # s: a hand that is away from the object for so long is not
+SEEN_LATE = 0.25  # s: by so much, the end of one body's rest may be seen before or after that of another
+FEWEST = 20  # samples of a hand of which a part is kept
 GRIP = 0.5  # of a round tip's radius: so far beyond the object's edge it still touches it nearly as wide as it is
 
 
@@ -45,7 +48,7 @@ def beside_object(recording: Recording, push: Push, height: float, sigma: float)
     runs = _runs_of(beside, hand.times)
     kept = max(runs, key=lambda run: run.stop - run.start, default=None)
     if kept is not None and _rests_outside(push, hand.times[kept], sigma):
-        return PoseStream(times=hand.times[kept], positions=hand.positions[kept], quaternions=hand.quaternions[kept])
+        return _part_of(hand, kept)
     pushing = [hand.times[run] for run in runs if _moves(push, *_felt(hand.times[run]), sigma)]
     if len(pushing) > 1 and _is_over(recording, push, hand)[~beside].any():
         spans = ", ".join(f"{times[0]:.2f} to {times[-1]:.2f} s" for times in pushing)
@@ -59,6 +62,27 @@ def beside_object(recording: Recording, push: Push, height: float, sigma: float)
             " high; correct hand_z_m or the object's size."
         )
     return hand
+
+
+def while_pushing(push: Push, hand: PoseStream) -> PoseStream:
+    """A hand's stream from its last standstill before the object moves to its first one when that has come to rest.
+
+    A hand that comes from afar, stands, pushes, stands and withdraws goes three ways, each at a speed of its own.
+    """
+    moves, rests = motion_span(push)
+    first, last = 0, len(hand)
+    for stand in rests_of(hand):
+        begins, ends = float(hand.times[stand.start]), float(hand.times[stand.stop - 1])
+        if begins < moves and ends < moves + SEEN_LATE:
+            first = stand.start
+        elif begins < rests + SEEN_LATE and ends > rests:
+            last = stand.stop
+            break
+    return _part_of(hand, slice(first, last)) if last - first >= FEWEST else hand
+
+
+def _part_of(hand: PoseStream, part: slice) -> PoseStream:
+    return PoseStream(times=hand.times[part], positions=hand.positions[part], quaternions=hand.quaternions[part])
 
 
 def _runs_of(flags: NDArray[np.bool_], times: Array) -> list[slice]:

@@ -45,13 +45,14 @@ def own_columns(problem: PushProblem, noise: Noise, residuals: Sequence[Array]) 
     of_path = [error.stds for error in problem.path_errors]
     steps = [NUISANCE_STEP] * (len(moved) - len(of_path)) + of_path
     columns = [difference(base, one) / step for one, step in zip(moved, steps, strict=True)]
-    return np.column_stack([*columns, model_error_columns(problem, noise, first_motion(problem, noise))])
+    # The model error begins when the object starts to move.
+    return np.column_stack([*columns, model_error_columns(problem, noise, first_motion(problem, noise.position))])
 
 
-def first_motion(problem: PushProblem, noise: Noise) -> float:
-    """Roughly when the object starts to move: the model error begins there [s]. A tracker's noise is no motion."""
+def first_motion(problem: PushProblem, sigma: float) -> float:
+    """Roughly when the object starts to move [s]; noise, whose standard deviation is sigma [m], is no motion."""
     if len(problem.times) < 3:
         return problem.begin
     moved = np.linalg.norm(problem.poses[:, :2] - np.array(problem.start.pose[:2]), axis=1)
-    beyond = np.flatnonzero(moved > max(0.05 * float(moved.max(initial=0.0)), FIRST_SIGMAS * noise.position))
+    beyond = np.flatnonzero(moved > max(0.05 * float(moved.max(initial=0.0)), FIRST_SIGMAS * sigma))
     return float(problem.times[max(0, beyond[0] - 1)]) if len(beyond) else problem.begin

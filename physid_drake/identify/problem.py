@@ -14,7 +14,7 @@ from physid_drake.cell.hand_fit import fit_uncertain_paths, stream_std
 from physid_drake.cell.hand_path import PathError
 from physid_drake.identify.force_windows import force_windows
 from physid_drake.identify.frames import FEWEST_FREE, checks_of, push_checks_of
-from physid_drake.identify.hand_stream import beside_object, vertical_reach
+from physid_drake.identify.hand_stream import beside_object, vertical_reach, while_pushing
 from physid_drake.recording import Cylinder as CylinderShape
 from physid_drake.recording import (
     NoiseEstimate,
@@ -228,6 +228,7 @@ def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[Push
     for check in checks_of(recording):
         check()
     hands = {k: beside_object(recording, push, height, noise.position) for k, push in enumerate(recording.pushes)}
+    hands = {k: hand and while_pushing(recording.pushes[k], hand) for k, hand in hands.items()}
     moving = {k: hand for k, hand in hands.items() if hand is not None}
     streams = [(hand.times, hand.positions[:, :2]) for hand in moving.values()]
     fitted = fit_uncertain_paths(

@@ -8,6 +8,7 @@ from physid_drake.recording.statistics import (
     NoiseEstimate,
     PushSummary,
     estimate_noise,
+    motion_span,
     rest_segments,
     summarise,
 )
@@ -47,6 +48,7 @@ __all__ = [
     "Table",
     "digest_of",
     "estimate_noise",
+    "motion_span",
     "outline_distance",
     "planar_poses",
     "polygon_centroid",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -92,6 +93,14 @@ def summarise(push: Push) -> PushSummary:
 def rest_segments(push: Push) -> list[slice]:
     """Slices of the object's samples in which it does not move, each of at least ten samples."""
     return rests_of(push.object)
+
+
+def motion_span(push: Push) -> tuple[float, float]:
+    """From when to when the object moves [s], between its first rest and its last; infinite where none is seen."""
+    rests, times = [] if push.endpoint_only else rest_segments(push), push.object.times
+    begin = float(times[rests[0].stop - 1]) if rests and rests[0].start == 0 else -math.inf
+    end = float(times[rests[-1].start]) if rests and rests[-1].stop == len(times) else math.inf
+    return (begin, end) if begin < end else (-math.inf, math.inf)
 
 
 def estimate_noise(recording: Recording) -> NoiseEstimate:

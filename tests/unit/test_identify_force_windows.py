@@ -1,13 +1,16 @@
 """Which means of recorded forces are compared: not those of touches, strikes and rests."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from problems import QUIET
 from runs import shipped_pushes
 
+from physid_drake.cell import HandPath
 from physid_drake.cell.hand_path import straight_path
+from physid_drake.identify import force_windows
 from physid_drake.identify.force_windows import SHARE, _resting, _standing, _touching
 from physid_drake.identify.problem import problems_of
 from physid_drake.recording import ForceStream, PoseStream
@@ -113,7 +116,18 @@ def test_the_force_on_an_object_at_rest_is_left_out(recording):
 def test_the_force_of_a_hand_that_stands_is_left_out():
     """Whether or not the tracker sees the object rest: one that stops against it leans on it with any force."""
     stops = straight_path(np.zeros(2), np.array([0.02, 0.0]), 1.0, 4.97)
-    np.testing.assert_array_equal(_standing(stops, MIDDLES), (MIDDLES < 1.0) | (MIDDLES > 5.93))
+    unseen = SimpleNamespace(endpoint_only=True, object=SimpleNamespace(times=np.array([0.0, 9.0])))
+    np.testing.assert_array_equal(_standing(unseen, stops, MIDDLES), (MIDDLES < 1.0) | (MIDDLES > 5.93))
+
+
+def test_a_hand_that_came_fast_and_pushes_slowly_does_not_stand(monkeypatch):
+    """0.3 m/s until the object moves at 1 s, and 10 mm/s from there to 6 s."""
+    monkeypatch.setattr(force_windows, "motion_span", lambda push: (1.0, 6.0))
+    times, speeds = np.array([0.8, 0.99, 1.0, 6.0]), np.array([0.3, 0.3, 0.01, 0.01])
+    path = HandPath(times=times, velocities=np.outer(speeds, [1.0, 0.0]), start=np.zeros(2))
+    standing = _standing(None, path, MIDDLES)
+    np.testing.assert_array_equal(standing[(MIDDLES > 1.0) & (MIDDLES < 5.9)], False)
+    np.testing.assert_array_equal(standing[MIDDLES > 6.0], True)
 
 
 @pytest.mark.parametrize("rate", [100.0, 1000.0])

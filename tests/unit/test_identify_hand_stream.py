@@ -8,6 +8,7 @@ from problems import QUIET, ends, first, with_pushes
 from runs import shipped_pushes
 
 from physid_drake.errors import RecordingError
+from physid_drake.identify.hand_stream import while_pushing
 from physid_drake.identify.problem import problems_of
 from physid_drake.recording import Box, Hand, ObjectModel, PoseStream, Push
 
@@ -111,3 +112,68 @@ def test_a_hand_that_lifts_off_is_cut_where_only_the_ends_are_known_too(recordin
     cut, whole = first(with_pushes(recording, lift)), first(with_pushes(recording, ends))
     assert cut.path.knot_positions()[-1] @ [1.0, 0.0] < pushed.positions[:, 0].max() + 1e-3
     assert cut.hand_height == whole.hand_height
+
+
+def visit(*, stands=0.5, halts=0.0, speed=0.02, travel=0.2):
+    """A box that lies at 0 to 3 s and later, and a hand that comes, stands, pushes, stands and withdraws.
+
+    Args:
+        stands: for how long before the push, and after it [s].
+        halts: for how long half way through the push [s].
+        speed: of the push [m/s]; the hand comes and withdraws at 0.25 m/s.
+        travel: how far it comes and withdraws [m].
+
+    Returns:
+        The push, and when its hand leaves the two standstills.
+    """
+    half, fast = 0.02 / speed, travel / 0.25
+    lasts = [0.5, fast, stands, half, halts, half, stands, fast, 0.5]
+    ways = [0.0, travel, 0.0, 0.02, 0.0, 0.02, 0.0, -travel, 0.0]
+    ends = np.cumsum(lasts)
+    times = np.arange(0.0, ends[-1], 0.005)
+    hand = np.interp(times, np.r_[0.0, ends], np.cumsum([-0.05 - travel, *ways]))
+    rng = np.random.default_rng(0)
+    pushed = np.interp(times, ends[2:6], [0.0, 0.02, 0.02, 0.04])
+    still = np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1))
+
+    def stream(x, noise):
+        places = np.column_stack([x, 0.0 * x, 0.025 + 0.0 * x])
+        places[:, :2] += noise * rng.standard_normal((len(x), 2))
+        return PoseStream(times=times, positions=places, quaternions=still)
+
+    return Push(name="visit", object=stream(pushed, 2e-4), hand=stream(hand, 5e-5), force=None), ends[2], ends[6]
+
+
+@pytest.mark.parametrize("halts", [0.0, 0.8])
+@pytest.mark.parametrize("speed", [0.01, 0.05, 0.2])
+def test_a_hand_that_comes_stands_pushes_and_withdraws_counts_from_stand_to_stand(speed, halts):
+    push, begin, end = visit(speed=speed, halts=halts)
+    part = while_pushing(push, push.hand)
+    assert begin - 0.5 - 0.05 < part.times[0] < begin - 0.2
+    assert end - 0.3 < part.times[-1] < end + 0.05
+    kept = (push.hand.times >= part.times[0]) & (push.hand.times <= part.times[-1])
+    np.testing.assert_array_equal(part.positions, push.hand.positions[kept])
+
+
+@pytest.mark.parametrize("halts", [0.0, 0.8])
+def test_a_hand_that_does_not_stand_before_or_after_a_push_counts_whole(halts):
+    push, *_ = visit(stands=0.0, halts=halts)
+    assert while_pushing(push, push.hand) is push.hand or len(while_pushing(push, push.hand)) == len(push.hand)
+
+
+def test_where_only_the_ends_are_known_a_hand_counts_whole():
+    push, *_ = visit()
+    assert len(while_pushing(ends(push), push.hand)) == len(push.hand)
+
+
+def test_what_a_hand_does_before_and_after_changes_nothing_of_its_push(recording):
+    """Nor of how it brakes: that may vary, and is not the brake of the way back."""
+    near, far = (visit(travel=travel)[0] for travel in (0.002, 0.2))
+    shape = replace(recording, object=ObjectModel(shape=Box(size=(0.08, 0.08, 0.05))),
+                    hand=Hand(tip="sphere", radius=0.01))  # fmt: skip
+    paths = [first(replace(shape, pushes=(push,)), height=0.05).path for push in (near, far)]
+    brakes = [path.times[list(path.last_brake())] for path in paths]
+    stops = [push.object.times[-1] - 0.5 - travel / 0.25 - 0.5 for push, travel in ((near, 0.002), (far, 0.2))]
+    for brake, stop in zip(brakes, stops, strict=True):
+        np.testing.assert_allclose(brake, stop, atol=0.06)
+    assert all(path.top_speed() == pytest.approx(0.02, rel=0.05) for path in paths)
