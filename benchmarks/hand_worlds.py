@@ -2,7 +2,8 @@
 
 Hands of the proof's worlds come from afar, go on at 0.05 to 0.5 m/s, brake and stay. Here the same scenes are pushed
 by hands that are slow (10 to 60 mm/s, with a force sensor), that go and brake as gently as people's arms do, that go
-round a bend, that halt on their way, or that begin where they touch and withdraw; by ones low on the object; or by
+round a bend, that halt on their way, or that begin where they touch and withdraw; by ones that come from afar, stand,
+push, stand and withdraw, as people's arms do (`visiting`; with a force sensor); by ones low on the object; or by
 ones that are tracked no better than the object, or with a slow noise. Of `camera`, hands and noise are the proof's,
 but the object is seen 31 times a second, between samples of the hand, stamps count from 1970, nothing is stated.
 Prints what was put in and what is said of it.
@@ -28,6 +29,7 @@ from physid_drake.recording import PoseStream, Push, Recording
 
 SPEEDS = (0.01, 0.06)  # m/s, of slow hands
 BRAKE = 0.1  # s
+AWAY, COMES, STANDS = 0.1, 0.25, 0.8  # m, m/s, s: how far and how fast a hand comes, and how long it stands
 WANDERS, MEMORY = 3e-4, 0.05  # m, s: a slow noise of the hand
 FORCE, RATE = 0.02, 100.0  # N, Hz
 CAMERA_RATE, FRAMES = 250.0, 8  # Hz; one picture in so many samples
@@ -148,6 +150,27 @@ def touching(rng: Rng, scene: Scene) -> Scene:
     return along(scene, path)
 
 
+def visiting(rng: Rng, scene: Scene) -> Scene:
+    """At 0.25 m/s to where the push begins, and 0.1 m back in the end, 0.8 s after it; all of least jerk."""
+    s = np.linspace(0.0, 1.0, 41)
+    shape = 30.0 * (s * (1.0 - s)) ** 2
+
+    def path(push: DrawnPush) -> HandPath:
+        old, ahead = push.path, heading_of(push.path)
+        length = float(np.linalg.norm(old.position(old.times[-1:])[0] - old.start))
+        ways, speeds = (AWAY, length, -AWAY), (COMES, speed_of(old), -COMES)
+        ends, times, velocities = old.times[0], [], []
+        for way, speed in zip(ways, speeds, strict=True):
+            lasts = 1.875 * way / speed
+            times.append(ends + lasts * s)
+            velocities.append(way / lasts * shape[:, None] * ahead)
+            ends += lasts + STANDS
+        return dc.replace(old, start=old.start - AWAY * ahead, times=np.concatenate(times),
+                          velocities=np.concatenate(velocities))  # fmt: skip
+
+    return along(dc.replace(scene, noise=dc.replace(scene.noise, force=FORCE), rate=RATE), path)
+
+
 def low(rng: Rng, scene: Scene) -> Scene:
     """The tip is at a quarter to a half of the object's height, instead of at a half."""
     height = float(rng.uniform(0.5, 1.0)) * scene.plan.tip_height
@@ -190,8 +213,8 @@ def thinned(stream: PoseStream, first: int, step: int) -> PoseStream:
 
 
 MANNERS = {
-    "slow": slow, "gentle": gentle, "curved": curved, "halting": halting, "touching": touching, "low": low,
-    "noisy": noisy, "wandering": wandering, "camera": camera,
+    "slow": slow, "gentle": gentle, "curved": curved, "halting": halting, "touching": touching,
+    "visiting": visiting, "low": low, "noisy": noisy, "wandering": wandering, "camera": camera,
 }  # fmt: skip
 
 
