@@ -10,7 +10,7 @@ from physid_drake.diagnose import confirm
 from physid_drake.diagnose.candidate import Candidate, push_scores, ranked, rivals
 from physid_drake.diagnose.linear import LinearPush, Whitened, solve
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
-from physid_drake.diagnose.regimes import _by_heading, _by_speed
+from physid_drake.diagnose.regimes import _by_heading, _by_speed, speed_of
 from physid_drake.effects import Effect, effect_named
 
 
@@ -145,14 +145,26 @@ def pushes(speeds, headings):
         ahead = np.array([np.cos(heading), np.sin(heading)])
         path = HandPath(times=np.array([0.0, 1.0]), velocities=np.array([speed * ahead] * 2), start=np.zeros(2))
         end = np.array([[0.1 * ahead[0], 0.1 * ahead[1], 0.0]])
-        made.append(SimpleNamespace(path=path, start=Start(pose=(0.0, 0.0, 0.0)), poses=end))
-    return SimpleNamespace(problems=made)
+        start = Start(pose=(0.0, 0.0, 0.0))
+        made.append(SimpleNamespace(path=path, start=start, begin=0.0, times=np.array([1.0]), poses=end))
+    return SimpleNamespace(problems=made, noise=SimpleNamespace(position=3e-4))
 
 
 def test_slow_and_fast_pushes_are_two_regimes():
     case = pushes([0.05, 0.4, 0.06, 0.5, 0.04, 0.6], [0.0] * 6)
     assert _by_speed(case) == ((4, 0, 2), (1, 3, 5))
     assert _by_heading(case) is None
+
+
+def test_how_fast_a_hand_came_is_not_how_fast_it_pushes():
+    """0.4 m/s until 0.5 s, then 0.03 m/s; the object moves from 0.6 s on."""
+    case, times = pushes([0.4], [0.0]), np.linspace(0.0, 2.0, 201)
+    knots, speeds = np.array([0.0, 0.45, 0.5, 2.0]), np.array([0.4, 0.4, 0.03, 0.03])
+    problem = case.problems[0]
+    problem.path = HandPath(times=knots, velocities=np.outer(speeds, [1.0, 0.0]), start=np.zeros(2))
+    problem.times, moved = times, 0.03 * np.maximum(0.0, times - 0.6)
+    problem.poses = np.column_stack([moved, 0.0 * times, 0.0 * times])
+    assert speed_of(case, 0) == pytest.approx(0.03)
 
 
 def test_pushes_to_either_side_are_two_regimes():
