@@ -65,15 +65,17 @@ class HandPath:
         start = middle + (1.0 + share) * (self.start - middle)
         return replace(self, velocities=(1.0 + share) * self.velocities, start=start)
 
-    def braking(self, share: float) -> HandPath:
+    def braking(self, share: float, begin: float = -math.inf, end: float = math.inf) -> HandPath:
         """The last brake longer by ``share`` about its middle, so that the hand stops at the same place.
 
         The object leaves the hand at the first instant of braking, so this is what a 100 Hz stream knows least.
 
         Args:
             share: relative change of the brake's duration [-].
+            begin: as of ``last_brake`` [s].
+            end: the same.
         """
-        brake = self.last_brake()
+        brake = self.last_brake(begin, end)
         if brake is None:
             return self
         first, last = (knot // self.pieces for knot in brake)
@@ -87,11 +89,20 @@ class HandPath:
         moved = replace(self, times=subdivided(times, self.pieces))
         return replace(moved, start=moved.start + self.knot_positions()[-1] - moved.knot_positions()[-1])
 
-    def last_brake(self) -> tuple[int, int] | None:
-        """Indices of the knots between which the speed falls for the last time, or None."""
-        speed = np.linalg.norm(self.velocities[:: self.pieces], axis=1)
-        top = float(speed.max(initial=0.0))
-        falls = [k for k in range(len(speed) - 1) if speed[k] > 0.3 * top and speed[k + 1] < 0.5 * speed[k]]
+    def last_brake(self, begin: float = -math.inf, end: float = math.inf) -> tuple[int, int] | None:
+        """Indices of the knots between which the speed falls for the last time, or None.
+
+        Args:
+            begin: when the object begins to move [s]: a hand that came faster braked before.
+            end: when it has come to rest [s]: one that withdraws goes back, and brakes later.
+        """
+        way = np.diff(self.positions(np.array([begin, end])), axis=0)[0]
+        velocities, times = self.velocities[:: self.pieces], self.times[:: self.pieces]
+        speed = np.where(velocities @ way > 0.0, np.linalg.norm(velocities, axis=1), 0.0)
+        seen = np.concatenate([speed[(times > begin) & (times < end)], np.interp([begin, end], times, speed)])
+        top = float(seen.max())
+        fast = (speed[:-1] > 0.3 * top) & (speed[1:] < 0.5 * speed[:-1])
+        falls = np.flatnonzero(fast & (times[1:] > begin) & (times[:-1] < end)).tolist()
         return (falls[-1] * self.pieces, (falls[-1] + 1) * self.pieces) if falls and top > 0.0 else None
 
 

@@ -8,7 +8,6 @@ from physid_drake.diagnose.candidate import push_scores, standard_error
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import RegimeGain
-from physid_drake.identify.own_columns import first_motion
 
 FEWEST = 3  # pushes of a regime
 FASTER = 2.0  # the median of the fast over that of the slow pushes: less is one regime
@@ -56,7 +55,7 @@ def speed_of(case: Case, i: int) -> float:
     """Largest speed of the hand once the object moves [m/s], of the object where there is no hand."""
     problem = case.problems[i]
     if problem.path is not None:
-        return problem.path.top_speed(first_motion(problem, case.noise.position))
+        return problem.path.top_speed(problem.moving[0])
     return float(np.hypot(*case.problems[i].start.velocity[:2]))
 
 

@@ -53,7 +53,7 @@ def nuisance_of(problem: PushProblem, friction_scatter: float) -> Nuisance:
         names += VELOCITY
         stds += list(problem.start_std[3:])
     else:
-        if problem.path.last_brake() is not None:
+        if problem.path.last_brake(*problem.moving) is not None:
             names.append("brake")
             stds.append(BRAKE_STD)
         names += ["speed", "restitution"]
@@ -78,7 +78,7 @@ def apply_nuisance(problem: PushProblem, nuisance: Nuisance, values: Array) -> P
     velocity = np.array(problem.start.velocity) + [given.get(name, 0.0) for name in VELOCITY]
     path = problem.path
     if path is not None:
-        path = path.faster(given.get("speed", 0.0)).braking(given.get("brake", 0.0))
+        path = path.faster(given.get("speed", 0.0)).braking(given.get("brake", 0.0), *problem.moving)
     start = replace(problem.start, pose=triple(pose), velocity=triple(velocity))
     return PushSetting(
         start=start,

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from physid_drake.identify.misfit import difference, model_error_columns
 from physid_drake.identify.nuisance import Nuisance
-from physid_drake.identify.problem import Noise, PushProblem
+from physid_drake.identify.problem import Noise, PushProblem, first_motion
 from physid_drake.identify.rollouts import Task
 
 Array = NDArray[np.float64]
 
 NUISANCE_STEP = 0.5  # of the prior standard deviation
-FIRST_SIGMAS = 4.0  # of the tracker: motion that is surely none of its noise
 
 
 def own_tasks(problem: PushProblem, nuisance: Nuisance, theta: Array) -> list[Task]:
@@ -47,12 +46,3 @@ def own_columns(problem: PushProblem, noise: Noise, residuals: Sequence[Array]) 
     columns = [difference(base, one) / step for one, step in zip(moved, steps, strict=True)]
     # The model error begins when the object starts to move.
     return np.column_stack([*columns, model_error_columns(problem, noise, first_motion(problem, noise.position))])
-
-
-def first_motion(problem: PushProblem, sigma: float) -> float:
-    """Roughly when the object starts to move [s]; noise, whose standard deviation is sigma [m], is no motion."""
-    if len(problem.times) < 3:
-        return problem.begin
-    moved = np.linalg.norm(problem.poses[:, :2] - np.array(problem.start.pose[:2]), axis=1)
-    beyond = np.flatnonzero(moved > max(0.05 * float(moved.max(initial=0.0)), FIRST_SIGMAS * sigma))
-    return float(problem.times[max(0, beyond[0] - 1)]) if len(beyond) else problem.begin

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from physid_drake.recording import (
     Recording,
     Shape,
     estimate_noise,
+    motion_span,
     rest_segments,
 )
 from physid_drake.recording.rest_noise import SILENT, seen_noise
@@ -40,6 +41,7 @@ NOTABLE_ERROR = 0.05  # of the tracker's deviation: what less of the hand does t
 SLOW_NOISE = 1.5  # samples: a hand's noise that remembers less is white, as one of robots' joints nearly is
 CLEAR = 0.3  # of the logarithm of its variance: noise that is known so well may be slow
 ROUGHER = 1.3  # times the third differences of the noise at rest
+FIRST_SIGMAS = 4.0  # of the tracker: motion that is surely none of its noise
 DISPROVED = 2.0  # times what is stated of hand or force: noise that is seen to be louder is believed
 # A simulation without noise, or a tracker that is quiet at rest: below these the cell's own error is what differs.
 FINEST_POSITION = 1e-5  # m
@@ -168,6 +170,7 @@ class PushProblem:
         force_times: (k,) middles of the force windows [s].
         forces: (k, 2) recorded mean forces on the object, x and y of W [N].
         force_std: (k,) of each [N].
+        moving: from when to when the object moves [s], as far as it is seen.
         pace: ticks longer than the cell's by this factor will do: the hand is slow.
         tip_height: of P above the table, as recorded [m]; None without a hand. Of an upright tip, which may be longer
             than the object is high, it is not the contact's.
@@ -187,6 +190,7 @@ class PushProblem:
     forces: Array
     force_std: Array
     hand_axes: Array = field(default_factory=lambda: np.eye(2))
+    moving: tuple[float, float] = (-math.inf, math.inf)
     pace: float = 1.0
     tip_height: float | None = None
     path_errors: tuple[PathError, ...] = ()
@@ -255,7 +259,7 @@ def _problem(
     compared = np.ones(len(planar), dtype=bool)
     compared[0] = not (push.endpoint_only or path is None)
     forces = force_windows(push, path, noise.force, float(start_std[0]))
-    return PushProblem(
+    problem = PushProblem(
         name=push.name,
         order=order,
         begin=float(push.object.times[0]),
@@ -273,6 +277,16 @@ def _problem(
         force_std=forces.stds,
         tip_height=None if hand is None else float(np.median(hand.positions[:, 2])),
     )
+    return replace(problem, moving=(first_motion(problem, noise.position), motion_span(push)[1]))
+
+
+def first_motion(problem: PushProblem, sigma: float) -> float:
+    """Roughly when the object starts to move [s]; noise, whose standard deviation is sigma [m], is no motion."""
+    if len(problem.times) < 3:
+        return problem.begin
+    moved = np.linalg.norm(problem.poses[:, :2] - np.array(problem.start.pose[:2]), axis=1)
+    beyond = np.flatnonzero(moved > max(0.05 * float(moved.max(initial=0.0)), FIRST_SIGMAS * sigma))
+    return float(problem.times[max(0, beyond[0] - 1)]) if len(beyond) else problem.begin
 
 
 def usual_heights(problems: Sequence[PushProblem]) -> tuple[float | None, float | None]:

@@ -146,8 +146,8 @@ def pushes(speeds, headings):
         path = HandPath(times=np.array([0.0, 1.0]), velocities=np.array([speed * ahead] * 2), start=np.zeros(2))
         end = np.array([[0.1 * ahead[0], 0.1 * ahead[1], 0.0]])
         start = Start(pose=(0.0, 0.0, 0.0))
-        made.append(SimpleNamespace(path=path, start=start, begin=0.0, times=np.array([1.0]), poses=end))
-    return SimpleNamespace(problems=made, noise=SimpleNamespace(position=3e-4))
+        made.append(SimpleNamespace(path=path, start=start, poses=end, moving=(0.0, np.inf)))
+    return SimpleNamespace(problems=made)
 
 
 def test_slow_and_fast_pushes_are_two_regimes():
@@ -158,12 +158,11 @@ def test_slow_and_fast_pushes_are_two_regimes():
 
 def test_how_fast_a_hand_came_is_not_how_fast_it_pushes():
     """0.4 m/s until 0.5 s, then 0.03 m/s; the object moves from 0.6 s on."""
-    case, times = pushes([0.4], [0.0]), np.linspace(0.0, 2.0, 201)
+    case, problem = pushes([0.4], [0.0]), pushes([0.4], [0.0]).problems[0]
     knots, speeds = np.array([0.0, 0.45, 0.5, 2.0]), np.array([0.4, 0.4, 0.03, 0.03])
-    problem = case.problems[0]
     problem.path = HandPath(times=knots, velocities=np.outer(speeds, [1.0, 0.0]), start=np.zeros(2))
-    problem.times, moved = times, 0.03 * np.maximum(0.0, times - 0.6)
-    problem.poses = np.column_stack([moved, 0.0 * times, 0.0 * times])
+    problem.moving = (0.6, 2.0)
+    case.problems[0] = problem
     assert speed_of(case, 0) == pytest.approx(0.03)
 
 

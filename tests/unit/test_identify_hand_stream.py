@@ -9,6 +9,7 @@ from runs import shipped_pushes
 
 from physid_drake.errors import RecordingError
 from physid_drake.identify.hand_stream import while_pushing
+from physid_drake.identify.nuisance import nuisance_of
 from physid_drake.identify.problem import problems_of
 from physid_drake.recording import Box, Hand, ObjectModel, PoseStream, Push
 
@@ -166,14 +167,18 @@ def test_where_only_the_ends_are_known_a_hand_counts_whole():
     assert len(while_pushing(ends(push), push.hand)) == len(push.hand)
 
 
-def test_what_a_hand_does_before_and_after_changes_nothing_of_its_push(recording):
-    """Nor of how it brakes: that may vary, and is not the brake of the way back."""
-    near, far = (visit(travel=travel)[0] for travel in (0.002, 0.2))
+@pytest.mark.parametrize("stands", [0.1, 0.5])
+@pytest.mark.parametrize("travel", [0.002, 0.2])
+def test_the_brake_that_may_vary_is_the_one_that_lets_the_object_go(recording, travel, stands):
+    """Neither that of a faster hand that comes, nor that of one that withdraws, however shortly it stands between."""
+    push, *_ = visit(travel=travel, stands=stands)
     shape = replace(recording, object=ObjectModel(shape=Box(size=(0.08, 0.08, 0.05))),
                     hand=Hand(tip="sphere", radius=0.01))  # fmt: skip
-    paths = [first(replace(shape, pushes=(push,)), height=0.05).path for push in (near, far)]
-    brakes = [path.times[list(path.last_brake())] for path in paths]
-    stops = [push.object.times[-1] - 0.5 - travel / 0.25 - 0.5 for push, travel in ((near, 0.002), (far, 0.2))]
-    for brake, stop in zip(brakes, stops, strict=True):
-        np.testing.assert_allclose(brake, stop, atol=0.06)
-    assert all(path.top_speed() == pytest.approx(0.02, rel=0.05) for path in paths)
+    problem = first(replace(shape, pushes=(push,)), height=0.05)
+    stop = 0.5 + travel / 0.25 + stands + 0.04 / 0.02
+    begins, _ = problem.path.last_brake(*problem.moving)
+    assert problem.path.times[begins] == pytest.approx(stop, abs=0.06)
+    assert nuisance_of(problem, 0.02).index("brake") >= 0
+    longer, shorter = (problem.path.braking(share, *problem.moving).positions(problem.times) for share in (0.5, -0.5))
+    moved = np.linalg.norm(longer - shorter, axis=1)
+    assert abs(problem.times[np.argmax(moved)] - stop) < 0.15
