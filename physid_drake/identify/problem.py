@@ -284,7 +284,7 @@ def first_motion(problem: PushProblem, sigma: float) -> float:
     """Roughly when the object starts to move [s]; noise, whose standard deviation is sigma [m], is no motion."""
     if len(problem.times) < 3:
         return problem.begin
-    moved = np.linalg.norm(problem.poses[:, :2] - np.array(problem.start.pose[:2]), axis=1)
+    moved = np.linalg.norm(problem.poses[:, :2] - problem.poses[0, :2], axis=1)
     beyond = np.flatnonzero(moved > max(0.05 * float(moved.max(initial=0.0)), FIRST_SIGMAS * sigma))
     return float(problem.times[max(0, beyond[0] - 1)]) if len(beyond) else problem.begin
 
