@@ -56,7 +56,7 @@ def speed_of(case: Case, i: int) -> float:
     problem = case.problems[i]
     if problem.path is not None:
         return problem.path.top_speed(problem.moving[0])
-    return float(np.hypot(*case.problems[i].start.velocity[:2]))
+    return float(np.hypot(*problem.start.velocity[:2]))
 
 
 def _by_heading(case: Case) -> Halves | None:
