@@ -32,6 +32,7 @@ from physid_drake.run_folder import RunFolder, named_after, versions
 STATE = "stages.npz"
 FILES = ("diagnosis.json", "page.html", "scene.html", "model.yaml")
 SHOWN = 12  # pushes in the animation
+MOST_NOTES = 8
 ALPHA = 0.01  # false-alarm rate
 LONGEST_STEP = 0.05  # s
 
@@ -116,8 +117,10 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
     if diagnosis.location is not None:
         console.print(f"Where: {diagnosis.location.statement}.")
     console.print(f"Left over: {diagnosis.left}.")
-    for warning in diagnosis.warnings:
+    for warning in diagnosis.warnings[:MOST_NOTES]:
         console.print(f"Note: {warning}.")
+    if len(diagnosis.warnings) > MOST_NOTES:
+        console.print(f"Note: {len(diagnosis.warnings) - MOST_NOTES} more in diagnosis.json and on the page.")
     if diagnosis.effects:
         console.print(findings_table(diagnosis))
     console.print(fit_table(diagnosis))
@@ -128,7 +131,7 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
     if push is not None:
         console.print(
             f"Next push: towards {push.direction_deg:.0f} degrees at {push.speed_mps:.2g} m/s,"
-            f" {push.aim}, would settle it with probability"
+            f" {push.aim}, {push.start}, would settle it with probability"
             f" {push.settles_with_probability:.2f}."
         )
 

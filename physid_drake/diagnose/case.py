@@ -89,7 +89,8 @@ class Case:
         gone = f"left out: {', '.join(self.lost)}, which the cell cannot simulate {WHY_LOST}"
         lost = (gone,) if self.lost else ()
         said = (*doubts(self.recording), *self.noise.warnings, *unseen, *self._unused_forces())
-        return (*few, *lost, *said)
+        read = (f"{push.name}: {warning.rstrip('.')}" for push in self.recording.pushes for warning in push.warnings)
+        return (*few, *lost, *said, *read)
 
     def _unused_forces(self) -> tuple[str, ...]:
         """That forces were recorded of which nothing could be compared."""

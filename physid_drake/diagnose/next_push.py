@@ -40,7 +40,8 @@ def next_push(case: Case, states: Sequence[State]) -> NextPush | None:
         states: the rival models.
 
     Returns:
-        The push and the probability that it settles the question; None without rivals or without a hand.
+        The push and the probability that it settles the question; None without rivals, without a hand, or where
+        every push would diverge or may lose the object.
     """
     if len(states) < 2 or case.recording.hand is None:
         return None
@@ -63,10 +64,13 @@ def next_push(case: Case, states: Sequence[State]) -> NextPush | None:
     case.pool.count += pool.count
     chances = [_chance(case, ends[k :: len(pushes)], pushes[k]) for k in range(len(pushes))]
     best = int(np.argmax(chances))
+    if chances[best] == 0.0:
+        return None
     direction, speed, offset = _choices()[best]
     return NextPush(
         direction_deg=math.degrees(direction), speed_mps=speed, contact_offset_m=offset * 0.5 * _width(case),
-        settles_with_probability=chances[best],
+        start_x_m=pushes[best].start.pose[0], start_y_m=pushes[best].start.pose[1],
+        start_yaw_deg=math.degrees(pushes[best].start.pose[2]), settles_with_probability=chances[best],
     )  # fmt: skip
 
 
@@ -112,9 +116,20 @@ def _problem(case: Case, direction: float, speed: float, offset: float) -> PushP
     )  # fmt: skip
 
 
+def _on_table(case: Case, end: Array) -> bool:
+    """Whether an object at a pose (3,) stands on the table as a whole, however it is turned."""
+    x0, y0, x1, y1 = np.abs(solid_of(case.recording.object.shape).outline.extent()).tolist()
+    reach = math.hypot(max(x0, x1), max(y0, y1))
+    centre, size = np.array(case.recording.table.centre), np.array(case.recording.table.size)
+    return bool((np.abs(end[:2] - centre) + reach < 0.5 * size).all())
+
+
 def _chance(case: Case, ends: Sequence[Array | None], problem: PushProblem) -> float:
-    """Probability that the end pose names the right one of the models, for the pair that is hardest to tell."""
-    if any(e is None for e in ends):
+    """Probability that the end pose names the right one of the models, for the pair that is hardest to tell.
+
+    None of a push in which a model diverges or lets the object come near an edge of the table.
+    """
+    if any(e is None or not _on_table(case, e) for e in ends):
         return 0.0
     chances = []
     for a, b in itertools.combinations([e for e in ends if e is not None], 2):

@@ -21,7 +21,11 @@ UNKNOWN = "neither stated nor seen at rest"
 UNUSUAL = 3.0  # times the median scatter of rests: one of more is none
 SMALLEST = 1e-18  # m^2
 CHANCE = 0.05  # of pushes that agree on a jitter there is not; fewer than five cannot agree as surely
-CONTRADICTS = 1.5  # seen over stated: beyond it the stated figure is not believed
+# Seen over stated: beyond it the stated figure is not believed. Of 294 stated figures of worlds whose noise is as
+# stated, what rests show is 0.88 to 1.07 of it; 1.2 times what is stated would make a mismatch of twelve good pushes.
+CONTRADICTS = 1.15
+SURELY = 3.0  # standard deviations of the logarithm of the variance seen
+FAR_QUIETER = 1.5  # stated over seen
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -109,6 +113,8 @@ def tracker_noise(recording: Recording) -> tuple[TrackerNoise, Noise]:
     if seen_yaw is None:  # too little rest for one stream, enough for two: it is the same tracker's filter
         tau_yaw = tau_xy
     believed = not warnings
+    warnings += _quieter("position", plain, seen_xy, "mm", 1e3)
+    warnings += _quieter("rotation", plain, seen_yaw, "deg", math.degrees(1.0))
     warnings += _of_hand_and_force(recording, plain)
     noise = TrackerNoise(
         position=position.std,
@@ -160,12 +166,25 @@ def _chosen(what: str, value: float, source: str, seen: SeenNoise | None, warnin
         return SeenNoise(std=value, correlation_time=0.0, doubt=0.0)
     if source != "stated":
         return seen
-    if seen.std > CONTRADICTS * value:
+    if seen.std > CONTRADICTS * value and 2.0 * math.log(seen.std / value) > SURELY * seen.doubt:
         warnings.append(
             f"the {what} noise at rest is {seen.std:.3g}, {seen.std / value:.1f} times what the recording states"
         )
         return seen
     return SeenNoise(std=value, correlation_time=seen.correlation_time, doubt=0.0)
+
+
+def _quieter(what: str, plain: Noise, seen: SeenNoise | None, unit: str, scale: float) -> list[str]:
+    """That rests are far quieter than stated: believed all the same, since many trackers are quieter at rest."""
+    stated = getattr(plain, what)
+    if seen is None or plain.source[what] != "stated" or FAR_QUIETER * seen.std > stated:
+        return []
+    if 2.0 * math.log(stated / seen.std) < SURELY * seen.doubt:
+        return []
+    return [
+        f"the {what} noise at rest is {scale * seen.std:.2g} {unit}, far less than the {scale * stated:.2g} {unit}"
+        " that the recording states; what is smaller than that is taken for noise"
+    ]
 
 
 def _jitter(pushes: Sequence[Push]) -> float:

@@ -188,12 +188,16 @@ class NextPush:
         direction_deg: of the hand's way in W.
         speed_mps: of the hand.
         contact_offset_m: of the hand's line from the centre of B, to its left.
+        start_x_m, start_y_m, start_yaw_deg: of the object in W before it; elsewhere it may tell something else.
         settles_with_probability: that it tells which rival is right.
     """
 
     direction_deg: float
     speed_mps: float
     contact_offset_m: float
+    start_x_m: float
+    start_y_m: float
+    start_yaw_deg: float
     settles_with_probability: float
 
     @property
@@ -203,6 +207,12 @@ class NextPush:
         if offset == 0:
             return "through the middle"
         return f"{abs(offset)} mm {'left' if offset > 0 else 'right'} of the middle"
+
+    @property
+    def start(self) -> str:
+        """Where the object stands before it, in words."""
+        place = f"({1e3 * self.start_x_m:.0f}, {1e3 * self.start_y_m:.0f}) mm"
+        return f"with the object at {place}, turned by {self.start_yaw_deg:.0f} degrees"
 
 
 @dc.dataclass(frozen=True, kw_only=True)

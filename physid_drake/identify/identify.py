@@ -22,11 +22,11 @@ from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
 from physid_drake.identify.polish import Polished, Polisher
 from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
-from physid_drake.identify.theta import ThetaMap, cell_error, theta_map
+from physid_drake.identify.theta import ThetaMap, cell_error, range_of, theta_map
 from physid_drake.progress import Progress
 from physid_drake.recording import Recording, thinned
 from physid_drake.search import SearchResult, search_minimum, search_named
-from physid_drake.space import ParameterSpace
+from physid_drake.space import Parameter, ParameterSpace
 
 Array = NDArray[np.float64]
 
@@ -321,11 +321,17 @@ def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
                 ci90=(_moved(space, u, j, low), _moved(space, u, j, high)),
                 identifiable=told,
                 prior=parameter.prior_mean,
-                # That nothing is below zero is physics, and no choice of the search's.
-                at_bound=bool(u[j] > 1.0 - AT_BOUND or (u[j] < AT_BOUND and parameter.lower != 0.0)),
+                at_bound=_may_lie_beyond(parameter, float(u[j])),
             )
         )
     return tuple(result)
+
+
+def _may_lie_beyond(parameter: Parameter, place: float) -> bool:
+    """Whether a value, at a place in its bounds from 0 to 1, is at one that the search chose, and not physics."""
+    beyond = range_of(parameter.name)
+    low = place < AT_BOUND and parameter.lower > max(beyond.above, beyond.least)
+    return low or (place > 1.0 - AT_BOUND and parameter.upper < min(beyond.most, beyond.below))
 
 
 def _moved(space: ParameterSpace, u: Array, j: int, value: float) -> float:

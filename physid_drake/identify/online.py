@@ -13,11 +13,19 @@ from physid_drake.cell import CellConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.identify.cells import cells_told, tied_cells
 from physid_drake.identify.config import SearchConfig, ThetaConfig
+from physid_drake.identify.frames import checks_of
 from physid_drake.identify.identify import Accuracy, Identification, accuracy_of, estimates_of, pooled
 from physid_drake.identify.linearise import PushTerm, linearised, prior_slope
 from physid_drake.identify.misfit import whitened_residual
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
-from physid_drake.identify.polish import SCATTER_PUSHES, Polished, degrees_of_freedom, new_scatter, prior_rows
+from physid_drake.identify.polish import (
+    SCATTER_PUSHES,
+    Polished,
+    degrees_of_freedom,
+    new_scatter,
+    prior_rows,
+    scatter_of,
+)
 from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, theta_map
@@ -49,7 +57,7 @@ class OnlineBelief:
         space: of theta.
         terms: of the pushes so far, but for those whose rollouts diverged.
         mean: (d,) of the Gaussian, in the unit cube.
-        scatter: of friction from push to push [-].
+        scatter: of friction from push to push, over the root of the inflation [-].
         inflation: by which the noise is widened where the pushes are not explained, at least 1.
         noise: of the recording; None before the first push.
         search: of the newest push, over candidates drawn from P_{t-1}. None before the first push.
@@ -112,7 +120,8 @@ class OnlineIdentifier:
         """Prepare.
 
         Args:
-            recording: says what is pushed, by what and how it is measured; its pushes are not looked at.
+            recording: says what is pushed, by what and how it is measured; of its pushes, if it has any, only whether
+                hand and object can meet in them.
             cell: how pushes are simulated.
             theta: what is unknown.
             search: its method and number of processes; the other numbers are those of the batch search.
@@ -120,7 +129,12 @@ class OnlineIdentifier:
             budget: rollouts of the search on a new push.
             pool: of the same cell and theta, to share; None makes one.
             progress: told stage, steps done, steps in all.
+
+        Raises:
+            RecordingError: if the mass is impossible, or no hand is where its object is.
         """
+        for check in checks_of(recording):
+            check()
         solid = solid_of(recording.object.shape)
         grid = (cell.friction_cells[0], cell.friction_cells[1])
         free = theta_map(recording.object, solid, grid, theta, cell.default_density_kgpm3)
@@ -155,7 +169,7 @@ class OnlineIdentifier:
         # The noise is what sensors state, or what the first push shows: weights must not change under the terms.
         alone = thinned(dc.replace(self._recording, pushes=(push,)))
         noise = belief.noise or noise_of(alone)
-        problem = dc.replace(problems_of(alone, noise, self._height)[0], order=count)
+        problem = dc.replace(problems_of(alone, noise, self._height, whole=False)[0], order=count)
         expected = self._predicted(problem, [belief.theta])[0]
         found = self._search(belief, problem, noise, rng)
         self._progress("what the push tells", count, 0)
@@ -279,8 +293,9 @@ def _with_scales(belief: OnlineBelief, samples: int) -> OnlineBelief:
     scatter = belief.scatter
     if len(belief.terms) >= SCATTER_PUSHES:
         places = [term.nuisance.index("friction") for term in belief.terms]
-        scaled = [r / np.sqrt(inflation) for r in residuals]
-        scatter = new_scatter(whiteners, places, scaled, old=scatter, first=FIRST_SCATTER)
+        wide = float(np.sqrt(inflation))
+        scaled = [r / wide for r in residuals]
+        scatter = new_scatter(whiteners, places, scaled, old=scatter, first=FIRST_SCATTER / wide)
     return dc.replace(belief, inflation=inflation, scatter=scatter)
 
 
@@ -302,6 +317,6 @@ def _polished(belief: OnlineBelief) -> Polished:
     return Polished(
         theta=belief.theta, jacobian=belief.rows, chi2=float(sum((m**2).sum() for m in marginal)),
         inflation=belief.inflation, samples=sum(len(term.residual) for term in belief.terms),
-        friction_scatter=belief.scatter, residuals=tuple(marginal), unknowns=tuple(unknowns),
-        rollouts=belief.rollouts,
+        friction_scatter=scatter_of(belief.scatter, belief.inflation, len(belief.terms)),
+        residuals=tuple(marginal), unknowns=tuple(unknowns), rollouts=belief.rollouts,
     )  # fmt: skip

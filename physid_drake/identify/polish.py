@@ -96,6 +96,19 @@ def scatter_freedom(pushes: int) -> float:
     return SCATTER_WEIGHT + (pushes if pushes >= SCATTER_PUSHES else 0)
 
 
+def scatter_of(share: float, inflation: float, pushes: int) -> float:
+    """Friction's scatter from push to push [-], as pushes have it.
+
+    In a fit the inflation widens the priors of pushes' own unknowns along with the noise, so that it works with less.
+
+    Args:
+        share: the scatter in the fit, over the root of the inflation.
+        inflation: of the noise.
+        pushes: that the scatter was learned from; of too few it is the first guess, which nothing widens.
+    """
+    return min(LARGEST_SCATTER, share * float(np.sqrt(inflation))) if pushes >= SCATTER_PUSHES else share
+
+
 class Polisher:
     """Alternates: linearise the pushes' own unknowns, then fit theta with them marginalised."""
 
@@ -216,9 +229,10 @@ class Polisher:
             return whiteners
         old = self._scatter
         places = [nuisance.index("friction") for nuisance in self._nuisances()]
-        scaled = [residuals[k] / np.sqrt(self._inflation) for k in told]
+        wide = float(np.sqrt(self._inflation))
+        scaled = [residuals[k] / wide for k in told]
         self._scatter = new_scatter(
-            [whiteners[k] for k in told], [places[k] for k in told], scaled, old=old, first=self._first_scatter
+            [whiteners[k] for k in told], [places[k] for k in told], scaled, old=old, first=self._first_scatter / wide
         )
         return [rescaled(w, k, self._scatter / old) for w, k in zip(whiteners, places, strict=True)]
 
@@ -235,7 +249,7 @@ class Polisher:
             chi2=float(sum((m**2).sum() for m in marginal)),
             inflation=self._inflation,
             samples=sum(len(r) for i, r in enumerate(residuals) if i not in self._lost),
-            friction_scatter=self._scatter,
+            friction_scatter=scatter_of(self._scatter, self._inflation, len(whiteners) - len(self._lost)),
             residuals=tuple(marginal),
             unknowns=tuple(unknowns),
             rollouts=rollouts,

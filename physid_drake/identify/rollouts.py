@@ -64,10 +64,11 @@ class Task:
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
-    """What a rollout says about what was recorded: poses (n, 3) and mean forces (k, 2)."""
+    """What a rollout says about what was recorded: poses (n, 3) and mean forces (k, 2), and whether it ``fell``."""
 
     poses: Array
     forces: Array
+    fell: bool = False
 
 
 def simulate(spec: CellSpec, thetas: ThetaMap, task: Task) -> Motion:
@@ -112,7 +113,8 @@ def predict(spec: CellSpec, thetas: ThetaMap, task: Task) -> Prediction | None:
     poses[:, 2] += 2.0 * np.pi * turns
     if len(poses) == 1:  # nothing was recorded on the way to it: by how many turns nobody saw
         poses[:, 2] += 2.0 * np.pi * np.round((task.problem.poses[:, 2] - poses[:, 2]) / (2.0 * np.pi))
-    return Prediction(poses=poses, forces=_window_forces(motion, task.problem.force_times))
+    forces = _window_forces(motion, task.problem.force_times)
+    return Prediction(poses=poses, forces=forces, fell=motion.outcome is Outcome.FELL)
 
 
 def _window_forces(motion: Motion, middles: Array) -> Array:

@@ -14,6 +14,7 @@ from physid_drake.cell.checks import HEAVIEST, LIGHTEST
 from physid_drake.cell.solid import Solid
 from physid_drake.errors import ConfigError
 from physid_drake.identify.config import ThetaConfig
+from physid_drake.ranges import ANY, COEFFICIENT, POSITIVE, Range
 from physid_drake.recording import ObjectModel
 from physid_drake.space import Parameter, ParameterSpace
 
@@ -24,6 +25,16 @@ Array = NDArray[np.float64]
 CELL_ERROR = 0.01
 EXACT = 1e-4  # of a mass: a scale is not believed to be better
 UNWEIGHED = 0.8  # standard deviation of the logarithm of a mass that nobody weighed
+RANGES = {
+    "mass": POSITIVE, "hand_friction": POSITIVE, "inertia_ratio": POSITIVE, "com_x": ANY, "com_y": ANY,
+    "static_ratio": Range(above=0.0, least=1.0), "restitution": COEFFICIENT,
+}  # fmt: skip
+"""Of theta; all frictions with the table are positive, too."""
+
+
+def range_of(name: str) -> Range:
+    """What physics allows of a parameter of theta."""
+    return POSITIVE if name.startswith("support_friction") else RANGES[name]
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -105,6 +116,9 @@ def _adjusted(parameter: Parameter, config: ThetaConfig) -> Parameter:
         lower, upper = float(bounds[0]), float(bounds[1])
         middle = min(max(parameter.prior_mean, lower), upper)
         parameter = dc.replace(parameter, lower=lower, upper=upper, prior_mean=middle)
+        allowed = range_of(parameter.name)
+        if not (allowed.holds(lower) and allowed.holds(upper)):
+            raise ConfigError(f"theta.bounds.{family}: needs numbers {allowed.rule}, but got {bounds}.")
     if nominal is not None:
         parameter = dc.replace(parameter, prior_mean=float(nominal))
     return parameter

@@ -14,21 +14,16 @@ from scipy.stats import qmc
 
 from physid_drake.cell import Body
 from physid_drake.errors import ConfigError
-from physid_drake.identify.theta import friction_names
+from physid_drake.identify.theta import RANGES, friction_names
 from physid_drake.model import Model
 from physid_drake.plan.trajectory import Situation
-from physid_drake.ranges import ANY, COEFFICIENT, POSITIVE, Range
+from physid_drake.ranges import POSITIVE, Range
 
 Array = NDArray[np.float64]
 
 Z90 = float(stats.norm.ppf(0.95))
 FURTHEST = 3.0  # standard deviations
 LEAST_FRICTION = 0.01
-RANGES = {
-    "mass": POSITIVE, "hand_friction": POSITIVE, "inertia_ratio": POSITIVE, "com_x": ANY, "com_y": ANY,
-    "static_ratio": Range(above=0.0, least=1.0), "restitution": COEFFICIENT,
-}  # fmt: skip
-"""Of theta; all frictions with the table are positive, too."""
 
 
 def uncertain_names(model: Model) -> list[str]:

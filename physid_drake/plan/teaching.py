@@ -32,7 +32,8 @@ class Lesson:
 
     Attributes:
         best: index of the push that teaches most.
-        gains: (n,) expected information of each push about theta [nats]; 0 where its rollout diverged.
+        gains: (n,) expected information of each push about theta [nats]; 0 where its rollout diverged or fell
+            off the table.
         informations: (n, d, d) expected information of each push, in the unit cube of theta.
         stds: (n, d) posterior standard deviations after each push, in the unit cube.
     """
@@ -105,7 +106,7 @@ def most_informative_push(
 def _informations(
     pool: RolloutPool, problems: Sequence[PushProblem], noise: Noise, theta: Array, scatter: float
 ) -> Array:
-    """Information (n, d, d) of each push at theta (d,); zero where the rollout diverged."""
+    """Information (n, d, d) of each push at theta (d,); zero where the rollout diverged or fell."""
     nuisances = [nuisance_of(problem, scatter) for problem in problems]
     foreseen = pool.run(
         [
@@ -113,13 +114,14 @@ def _informations(
             for p, n in zip(problems, nuisances, strict=True)
         ]
     )
-    made = [k for k, prediction in enumerate(foreseen) if prediction is not None]
+    # An object that is lost is not pushed again, and what follows its fall would be no measurement.
+    kept = {k: p for k, p in enumerate(foreseen) if p is not None and not p.fell}
     # What is predicted stands for what will be recorded: only the slopes count.
-    recorded = [dc.replace(problems[k], poses=p.poses) for k, p in enumerate(foreseen) if p is not None]
+    recorded = [dc.replace(problems[k], poses=p.poses) for k, p in kept.items()]
     space = pool.thetas.space
     told = np.zeros((len(problems), space.dimension, space.dimension))
     for k, term in zip(
-        made, linearised(pool, recorded, noise, np.asarray(space.to_unit(theta)), scatter), strict=True
+        kept, linearised(pool, recorded, noise, np.asarray(space.to_unit(theta)), scatter), strict=True
     ):
         told[k] = term.information(scatter)
     return told

@@ -151,10 +151,7 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "noise": _noise(diagnosis),
         "noise_known": not any(warning.startswith(UNKNOWN) for warning in diagnosis.warnings),
         "detectable": [_detectable_row(one) for one in diagnosis.detectable],
-        "warnings": [
-            *diagnosis.warnings,
-            *(f"{push.name}: {warning}" for push in recording.pushes for warning in push.warnings),
-        ],
+        "warnings": diagnosis.warnings,
     }
 
 

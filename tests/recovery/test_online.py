@@ -11,6 +11,7 @@ from reference.scenes import OBJECTS, Theta
 from runs import COARSE, shipped_pushes
 from worlds import POINTS, pushes_of, recorded, slides
 
+from physid_drake.errors import RecordingError
 from physid_drake.identify import OnlineIdentifier, SearchConfig, ThetaConfig
 from physid_drake.identify.linearise import linearised, prior_slope
 from physid_drake.identify.online import _solved
@@ -248,3 +249,14 @@ def test_friction_of_three_cells_is_recovered_push_by_push():
     assert result.cells.told == 3
     assert result.cells.not_apart == ()
     assert _solved(belief).mean == pytest.approx(belief.mean, abs=1e-3)
+
+
+def test_a_push_that_misses_does_not_end_what_is_learned_of_others(recording):
+    """As in the batch: that no hand comes near is refused only where it is so in every push."""
+    aside = recording.pushes[1]
+    far = dc.replace(aside, hand=dc.replace(aside.hand, positions=aside.hand.positions + np.array([0.0, 0.5, 0.0])))
+    one = learner(dc.replace(recording, pushes=(recording.pushes[0], far)))
+    belief = one.learn(one.learn(one.start(), recording.pushes[0]), far)
+    assert len(belief.foreseen) == 2
+    with pytest.raises(RecordingError, match="same frame"):
+        learner(dc.replace(recording, pushes=(far,)))

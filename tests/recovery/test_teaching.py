@@ -111,3 +111,16 @@ def test_there_must_be_a_push_and_a_hand(taught):
         most_informative_push(
             [], pool=one.pool, noise=noise_of(shipped_pushes(1)), start=START, thetas=np.array([0.2, 0.3])
         )
+
+
+def test_an_object_that_would_be_lost_teaches_nothing(taught):
+    """Its last pose, held until the recording ends, would count as many measurements of where it fell."""
+    one, _, _ = taught
+    x1 = one.pool.spec.table[1][0]
+    ways = [PlannedPush(direction=d, speed=0.5, travel=0.1, contact_offset=0.0) for d in (0.0, np.pi)]
+    lesson = most_informative_push(
+        ways, pool=one.pool, noise=noise_of(shipped_pushes(1)), start=(x1 - 0.06, 0.0, 0.0),
+        thetas=np.array([0.22, 0.27]),
+    )  # fmt: skip
+    assert lesson.best == 1 and lesson.gains[0] == 0.0 < lesson.gains[1]
+    np.testing.assert_array_equal(lesson.informations[0], 0.0)

@@ -2,10 +2,11 @@
 
 import dataclasses as dc
 
+import numpy as np
 import pytest
 
 from physid_drake.diagnose.case import case_of, cell_config
-from physid_drake.diagnose.next_push import LONGEST_TICK, brisk_pool
+from physid_drake.diagnose.next_push import LONGEST_TICK, _chance, brisk_pool
 from physid_drake.diagnose.plain import coarse
 from physid_drake.errors import RecordingError
 from physid_drake.identify.config import ThetaConfig
@@ -80,3 +81,17 @@ def test_pushes_that_cannot_be_simulated_are_left_out_and_said(recording):
     assert not any("equal distances" in w for w in rest.warnings)
     with pytest.raises(RecordingError, match="single push"):
         rest.without([0, 1])
+
+
+def test_what_the_reader_left_out_is_said_in_the_answer(recording):
+    lost = dc.replace(recording.pushes[1], warnings=("object: row 4: track lost (all zeros), left out.",))
+    some = dc.replace(recording, pushes=(recording.pushes[0], lost, recording.pushes[2]))
+    assert "pushes/002.csv: object: row 4: track lost (all zeros), left out" in case(some).warnings
+
+
+@pytest.mark.parametrize(("x", "chance"), [(0.0, 1.0), (0.30, 0.0)])
+def test_a_push_that_may_lose_the_object_is_not_proposed(recording, x, chance):
+    small = dc.replace(recording, table=dc.replace(recording.table, centre=(0.0, 0.0), size=(0.6, 0.6)))
+    one = case(small)
+    ends = [np.array([x, 0.0, 0.1]), np.array([x - 0.2, 0.0, 0.1])]
+    assert _chance(one, ends, one.problems[0]) == pytest.approx(chance)

@@ -90,6 +90,46 @@ def test_a_stated_noise_that_the_rests_contradict_is_not_believed(recording):
     assert "position" in noise.warnings[0]
 
 
+@pytest.mark.parametrize(("share", "believed"), [(1.0, True), (0.9, True), (0.75, False), (0.65, False)])
+def test_what_is_believed_of_a_stated_noise_depends_on_how_surely_rests_are_louder(share, believed):
+    """A fixed factor of 1.5 believed 1.45 times as much: costs of 2.1 per degree of freedom, and a mismatch."""
+    push = recorded(ERASER, Theta(), pushes_of(ERASER, 1, 3), 5)
+    many = dc.replace(push, pushes=tuple(resting(push.pushes[0], k) for k in range(8)),
+                      sensors=dc.replace(push.sensors, object_position_std=share * POSITION_STD))  # fmt: skip
+    noise, _ = tracker_noise(many)
+    assert noise.stated is believed and (noise.doubt == 0.0) is believed
+    assert noise.position == pytest.approx(share * POSITION_STD if believed else POSITION_STD, rel=0.1)
+    few, _ = tracker_noise(dc.replace(many, pushes=(short_rest(many.pushes[0]),)))
+    assert few.stated and few.position == share * POSITION_STD  # so few samples cannot be sure
+
+
+def resting(push, seed):
+    """A push whose object stands still for 200 samples, with the noise that is stated."""
+    rng = np.random.default_rng(seed)
+    noise = POSITION_STD * rng.standard_normal((200, 3))
+    times = 0.01 * np.arange(200)
+    quaternions = np.repeat(push.object.quaternions[:1], 200, axis=0)
+    still = dc.replace(push.object, times=times, positions=push.object.positions[0] + noise, quaternions=quaternions)
+    return dc.replace(push, name=f"pushes/{seed}.csv", object=still)
+
+
+def short_rest(push):
+    some = push.object
+    return dc.replace(
+        push,
+        object=dc.replace(
+            some, times=some.times[:12], positions=some.positions[:12], quaternions=some.quaternions[:12]
+        ),
+    )
+
+
+def test_rests_far_quieter_than_stated_are_said_and_the_stated_noise_is_believed(recording):
+    loud = dc.replace(recording, sensors=dc.replace(recording.sensors, object_position_std=3.0 * POSITION_STD))
+    noise, _ = tracker_noise(loud)
+    assert noise.stated and noise.position == 3.0 * POSITION_STD and noise.doubt == 0.0
+    assert [w for w in noise.warnings if "position noise at rest" in w and "far less" in w]
+
+
 @pytest.mark.parametrize(("stated", "said"), [(5e-5, "times what the recording states"), (0.0, "states none")])
 def test_a_hands_noise_that_its_stream_contradicts_is_said(recording, stated, said):
     loud = [

@@ -91,7 +91,8 @@ def diagnosis_with(**changes):
                 value=0.25, unit="-", ci90=(0.2, 0.3), identifiable=True, before=0.24
             ),
         },
-        next_push=NextPush(direction_deg=45.0, speed_mps=0.2, contact_offset_m=-0.01, settles_with_probability=0.9),
+        next_push=NextPush(direction_deg=45.0, speed_mps=0.2, contact_offset_m=-0.01, start_x_m=0.1,
+                           start_y_m=-0.05, start_yaw_deg=0.0, settles_with_probability=0.9),
         seed=3,
         ranking=(
             ranked("stribeck_friction", gain=40.0, p_value=0.0, held_out_gain=20.0, held_out_se=4.0, why="found"),

@@ -7,9 +7,16 @@ from runs import shipped_pushes
 from physid_drake.cell import CellConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.identify import Identifier, SearchConfig, ThetaConfig
-from physid_drake.identify.identify import estimates_of
-from physid_drake.identify.misfit import FAILED, diverged, whitened_residual
-from physid_drake.identify.polish import THETA_STEP, Polished, Polisher, degrees_of_freedom
+from physid_drake.identify.identify import _may_lie_beyond, estimates_of
+from physid_drake.identify.misfit import FAILED, Whitener, diverged, whitened_residual
+from physid_drake.identify.polish import (
+    THETA_STEP,
+    Polished,
+    Polisher,
+    degrees_of_freedom,
+    new_scatter,
+    scatter_of,
+)  # fmt: skip
 from physid_drake.identify.theta import theta_map
 from physid_drake.recording import Box, ObjectModel
 
@@ -104,3 +111,31 @@ def test_an_interval_of_what_is_not_told_holds_its_value(identifier):
     )  # fmt: skip
     for estimate in estimates_of(thetas, polished):
         assert estimate.ci90[0] <= estimate.value <= estimate.ci90[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [("static_ratio", False, True), ("restitution", False, True), ("support_friction", True, True)],
+)
+def test_only_a_bound_that_was_chosen_may_be_too_narrow(name, low, high):
+    """Static friction is no less than kinetic, and nothing bounces back faster: no search can go further."""
+    model = ObjectModel(shape=SHAPE)
+    parameter = theta_map(model, solid_of(SHAPE), (1, 1), ThetaConfig(parameters=[name]), 500.0).space.parameters[0]
+    assert _may_lie_beyond(parameter, 0.0) is low and _may_lie_beyond(parameter, 1.0) is high
+    assert not _may_lie_beyond(parameter, 0.5)
+
+
+@pytest.mark.parametrize("inflation", [1.0, 4.0, 9.0])
+def test_the_scatter_of_friction_is_told_as_pushes_have_it(inflation):
+    """Forty linear pushes, in noise as loud as what a cell cannot explain leaves."""
+    rng, truth = np.random.default_rng(3), 0.05
+    slopes = [rng.uniform(50.0, 100.0, 60) for _ in range(40)]
+    frictions = truth * rng.standard_normal(40)
+    wide = np.sqrt(inflation)
+    residuals = [f * slope / wide + rng.standard_normal(60) for f, slope in zip(frictions, slopes, strict=True)]
+    share = 0.02
+    for _ in range(6):  # rounds, as a fit makes them
+        whiteners = [Whitener.of(share * slope[:, None]) for slope in slopes]
+        share = new_scatter(whiteners, [0] * 40, residuals, old=share, first=0.02 / wide)
+    assert scatter_of(share, inflation, 40) == pytest.approx(np.std(frictions), rel=0.1)
+    assert scatter_of(share, inflation, 3) == share

@@ -122,6 +122,18 @@ def test_the_cells_own_error_is_something_at_a_bound_and_at_nothing():
     )
 
 
+@pytest.mark.parametrize(
+    ("name", "bounds", "rule"),
+    [
+        ("static_ratio", [0.5, 2.0], "of at least 1"),
+        ("restitution", [0.0, 1.2], "of at most 1"),
+    ],
+)
+def test_bounds_beyond_what_physics_allows_are_refused(name, bounds, rule):
+    with pytest.raises(ConfigError, match=rf"theta\.bounds\.{name}: needs numbers .*{rule}"):
+        thetas(name, bounds={name: bounds})
+
+
 def test_bounds_move_the_nominal_inside():
     mass = thetas("mass", bounds={"mass": [0.5, 0.8]}).space.parameters[0]
     assert (mass.lower, mass.upper, mass.prior_mean) == (0.5, 0.8, 0.5)
