@@ -39,6 +39,7 @@ def test_a_notebook_holds_no_outputs_no_classes_and_no_machine_paths(path):
             assert len(cell.source.splitlines()) <= 40
 
 
+@pytest.mark.slow
 @every_notebook
 def test_a_notebook_runs(path, monkeypatch):
     monkeypatch.setenv("DRAKE_DEPRECATION_RUNTIME_SEVERITY", "error")

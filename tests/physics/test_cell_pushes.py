@@ -60,6 +60,7 @@ def errors(kind, seed, model, solver=(), pick=slice(None)):
     return series
 
 
+@pytest.mark.slow
 @both_models
 def test_sixty_pushes_are_followed_within_half_a_sigma(model):
     series = errors("sixty", 0, model)
@@ -69,6 +70,7 @@ def test_sixty_pushes_are_followed_within_half_a_sigma(model):
     assert max(rms(s) for s in series) < 2.5
 
 
+@pytest.mark.slow
 @both_models
 def test_other_pushes_are_followed_within_half_a_sigma(model):
     # Measured: 0.385 and 0.400, worst push 0.92. All sixty: 0.50 (point); 4.5 (hydroelastic), but for push 42 below.

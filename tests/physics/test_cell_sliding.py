@@ -113,6 +113,7 @@ def test_a_spinning_object_turns_as_far_as_torsional_friction_lets_it(model, nam
     assert np.abs(final(motion)[:2]).max() < 1e-9
 
 
+@pytest.mark.slow
 @both_models
 def test_a_spinning_triangle_turns_as_the_reference_does(model, request):
     body = OBJECTS["triangle"]

@@ -23,6 +23,8 @@ from physid_drake.recording import Sensors
 from physid_drake.report.diagnosis import diagnosis_json
 from physid_drake.run_diagnose import show
 
+pytestmark = pytest.mark.slow
+
 ERASER = OBJECTS["eraser"]
 THETA = Theta(support_friction=0.3, hand_friction=0.25)
 LOOKED_AT = ("viscous_drag", "table_tilt", "tether", "friction_gradient", "friction_drift", "com_offset")

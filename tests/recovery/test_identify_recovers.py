@@ -19,6 +19,8 @@ from physid_drake.identify.theta import CELL_ERROR, UNWEIGHED
 from physid_drake.recording import read_recording, write_recording
 from physid_drake.report.result import result_json
 
+pytestmark = pytest.mark.slow
+
 BOX = OBJECTS["box"]
 TRUTH = Theta(support_friction=0.27, hand_friction=0.22)  # of the shipped recording too
 POINT = CellConfig(contact=ContactConfig(model="point"))

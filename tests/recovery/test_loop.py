@@ -4,6 +4,7 @@ import dataclasses as dc
 import math
 
 import numpy as np
+import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from runs import COARSE, shipped_pushes
@@ -16,6 +17,8 @@ from physid_drake.plan import DistanceToGoal, SimulatedRobot, Situation, plan
 from physid_drake.plan.system import PolicySystem, RobotSystem, identified_model
 from physid_drake.plan.task import policy_for
 from physid_drake.policies import PlannedPush
+
+pytestmark = pytest.mark.slow
 
 START, GOAL = (0.0, 0.0, 0.0), (0.25, 0.0)
 

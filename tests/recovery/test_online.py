@@ -20,6 +20,8 @@ from physid_drake.identify.system import PUSH_PERIOD, IdentificationSystem, Reco
 from physid_drake.report.cells import cells_figure, cells_table, cells_verdict
 from physid_drake.report.result import result_json
 
+pytestmark = pytest.mark.slow
+
 BOX = OBJECTS["box"]
 FRICTIONS = ["hand_friction", "support_friction"]
 SEARCH = SearchConfig(jobs=1)

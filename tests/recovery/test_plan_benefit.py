@@ -15,6 +15,8 @@ from physid_drake.model import Model
 from physid_drake.plan import DistanceToGoal, Situation, plan
 from physid_drake.plan.task import policy_for
 
+pytestmark = pytest.mark.slow
+
 OBJECT = OBJECTS["box"]
 FRICTION, HAND_FRICTION, RADIUS, GRAVITY = 0.3, 0.25, 0.010, 9.81
 START = (0.0, 0.0, 0.0)

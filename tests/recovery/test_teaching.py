@@ -15,6 +15,8 @@ from physid_drake.identify.problem import noise_of
 from physid_drake.plan import most_informative_push
 from physid_drake.policies import PlannedPush
 
+pytestmark = pytest.mark.slow
+
 BOX = OBJECTS["box"]
 TRUTH = Theta(support_friction=0.27, hand_friction=0.22)
 RADIUS = 0.010

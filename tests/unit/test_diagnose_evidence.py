@@ -38,6 +38,7 @@ def fitted_to(frictions):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scatter", "most"), [(0.02, 0.0), (0.05, 0.001), (MOST_SCATTER, 0.005)])
 def test_frictions_that_scatter_are_hardly_ever_called_too_scattered(scatter, most):
     rng = np.random.default_rng(3)

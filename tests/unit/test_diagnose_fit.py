@@ -109,6 +109,7 @@ def test_a_push_left_out_whose_rollout_diverges_is_predicted_by_the_derivatives(
         assert np.linalg.norm(one - other) < np.linalg.norm(one)
 
 
+@pytest.mark.slow
 def test_a_fit_that_begins_with_a_centred_spring_finds_a_cable_that_is_slack_there(fitter):
     space = fitter.case.thetas.space
     u = np.asarray(space.to_unit(space.nominal))

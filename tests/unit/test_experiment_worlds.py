@@ -136,6 +136,7 @@ def test_a_slow_push_ends_where_it_does_played_faster():
     assert np.degrees(np.abs(ends - slow)[:, 2]).max() < 1.0
 
 
+@pytest.mark.slow
 def test_the_bottle_slides_as_far_as_its_speed_and_friction_say():
     bottle = FastPushes(world_of(BOTTLE, frictions=(0.12, 0.12)), speeds=5)
     speed = 0.9
@@ -158,6 +159,7 @@ def test_the_share_of_trials_within_a_distance_grows_to_one():
     assert list(series.mean) == sorted(series.mean)
 
 
+@pytest.mark.slow
 def test_motion_prediction_runs_from_end_to_end_and_is_resumed(tmp_path):
     experiment = MotionPrediction(
         seed=0, repetitions=2, pushes=4, training=2, testing=1, subsets=(1, 2), budget=4, tick_s=4e-3

@@ -222,6 +222,7 @@ def test_a_path_of_few_knots_is_explained_to_its_noise():
     assert max(ratios) < 1.5  # 3.5
 
 
+@pytest.mark.slow
 def test_every_noisy_path_is_fitted_with_few_knots():
     """Sixty paths: knots, speeds, rates, noise and rounding at random, some jumping, some frozen."""
     for seed in range(60):
@@ -280,6 +281,7 @@ def test_the_jitter_of_stamps_is_seen(jitter):
     assert seen == pytest.approx(jitter / np.sqrt(3.0), rel=0.3, abs=2e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("touches", [2, 3])
 def test_a_hand_that_comes_and_goes_several_times_is_followed(touches):
     """Each touch takes some twelve knots: approach, push, retreat."""

@@ -167,6 +167,7 @@ def test_where_only_the_ends_are_known_a_hand_counts_whole():
     assert len(while_pushing(ends(push), push.hand)) == len(push.hand)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stands", [0.1, 0.5])
 @pytest.mark.parametrize("travel", [0.002, 0.2])
 def test_the_brake_that_may_vary_is_the_one_that_lets_the_object_go(recording, travel, stands):

@@ -84,6 +84,7 @@ def test_what_only_its_prior_holds_takes_no_degree_of_freedom():
     assert degrees_of_freedom(1, np.concatenate([slope, np.eye(3)])) == 1.0
 
 
+@pytest.mark.slow
 def test_a_push_that_diverges_says_nothing_and_takes_nothing_from_the_others(identifier, monkeypatch):
     lost, simulate = identifier.problems[0].name, identifier.pool.run
 

@@ -298,6 +298,7 @@ def test_a_free_slide_starts_with_the_velocity_of_its_first_samples():
     assert spec_of(slide(), None).hand_radius is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rate", "correlation"), [(500, 0.0), (500, 0.9), (120, 0.8)])
 def test_a_free_slides_start_is_as_sure_as_its_noise_allows(rate, correlation):
     times, rng, off = np.arange(0.0, 0.3, 1.0 / rate), np.random.default_rng(0), []

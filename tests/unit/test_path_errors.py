@@ -68,6 +68,7 @@ def off(truth, fits):
     return np.sqrt(np.mean(np.square(ratios), axis=0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("memory", [0.0, 0.05])  # s
 @pytest.mark.parametrize("ramp", RAMPS)
 def test_fits_are_off_by_as_much_as_their_errors_say(ramp, memory):

@@ -99,6 +99,7 @@ def test_a_hand_that_turns_with_its_pushes_aims_beside_its_own_axes(direction):
     assert aside == pytest.approx([0.004 * math.sin(direction), -0.004 * math.cos(direction)], abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_mean_over_the_belief_stays_further_from_an_edge_that_it_may_fall_over():
     goal, far = (0.47, 0.0), Choices(travel=0.3)
     unsure = replace(MODEL, intervals={"theta.support_friction": [0.2, 0.36]})

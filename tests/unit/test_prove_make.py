@@ -74,6 +74,7 @@ def _cut(scene):
     return replace(scene, pushes=scene.pushes[:2])
 
 
+@pytest.mark.slow
 def test_a_world_is_made_again_bit_for_bit_and_tells_nothing(tmp_path, short_scenes):
     seals = [make.make(tmp_path / name, 1, 3, kind="effect") for name in ("a", "b")]
     assert seals[0] == seals[1] == make.make(tmp_path / "a", 1, 3, kind="effect")

@@ -102,6 +102,7 @@ def test_the_blindfold_refuses_every_look_and_nothing_else(folder):
     assert said.stdout.split() == [*["refused"] * 7, "7", "seen"]
 
 
+@pytest.mark.slow
 def test_a_command_under_the_blindfold_works_and_cannot_read_what_is_sealed(folder):
     shutil.copytree(shipped("recordings") / "eraser_reference", folder / "open")
     shutil.copytree(folder / "open", folder / "sealed" / "hidden")

@@ -51,6 +51,7 @@ def test_the_result_says_everything_that_was_asked(done):
     assert result["search"]["trials"] == 2
 
 
+@pytest.mark.slow
 def test_the_configuration_beside_the_result_gives_the_same_result(done, recording, tmp_path):
     again = tmp_path / "again"
     again.mkdir()
@@ -114,6 +115,7 @@ def test_the_page_lets_a_person_choose_every_push(page, done):
         assert name in "".join(page.text)
 
 
+@pytest.mark.slow
 def test_a_name_that_looks_like_html_stays_text(tmp_path):
     folder = write_small(tmp_path / "odd", name="<b>odd</b> & [red]$x$")
     assert quick(tmp_path / "out", recording=folder) == 0
@@ -156,6 +158,7 @@ def uninterrupted(tmp_path_factory, recording):
     return result_of(folder)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "trial",
     [
@@ -183,6 +186,7 @@ def test_ctrl_c_keeps_what_was_found_and_the_same_command_goes_on(
     assert result_of(out) == uninterrupted
 
 
+@pytest.mark.slow
 def test_ctrl_c_after_the_identification_keeps_it_too(recording, tmp_path, monkeypatch):
     """A plan and a diagnosis follow, which take longer."""
 
@@ -201,6 +205,7 @@ def test_ctrl_c_after_the_identification_keeps_it_too(recording, tmp_path, monke
     assert not (out / "belief.npz").exists()
 
 
+@pytest.mark.slow
 def test_another_configuration_does_not_go_on_from_there(recording, tmp_path, monkeypatch):
     out = tmp_path / "out"
     with monkeypatch.context() as patch:
@@ -216,6 +221,7 @@ def test_another_configuration_does_not_go_on_from_there(recording, tmp_path, mo
     assert np.isfinite(result_of(out)["reduced_chi2"])
 
 
+@pytest.mark.slow
 def test_a_recording_that_was_changed_since_is_not_gone_on_with(tmp_path, monkeypatch):
     recording, out = write_small(tmp_path / "recording", 3), tmp_path / "out"
     with monkeypatch.context() as patch:
@@ -229,6 +235,7 @@ def test_a_recording_that_was_changed_since_is_not_gone_on_with(tmp_path, monkey
     assert count.calls == 6
 
 
+@pytest.mark.slow
 def test_the_main_job_learns_push_by_push_on_request(tmp_path):
     recording = write_small(tmp_path / "recording", 2)
     assert quick(tmp_path / "out", recording=recording, search={"online": True}) == 0
@@ -238,6 +245,7 @@ def test_the_main_job_learns_push_by_push_on_request(tmp_path):
     assert content["foreseen"]["sigmas_rms"] > content["training"]["after"]["sigmas_rms"]
 
 
+@pytest.mark.slow
 def test_a_pipe_that_closes_loses_no_result(tmp_path, monkeypatch):
     def closed(*_):
         raise SystemExit(1)

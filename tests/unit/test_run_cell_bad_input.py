@@ -209,6 +209,7 @@ def test_a_folder_in_the_place_of_the_config(refused, tmp_path):
     assert "config.yaml" in refused(*out(tmp_path))
 
 
+@pytest.mark.slow
 def test_a_folder_in_the_place_of_the_result_leaves_no_scraps(tmp_path, recording, capsys):
     (tmp_path / "out" / "result.json").mkdir(parents=True)
     assert quick(tmp_path / "out", recording=recording) == 1
@@ -251,6 +252,7 @@ def failing(monkeypatch, which, error):
     monkeypatch.setattr(Stepper, "_advance", fail)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "error", [SystemExit("GJK: no convergence"), RuntimeError("step failed"), FloatingPointError("left")], ids=repr
 )
@@ -265,6 +267,7 @@ def test_rollouts_that_diverge_are_counted_and_not_fatal(tmp_path, recording, ca
     assert '"failed": 1' in (tmp_path / "out" / "result.json").read_text()
 
 
+@pytest.mark.slow
 def test_an_object_that_flies_away_has_diverged(recording, tmp_path, capsys, monkeypatch):
     """A kilometre in a second, in every rollout of one trial."""
     count = {"rollouts": 0}
@@ -288,6 +291,7 @@ def test_a_recording_that_no_rollout_follows_is_not_fatal(tmp_path, recording, c
     assert (status == 0 and "diverged" in captured.out) or (status == 1 and captured.err.count("error: ") == 1)
 
 
+@pytest.mark.slow
 def test_a_rollout_that_does_not_even_begin_is_not_fatal(tmp_path, recording, capsys, monkeypatch):
     begin, count = Stepper._begin_at, {"rollouts": 0}
 

@@ -52,6 +52,7 @@ def test_an_output_folder_that_cannot_be_written_is_refused(tmp_path, capsys):
     assert "cannot be written" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_results_go_to_a_folder_named_after_the_recordings(tmp_path, monkeypatch, capsys):
     def interrupted(*_, memory, **__):
         memory.keep("plain", [np.zeros(1)])

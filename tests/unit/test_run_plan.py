@@ -155,6 +155,7 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(folder, tmp_path, capsys, monke
 # The main job.
 
 
+@pytest.mark.slow
 def test_the_main_job_plans_with_what_it_identified(tmp_path):
     recording = write_small(tmp_path / "small")
     plan = {"start_m": [0.0, 0.0], "goal_m": [0.25, 0.0], "budget": 6, "sweep": 3, "draws": 2}
@@ -179,6 +180,7 @@ def test_the_main_job_plans_with_what_it_identified(tmp_path):
 TILT = (TableTilt(x=0.04),)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("verdict", "effects", "rivals", "caveat"),
     [
