@@ -32,7 +32,7 @@ from physid_drake.run_folder import RunFolder, named_after, versions
 STATE = "stages.npz"
 FILES = ("diagnosis.json", "page.html", "scene.html", "model.yaml")
 SHOWN = 12  # pushes in the animation
-MOST_NOTES = 8
+MOST_NOTES = 8  # on the terminal
 ALPHA = 0.01  # false-alarm rate
 LONGEST_STEP = 0.05  # s
 

@@ -17,6 +17,7 @@ from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import State
 from physid_drake.diagnose.values import NextPush
+from physid_drake.identify.frames import reach_of
 from physid_drake.identify.problem import PushProblem
 from physid_drake.identify.rollouts import RolloutPool, Task
 
@@ -118,8 +119,7 @@ def _problem(case: Case, direction: float, speed: float, offset: float) -> PushP
 
 def _on_table(case: Case, end: Array) -> bool:
     """Whether an object at a pose (3,) stands on the table as a whole, however it is turned."""
-    x0, y0, x1, y1 = np.abs(solid_of(case.recording.object.shape).outline.extent()).tolist()
-    reach = math.hypot(max(x0, x1), max(y0, y1))
+    reach = reach_of(case.recording)
     centre, size = np.array(case.recording.table.centre), np.array(case.recording.table.size)
     return bool((np.abs(end[:2] - centre) + reach < 0.5 * size).all())
 

@@ -202,9 +202,13 @@ def _moves(push: Push) -> bool:
 def _least_gap(recording: Recording, push: Push) -> float:
     """Distance [m] that tip and object surely have at least, wherever the object is turned."""
     assert push.hand is not None and recording.hand is not None
-    extent = np.abs(solid_of(recording.object.shape).outline.extent())
-    corner = float(np.hypot(max(extent[0], extent[2]), max(extent[1], extent[3])))
-    return float(from_object(push, push.hand).min()) - corner - recording.hand.radius
+    return float(from_object(push, push.hand).min()) - reach_of(recording) - recording.hand.radius
+
+
+def reach_of(recording: Recording) -> float:
+    """How far the object reaches from Bo at most, however it is turned [m]: the corner of its bounding box."""
+    x0, y0, x1, y1 = np.abs(solid_of(recording.object.shape).outline.extent()).tolist()
+    return float(np.hypot(max(x0, x1), max(y0, y1)))
 
 
 def from_object(push: Push, hand: PoseStream) -> Array:

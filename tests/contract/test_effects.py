@@ -278,7 +278,6 @@ def test_parameters_of_any_chart_point_mean_something(kind):
             assert kind.ranges()[name].holds(value), name
 
 
-@pytest.mark.slow
 @every_effect
 def test_each_direction_leaves_a_signature_that_grows_with_the_step(kind):
     rolls = rolls_for(kind)

@@ -92,7 +92,7 @@ def test_a_stated_noise_that_the_rests_contradict_is_not_believed(recording):
 
 @pytest.mark.parametrize(("share", "believed"), [(1.0, True), (0.9, True), (0.75, False), (0.65, False)])
 def test_what_is_believed_of_a_stated_noise_depends_on_how_surely_rests_are_louder(share, believed):
-    """A fixed factor of 1.5 believed 1.45 times as much: costs of 2.1 per degree of freedom, and a mismatch."""
+    """A fixed factor of 1.5 believed 1.45 times as much, whose square is all that a cost can tell."""
     push = recorded(ERASER, Theta(), pushes_of(ERASER, 1, 3), 5)
     many = dc.replace(push, pushes=tuple(resting(push.pushes[0], k) for k in range(8)),
                       sensors=dc.replace(push.sensors, object_position_std=share * POSITION_STD))  # fmt: skip
