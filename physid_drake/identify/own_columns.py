@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from physid_drake.identify.misfit import difference, model_error_columns
 from physid_drake.identify.nuisance import Nuisance
-from physid_drake.identify.problem import Noise, PushProblem, first_motion
+from physid_drake.identify.problem import Noise, PushProblem
 from physid_drake.identify.rollouts import Task
 
 Array = NDArray[np.float64]
@@ -45,4 +45,4 @@ def own_columns(problem: PushProblem, noise: Noise, residuals: Sequence[Array]) 
     steps = [NUISANCE_STEP] * (len(moved) - len(of_path)) + of_path
     columns = [difference(base, one) / step for one, step in zip(moved, steps, strict=True)]
     # The model error begins when the object starts to move.
-    return np.column_stack([*columns, model_error_columns(problem, noise, first_motion(problem, noise.position))])
+    return np.column_stack([*columns, model_error_columns(problem, noise, problem.moving[0])])

@@ -256,9 +256,7 @@ def _problem(
     for check in push_checks_of(recording, push):
         check()
     planar = push.object.planar
-    start, start_std = _start_of(push, planar, noise, free=path is None)
-    compared = np.ones(len(planar), dtype=bool)
-    compared[0] = not (push.endpoint_only or path is None)
+    start, start_std, first = _start_of(push, planar, noise, free=path is None)
     forces = force_windows(push, path, noise.force, float(start_std[0]))
     problem = PushProblem(
         name=push.name,
@@ -271,21 +269,21 @@ def _problem(
         path_errors=path_errors,
         hand_height=_contact_height(recording, hand, height),
         hand_axes=np.eye(2) if hand is None else _plane_axes(hand.quaternions),
-        times=push.object.times[compared].copy(),
-        poses=planar[compared].copy(),
+        times=push.object.times[first:].copy(),
+        poses=planar[first:].copy(),
         force_times=forces.middles,
         forces=forces.means,
         force_std=forces.stds,
         tip_height=None if hand is None else float(np.median(hand.positions[:, 2])),
     )
-    return replace(problem, moving=(first_motion(problem, noise.position), motion_span(push)[1]))
+    return replace(problem, moving=(_first_motion(problem, noise.position), motion_span(push)[1]))
 
 
-def first_motion(problem: PushProblem, sigma: float) -> float:
+def _first_motion(problem: PushProblem, sigma: float) -> float:
     """Roughly when the object starts to move [s]; noise, whose standard deviation is sigma [m], is no motion."""
     if len(problem.times) < 3:
         return problem.begin
-    moved = np.linalg.norm(problem.poses[:, :2] - problem.poses[0, :2], axis=1)
+    moved = np.linalg.norm(problem.poses[:, :2] - np.array(problem.start.pose[:2]), axis=1)
     beyond = np.flatnonzero(moved > max(0.05 * float(moved.max(initial=0.0)), FIRST_SIGMAS * sigma))
     return float(problem.times[max(0, beyond[0] - 1)]) if len(beyond) else problem.begin
 
@@ -299,17 +297,19 @@ def usual_heights(problems: Sequence[PushProblem]) -> tuple[float | None, float 
     return tip, contact
 
 
-def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[Start, Array]:
-    """Start pose from the rest before the motion, or pose and velocity of a free motion from its first samples."""
-    sigmas = noise.sigmas
+def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[Start, Array, int]:
+    """Start pose from the rest before the motion, or pose and velocity of a free motion from its first samples.
+
+    Its standard deviations, and the first sample to be compared: what gave the start would count twice.
+    """
     if free:
-        return _moving_start(push, planar, noise)
+        return *_moving_start(push, planar, noise), 1
     rests = rest_segments(push)
     if rests and rests[0].start == 0:
         still = planar[rests[0]]
-        pose = still.mean(axis=0)
-        return Start(pose=triple(pose)), noise.mean_std(len(still))
-    return Start(pose=triple(planar[0])), sigmas.copy()
+        # Its last sample is compared, too: the motion begins there.
+        return Start(pose=triple(still.mean(axis=0))), noise.mean_std(len(still)), min(len(still), len(planar)) - 1
+    return Start(pose=triple(planar[0])), noise.sigmas.copy(), 1
 
 
 def _moving_start(push: Push, planar: Array, noise: Noise) -> tuple[Start, Array]:

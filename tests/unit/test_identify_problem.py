@@ -18,6 +18,7 @@ from physid_drake.recording import (
     Recording,
     Sensors,
     Table,
+    rest_segments,
 )
 
 
@@ -241,6 +242,27 @@ def test_a_push_starts_at_the_mean_of_the_rest_before_it(recording):
     np.testing.assert_allclose(problem.start.pose, still.mean(axis=0), atol=3 * 3e-3 / np.sqrt(15))
     assert (problem.start_std < 0.5 * QUIET.sigmas).all()
     assert (problem.start_std > QUIET.sigmas / np.sqrt(len(push.object))).all()
+
+
+def test_what_made_the_start_is_not_compared_again(recording):
+    stream, problem = recording.pushes[0].object, first(recording)
+    rest = rest_segments(recording.pushes[0])[0]
+    np.testing.assert_array_equal(problem.times, stream.times[rest.stop - 1 :])
+    np.testing.assert_array_equal(problem.poses, stream.planar[rest.stop - 1 :])
+
+
+def test_noise_of_a_rest_is_no_motion(recording):
+    begins = [problem.moving[0] for problem in problems_of(recording, QUIET, 0.03)]
+
+    def louder(push):  # one sample of the rest is off, by more than a twentieth of the way
+        s = push.object
+        positions = s.positions.copy()
+        positions[3, :2] += 0.06 * np.linalg.norm(positions[-1, :2] - positions[0, :2]) + 5.0 * QUIET.position
+        return replace(push, object=PoseStream(times=s.times, positions=positions, quaternions=s.quaternions))
+
+    changed = problems_of(with_pushes(recording, louder), QUIET, 0.03)
+    np.testing.assert_allclose([problem.moving[0] for problem in changed], begins, atol=0.021)
+    assert (np.array(begins) > [p.begin + 0.1 for p in changed]).all()
 
 
 def test_correlated_noise_makes_the_start_less_sure(recording):
