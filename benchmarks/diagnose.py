@@ -1,12 +1,15 @@
 """How often a diagnosis is right, in one proof or several together: diagnose.py [PROOF ...] [--worlds 20] [--seed 1].
 
-PROOF is a folder of ``prove`` in which worlds have been diagnosed. Without one, ``prove`` makes and diagnoses as many
-worlds as are asked for (``pip install '.[proof]'``; minutes for each), and goes on where it stopped.
+PROOF is a folder of ``prove`` in which worlds have been diagnosed, or an archive of one in ``docs/answers``, scored
+when it was opened. Without one, ``prove`` makes and diagnoses as many worlds as are asked for (``pip install
+'.[proof]'``; minutes for each), and goes on where it stopped.
 """
 
 import argparse
+import json
 import subprocess
 import sys
+import tarfile
 from collections import Counter
 from pathlib import Path
 
@@ -17,7 +20,7 @@ from physid_drake.errors import PhysidError
 from physid_drake.prove.figures import figures_of, power_table, table
 from physid_drake.prove.score import read_outcomes
 from physid_drake.prove.seal import SEALED, check_seal, read_seal
-from physid_drake.report.proof import MAIN, POWER, said_of, truth_of
+from physid_drake.report.proof import MAIN, POWER, outcomes_in, said_of, truth_of
 
 FAULTS = ("world", "truth", "sigma", "said")
 
@@ -58,9 +61,20 @@ def made(worlds, seed):
 
 
 def opened(folder):
-    """The outcomes of the worlds that have been diagnosed, if the seal holds."""
+    """The outcomes of the worlds that have been diagnosed, if the seal holds; those that an archive holds."""
+    if folder.is_file():
+        return archived(folder)
     check_seal(folder, [file.stem for file in (folder / SEALED).glob("*.json")], read_seal(folder))
     return read_outcomes(folder / SEALED, folder / "diagnoses")
+
+
+def archived(file):
+    """The outcomes of an archive, whose worlds anybody can make again from their seed."""
+    try:
+        with tarfile.open(file) as archive:
+            return outcomes_in(json.load(archive.extractfile("proof.json")))
+    except (tarfile.TarError, KeyError, ValueError) as error:
+        raise PhysidError(f"{file} is no archive with a proof.json ({error}).") from error
 
 
 def shown(title, headings, rows):

@@ -172,6 +172,9 @@ class Model:
 class ModelCell:
     """A model, built: its diagram, and rollouts with all its physics.
 
+    The diagram's table does not end, and its physics are those of the first push; rollouts lose the object at the
+    edge, and take the number of the push.
+
     Attributes:
         model: what it was built from.
         cell: the cell, in the effects' geometry, which rollouts take.

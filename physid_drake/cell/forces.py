@@ -52,6 +52,15 @@ class Swinging(Protocol):
         ...
 
 
+@runtime_checkable
+class Braking(Protocol):
+    """A law like dry friction, which holds what rests: what it does depends on what the others do."""
+
+    def brake(self, state: ObjectState, others: Sequence[Wrench]) -> Wrench:
+        """The mean force over the tick that begins at a state, beside the wrenches of all other laws."""
+        ...
+
+
 class FrictionLaw(Protocol):
     """A friction that is not one Coulomb coefficient per cell.
 
@@ -97,7 +106,8 @@ class Frictions:
 
 def total_wrenches(state: ObjectState, laws: Sequence[ForceLaw], frictions: Sequence[FrictionLaw]) -> list[Wrench]:
     """What all laws do at a state; those of friction, and turning slip, give back what the contact has too much."""
-    wrenches = [law.wrench(state) for law in laws]
+    brakes = [law for law in laws if isinstance(law, Braking)]
+    wrenches = [law.wrench(state) for law in laws if not isinstance(law, Braking)]
     ratio = None
     if frictions:
         together = Frictions(tuple(frictions))
@@ -105,6 +115,8 @@ def total_wrenches(state: ObjectState, laws: Sequence[ForceLaw], frictions: Sequ
         wrenches.append(friction_wrench(state, together.largest - ratio))
     if state.turning:
         wrenches.append(_turning_wrench(state, ratio))
+    for law in brakes:
+        wrenches.append(law.brake(state, wrenches))
     return wrenches
 
 

@@ -70,6 +70,7 @@ class ObjectState:
         stiffness: of the whole support [N/m].
         lifted: whether the contact takes friction from depths that are larger than the loads (``lifts``).
         v_rolling: of the underside against Bo, in an object that rolls, x + iy [m/s].
+        rolling_mass: what a force across its axis sets in motion [kg]; 0 of what does not roll.
         lead: how far ahead a force by the object's place is taken, in ticks [-].
         edge: lower and upper corner of a table that ends, x + iy [m]; None where it does not.
     """
@@ -90,6 +91,7 @@ class ObjectState:
     stiffness: float
     lifted: bool = False
     v_rolling: complex = 0j
+    rolling_mass: float = 0.0
     lead: float = 0.5
     edge: tuple[complex, complex] | None = None
 
@@ -241,6 +243,7 @@ class StateReader:
         half_height: of the object [m].
         stiffness: of the whole support [N/m].
         rolling_radius: of a lying cylinder [m]; None of what does not roll.
+        rolling_mass: its mass, and its inertia about the axis over the radius squared [kg].
         edge: lower and upper corner of a table that ends, x + iy [m]; None where it does not.
         lead: how far ahead a force by the object's place is taken, in ticks [-]: half of one in a rollout.
         lifted: whether the contact takes friction from depths that are larger than the loads.
@@ -254,6 +257,7 @@ class StateReader:
     half_height: float
     stiffness: float
     rolling_radius: float | None = None
+    rolling_mass: float = 0.0
     edge: tuple[complex, complex] | None = None
     lead: float = 0.5
     lifted: bool = False
@@ -285,6 +289,7 @@ class StateReader:
             stiffness=self.stiffness,
             lifted=self.lifted,
             v_rolling=0j if self.rolling_radius is None else self.rolling_radius * complex(-V_WB[1], V_WB[0]),
+            rolling_mass=self.rolling_mass,
             edge=self.edge,
             lead=self.lead,
         )
@@ -298,6 +303,9 @@ class StateReader:
 def reader_of(body: Body, scene: Scene) -> StateReader:
     """The reader for a body on a scene's support points."""
     support, solid = scene.support, scene.solid
+    radius, rolling_mass = solid.rolling_radius, 0.0
+    if radius is not None:
+        rolling_mass = body.mass * (1.0 + body.inertia_ratio * solid.gyration[1] / radius**2)
     return StateReader(
         underside=Underside(
             points=as_complex(support.points),
@@ -311,7 +319,8 @@ def reader_of(body: Body, scene: Scene) -> StateReader:
         p_BBcm=complex(float(body.p_BBcm[0]), float(body.p_BBcm[1])),
         half_height=0.5 * solid.height,
         stiffness=body.mass * scene.gravity / scene.rest_depth,
-        rolling_radius=solid.rolling_radius,
+        rolling_radius=radius,
+        rolling_mass=rolling_mass,
         edge=scene.edge,
         lifted=scene.lifts,
     )

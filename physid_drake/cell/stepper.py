@@ -296,10 +296,12 @@ class Stepper:
     def _step_free(self, end: float, begin: float, push: TipImpulse | None = None) -> None:
         """Advance from ``begin`` to ``end`` [s] without Drake's hand; ``push`` is what a sprung tip gives."""
         span, old, force = end - begin, self._state.twist(), (0.0, 0.0, 0.0)
+        # First the laws: friction has not yet answered the tip's impulse, which may be far more than it lets through.
+        self._laws.act(self._state, begin, span)
         if push is not None:
             force = push.jx / span, push.jy / span, 0.0
             self._take(push)
-        after = self._advance(end, begin, free=push is None)
+        after = self._advance(end, span, free=push is None)
         self._mend_position(old, after, span)
         self._record(end, force)
 
@@ -312,7 +314,8 @@ class Stepper:
             self._drift.forget()
         command = self._drift.command(before, move.velocity, span)
         state.set_hand(move.start, self._height, command)
-        after = self._advance(end, begin, free=not touching)
+        self._laws.act(state, begin, span)
+        after = self._advance(end, span, free=not touching)
         if touching:
             force = self._hand_force(command, span)
             if self._solver.drift_feedforward:
@@ -322,8 +325,8 @@ class Stepper:
             self._mend_position(old, after, span)
         self._record(end, force)
 
-    def _advance(self, end: float, begin: float, *, free: bool) -> Planar:
-        """Let the laws act and Drake step; returns the object's twist.
+    def _advance(self, end: float, span: float, *, free: bool) -> Planar:
+        """Let Drake step over a span [s]; returns the object's twist.
 
         ``free`` where nothing pushes the object.
 
@@ -331,13 +334,12 @@ class Stepper:
             FloatingPointError: if the object has flown away.
         """
         state = self._state
-        self._laws.act(state, begin, end - begin)
         yaw, spin = state.heading()
         state.send()
         self._simulator.AdvanceTo(end)
         state.fetch()
         if free:
-            state.keep_momentum(yaw, spin, end - begin)
+            state.keep_momentum(yaw, spin, span)
         after = state.twist()
         # Written so that a NaN anywhere fails the comparison.
         if not abs(after[0]) + abs(after[1]) + 1e-3 * abs(after[2]) < FASTEST:

@@ -15,11 +15,13 @@ from physid_drake.cell import HandPath, Start
 from physid_drake.cell.solid import solid_of
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import Fitter
+from physid_drake.diagnose.leaving import hand_frame
 from physid_drake.diagnose.model import State
 from physid_drake.diagnose.values import NextPush
 from physid_drake.identify.frames import reach_of
 from physid_drake.identify.problem import PushProblem
 from physid_drake.identify.rollouts import RolloutPool, Task
+from physid_drake.model import turned
 
 Array = NDArray[np.float64]
 
@@ -110,8 +112,10 @@ def _problem(case: Case, direction: float, speed: float, offset: float) -> PushP
     times = np.cumsum([0.05, ramp, cruise, brake])
     path = HandPath(times=times, velocities=np.outer([0.0, speed, speed, 0.0], ahead), start=start - reach * ahead)
     end = float(times[-1]) + AFTER
+    hand_axes, hand_turns = hand_frame(case.problems)
+    axes = turned(direction) @ np.array(hand_axes) if hand_turns else np.array(hand_axes)
     return dc.replace(
-        case.problems[0], name="next", order=case.pushes, pace=1.0, begin=0.0, end=end,
+        case.problems[0], name="next", order=case.pushes, pace=1.0, begin=0.0, end=end, hand_axes=axes,
         start=Start(pose=(float(middle[0]), float(middle[1]), 0.0)), path=path, times=np.array([end]),
         poses=np.zeros((1, 3)), force_times=np.zeros(0), forces=np.zeros((0, 2)), force_std=np.zeros(0),
     )  # fmt: skip

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
-
-import numpy as np
 
 from physid_drake.cell.forces import ForceLaw, Wrench
 from physid_drake.cell.object_state import ObjectState
 from physid_drake.effects.effect import Coordinate, Effect, PushFacts, Surroundings, parameter
 from physid_drake.ranges import NOT_NEGATIVE
-
-ROLLING_EDGE = 1e-3  # m/s: below it rolling resistance fades, so that it never drives backwards
 
 
 def _mean_decay(share: float) -> float:
@@ -126,12 +122,21 @@ class RollingResistance(Effect):
 
 @dc.dataclass(frozen=True)
 class _RollingLaw:
-    share: float  # of the weight
+    """Coulomb's law: as much as stops the roll within a tick, other forces included, up to ``share`` of the weight.
+
+    A force that fades with speed instead would let a cylinder creep down a tilt on which it rests.
+    """
+
+    share: float
 
     def wrench(self, state: ObjectState) -> Wrench:
+        return self.brake(state, ())
+
+    def brake(self, state: ObjectState, others: Sequence[Wrench]) -> Wrench:
         # Across the axis (y of B) it rolls; along the axis it slides.
-        across = np.array([math.cos(state.yaw), math.sin(state.yaw)])
-        speed = float(across @ state.v_WBcm)
-        edge = max(ROLLING_EDGE, self.share * state.weight / state.mass * state.span)
-        force = -self.share * state.weight * speed / math.hypot(speed, edge)
-        return Wrench(fx=force * across[0], fy=force * across[1], torque=0.0)
+        x, y = math.cos(state.yaw), math.sin(state.yaw)
+        speed = float(state.v_WBcm @ (x, y))
+        stops = state.rolling_mass * speed / state.span + sum(x * w.fx + y * w.fy for w in others)
+        most = self.share * state.weight
+        force = -min(max(stops, -most), most)
+        return Wrench(fx=force * x, fy=force * y, torque=0.0)

@@ -11,18 +11,19 @@ from numpy.typing import NDArray
 
 from physid_drake.cell import Body, Cell, HandPath, Motion, Start
 from physid_drake.cell.diagram import GRAVITY
-from physid_drake.cell.forces import FrictionLaw
+from physid_drake.cell.forces import FrictionLaw, Frictions
 from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.support import PressureGrid
 from physid_drake.effects.catalogue import CATALOGUE
 from physid_drake.effects.effect import Effect, Pose, PushFacts
-from physid_drake.recording import Shape
+from physid_drake.recording import Cylinder, Shape
 
 Array = NDArray[np.float64]
 
 LEAST_FRICTION = 0.02  # of theta's bounds
 FARTHEST = 1.0  # m beyond the hand's way: a slide is hardly ever longer
 FURTHER = 4.0  # times: a bounce doubles the speed, a tilt takes three quarters of the friction
+WIDENINGS = 3  # at most: each brings another friction to a push that left the region thought of
 SHORT = 1e-4  # s: for differences
 
 
@@ -76,22 +77,43 @@ def roll(
     cell = build(geometry_with(present, geometry))
     facts = facts_of(cell, body, _region(cell, body, push, present), push.order, push.hand_axes)
     body = body_with(present, body, facts)
+    facts = dc.replace(facts, region=_region(cell, body, push, present))  # less friction leads further
     start = _true_start(present, push.start)
     path = push.path
     if path is not None:
         for effect in present:
             path = effect.hand(path, facts)
-    return cell.rollout(
-        body,
-        start=start,
-        path=path,
-        begin=push.begin,
-        end=push.end,
-        hand_height=push.hand_height,
-        laws=[law for effect in present for law in effect.laws(facts)],
-        frictions=frictions_of(present, facts),
-        mount=mount_of(present, facts),
-    )
+    for _ in range(WIDENINGS):
+        motion = cell.rollout(
+            body,
+            start=start,
+            path=path,
+            begin=push.begin,
+            end=push.end,
+            hand_height=_contact_height(cell, geometry, push.hand_height),
+            laws=[law for effect in present for law in effect.laws(facts)],
+            frictions=frictions_of(present, facts),
+            mount=mount_of(present, facts),
+        )
+        # Forces may lead further than the hand's speed would, onto a patch beyond.
+        wider = dc.replace(facts, region=_reached(cell, motion, facts.region))
+        if _as_rough(frictions_of(present, wider), frictions_of(present, facts)):
+            break
+        facts = wider
+    return motion
+
+
+def _as_rough(these: Sequence[FrictionLaw], others: Sequence[FrictionLaw]) -> bool:
+    """Whether two regions have the same laws, and the contact holds the same friction."""
+    return len(these) == len(others) and Frictions(tuple(these)).largest == Frictions(tuple(others)).largest
+
+
+def _contact_height(cell: Cell, plain: Geometry, height: float | None) -> float | None:
+    """That of an object whose size effects change: a lying cylinder is touched at its axis."""
+    radius = cell.solid.rolling_radius
+    if height is None or radius is None or not isinstance(plain.shape, Cylinder):
+        return height
+    return height * radius / plain.shape.radius
 
 
 def aimed(effects: Sequence[Effect], path: HandPath, facts: PushFacts) -> HandPath:
@@ -167,6 +189,15 @@ def tracked(motion: Motion, times: Array, effects: Sequence[Effect]) -> Array:
     for effect in _as_listed(present):
         poses = effect.tracked(poses)
     return poses
+
+
+def _reached(cell: Cell, motion: Motion, region: Array) -> Array:
+    """A region (2, 2) with all places to which the object's points came."""
+    x0, y0, x1, y1 = cell.solid.underside.extent()
+    margin, places = math.hypot(x1 - x0, y1 - y0), motion.poses[:, 4:6]
+    return np.array([
+        np.minimum(region[0], places.min(axis=0) - margin), np.maximum(region[1], places.max(axis=0) + margin)
+    ])  # fmt: skip
 
 
 def _region(cell: Cell, body: Body, push: Rollout, effects: Sequence[Effect]) -> Array:

@@ -6,6 +6,7 @@ the solver evaluated and linearised within its steps would cost many times as mu
 
 from __future__ import annotations
 
+import copy
 import dataclasses as dc
 from collections.abc import Sequence
 
@@ -13,7 +14,7 @@ from pydrake.common.cpp_param import List
 from pydrake.common.value import AbstractValue, Value
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
-from pydrake.systems.framework import Context, DiagramBuilder, DiscreteValues, LeafSystem
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem, State
 
 from physid_drake.cell import Body
 from physid_drake.cell.diagram import Scene
@@ -50,10 +51,13 @@ class EffectForces(LeafSystem):
         LeafSystem.__init__(self)
         self.set_name(NAME)
         self._reader, self._tick, self._laws, self._frictions = reader, tick, tuple(laws), tuple(frictions)
+        # A liquid has a motion of its own: it is the Context's, whose clones copy it; each simulation begins anew.
+        self.DeclareAbstractState(AbstractValue.Make(self._fresh()))
+        self.DeclareInitializationUnrestrictedUpdateEvent(self._begin)
         self._body = scene.object.index()
         self.DeclareVectorInputPort("object.state_estimated", 13)
         self.DeclareDiscreteState(5)  # the sum of the laws' wrenches
-        self.DeclarePeriodicDiscreteUpdateEvent(tick, 0.0, self._sample)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(tick, 0.0, self._sample)
         self.DeclareAbstractOutputPort(
             "object.force_commanded",
             lambda: AbstractValue.Make([ExternallyAppliedSpatialForce()]),
@@ -61,11 +65,20 @@ class EffectForces(LeafSystem):
             {self.xd_ticket()},
         )
 
-    def _sample(self, context: Context, discrete: DiscreteValues) -> None:
+    def _fresh(self) -> list[ForceLaw]:
+        return copy.deepcopy(list(self._laws))
+
+    def _begin(self, context: Context, state: State) -> None:
+        del context
+        state.get_mutable_abstract_state(0).set_value(self._fresh())
+
+    def _sample(self, context: Context, state: State) -> None:
         x = self.get_input_port().Eval(context).tolist()
-        state = self._reader.at(context.get_time(), self._tick, x[:7], x[7:])
-        wrenches = total_wrenches(state, self._laws, self._frictions)
-        discrete.set_value([sum(parts) for parts in zip(*map(dc.astuple, wrenches), strict=True)])
+        seen = self._reader.at(context.get_time(), self._tick, x[:7], x[7:])
+        laws = state.get_mutable_abstract_state(0).get_mutable_value()
+        wrenches = total_wrenches(seen, laws, self._frictions)
+        total = [sum(parts) for parts in zip(*map(dc.astuple, wrenches), strict=True)]
+        state.get_mutable_discrete_state().set_value(total)
 
     def _forces(self, context: Context, output: Value[List[ExternallyAppliedSpatialForce]]) -> None:
         fx, fy, torque, tip_x, tip_y = context.get_discrete_state_vector().value().tolist()

@@ -145,6 +145,8 @@ def _shifted(value: float, interval: tuple[float, float], score: float, allowed:
     low, high = interval
     if low > 0.0 and value > 0.0 and (allowed.above == 0.0 or _is_logarithms(value, low, high)):
         return allowed.nearest(math.exp(_drawn(math.log(value), math.log(low), math.log(high), score)))
+    if high < 0.0 and value < 0.0 and _is_logarithms(-value, -high, -low):
+        return allowed.nearest(-math.exp(_drawn(math.log(-value), math.log(-high), math.log(-low), -score)))
     moved = _drawn(value, low, high, score)
     # An interval that stays on one side of zero is of something that has a sign.
     if low >= 0.0:

@@ -250,7 +250,9 @@ class PushWorld:
         ux, uy = c * vx - s * vy, s * vx + c * vy
         cy, sy = math.cos(moment.yaw), math.sin(moment.yaw)
         bx, by = self.plan.com
-        moment.vx, moment.vy = ux - spin * (sy * bx + cy * by), uy + spin * (cy * bx - sy * by)
+        across, along = cy * bx - sy * by, sy * bx + cy * by
+        moment.com_x, moment.com_y = moment.x + across, moment.y + along
+        moment.vx, moment.vy = ux - spin * along, uy + spin * across
         speed = math.hypot(moment.vx, moment.vy)
         if speed > 1e-3:
             moment.slid += speed * self._dt

@@ -11,7 +11,7 @@ from typing import Any
 from rich.table import Table
 
 from physid_drake.prove.figures import Figures, decimals, held_out_table, json_of, power_table, table
-from physid_drake.prove.score import Outcome
+from physid_drake.prove.score import HeldOut, Outcome, number
 
 FORMAT = "physid-proof/1"
 MAIN = ("", "figure", "95 % interval", "asked for")
@@ -96,10 +96,50 @@ def _outcome(outcome: Outcome) -> dict[str, Any]:
         "probabilities": [_digits(p) for p in outcome.probabilities],
         "parameter_errors": [_digits(e) for e in outcome.errors],
         "covered_90": list(outcome.covered),
+        "others_covered_90": list(outcome.others_covered),
+        "theta_errors": [_digits(e) for e in outcome.theta_errors],
+        "theta_covered_90": list(outcome.theta_covered),
         "reduced_chi2_after": _digits(outcome.chi2),
         "held_out_rms": [_digits(v) for v in outcome.held_out.rms],
+        "held_out_position_m": [_digits(v) for v in outcome.held_out.position],
+        "held_out_rotation_rad": [_digits(v) for v in outcome.held_out.rotation],
         "error": outcome.error,
     }
+
+
+def outcomes_in(content: dict[str, Any]) -> tuple[Outcome, ...]:
+    """The outcomes of a ``proof.json``; those of older ones have no intervals of places and of theta."""
+    times = content["seconds"].get("worlds", {})
+    return tuple(
+        Outcome(
+            id=one["id"],
+            kind=one["kind"],
+            true=tuple(one["true"]),
+            size=one["size_sigma"],
+            verdict=one["verdict"],
+            classes=tuple(tuple(names) for names in one["classes"]),
+            probabilities=tuple(one["probabilities"]),
+            errors=tuple(one["parameter_errors"]),
+            covered=tuple(one["covered_90"]),
+            others_covered=tuple(one.get("others_covered_90", ())),
+            theta_errors=tuple(one.get("theta_errors", ())),
+            theta_covered=tuple(one.get("theta_covered_90", ())),
+            chi2=number(one["reduced_chi2_after"]),
+            held_out=HeldOut(
+                rms=_three(one["held_out_rms"]),
+                position=_three(one.get("held_out_position_m")),
+                rotation=_three(one.get("held_out_rotation_rad")),
+            ),
+            seconds=number(times.get(one["id"])),
+            error=one["error"],
+        )
+        for one in content["outcomes"]
+    )
+
+
+def _three(values: Sequence[float | None] | None) -> tuple[float, float, float]:
+    before, after, floor = map(number, values or (None,) * 3)
+    return before, after, floor
 
 
 def _digits(value: float) -> float | None:

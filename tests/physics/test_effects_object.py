@@ -62,6 +62,23 @@ def test_a_rolling_cylinder_stops_and_stays():
     assert np.abs(velocities(motion)[-20:, 0]).max() < 1e-3
 
 
+@pytest.mark.parametrize("tilt", [0.03, 0.05])
+def test_rolling_resistance_holds_a_cylinder_on_a_tilt_below_b_over_r(tilt):
+    effects = (make("rolling_resistance", coefficient=0.002), make("table_tilt", x=tilt))  # b / R is 0.061
+    assert np.abs(end(slide(*effects, velocity=(0.0, 0.0, 0.0), geometry=LYING, seconds=4.0))).max() < 1e-6
+    motion = slide(*effects, velocity=(0.15, 0.0, 0.0), geometry=LYING, seconds=8.0)
+    want = 0.15**2 / 2 / (2.0 / 3.0 * G * (0.002 / 0.033 - math.sin(tilt)))
+    assert end(motion)[0] == pytest.approx(want, rel=2e-3)
+    assert np.abs(velocities(motion)[-20:, 0]).max() < 1e-6
+
+
+@pytest.mark.parametrize("tilt", [0.07, 0.1])
+def test_rolling_resistance_lets_a_cylinder_go_on_a_tilt_beyond(tilt):
+    effects = (make("rolling_resistance", coefficient=0.002), make("table_tilt", x=tilt))
+    down = end(slide(*effects, velocity=(0.0, 0.0, 0.0), geometry=LYING))[0]
+    assert down == pytest.approx(0.5 * 2.0 / 3.0 * G * (math.sin(tilt) - 0.002 / 0.033), rel=0.01)
+
+
 def test_rolling_resistance_leaves_a_slide_along_the_axis():
     effect = make("rolling_resistance", coefficient=0.004)
     assert end(slide(effect, velocity=(0.0, 0.3, 0.0), geometry=LYING))[1] == pytest.approx(

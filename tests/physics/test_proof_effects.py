@@ -138,6 +138,15 @@ def test_tether_and_magnet_pull_towards_their_point():
     assert slide(fx.Tether(stiffness=k, x=1.0))[0] == pytest.approx(float(x), rel=0.003)
 
 
+def test_tether_and_magnet_pull_at_the_centre_of_mass():
+    def moved(**place):
+        pulls = (fx.Tether(stiffness=40.0, **place), fx.Magnet(strength=1e-2, core=0.05, **place))
+        return [np.abs(slide(fx.ComOffset(x=0.01), pull, velocity=(0.0, 0.0, 0.0))).max() for pull in pulls]
+
+    assert max(moved(x=0.01)) < 1e-5  # it is there already
+    assert min(moved(x=0.05)) > 1e-3
+
+
 @pytest.mark.parametrize(("core", "share"), [(0.03, 0.4), (0.05, 0.2)])
 def test_a_magnet_does_the_work_of_its_law(core, share):
     # Into it and not past it: half m v^2 + the attraction's work = friction's.

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from physid_drake.diagnose.case import case_of, cell_config
-from physid_drake.diagnose.next_push import LONGEST_TICK, _chance, brisk_pool
+from physid_drake.diagnose.next_push import LONGEST_TICK, _chance, _problem, brisk_pool
 from physid_drake.diagnose.plain import coarse
 from physid_drake.errors import RecordingError
 from physid_drake.identify.config import ThetaConfig
+from physid_drake.model import turned
 from physid_drake.recording import ForceStream, Recording, read_recording
 from physid_drake.resources import shipped
 
@@ -95,3 +96,15 @@ def test_a_push_that_may_lose_the_object_is_not_proposed(recording, x, chance):
     one = case(small)
     ends = [np.array([x, 0.0, 0.1]), np.array([x - 0.2, 0.0, 0.1])]
     assert _chance(one, ends, one.problems[0]) == pytest.approx(chance)
+
+
+@pytest.mark.parametrize("direction", [0.0, 2.0])
+def test_the_hand_of_the_next_push_turns_as_those_of_the_recording_do(recording, direction):
+    """Beside a hand that faces where it pushes, its offset turns, too."""
+    usual = case(recording)
+    faces = (dc.replace(problem, hand_axes=turned(problem.path.heading)) for problem in usual.problems)
+    facing = dc.replace(usual, problems=tuple(faces))
+    push = _problem(facing, direction, 0.2, 0.0)
+    np.testing.assert_allclose(push.hand_axes, turned(push.path.heading), atol=1e-6)
+    fixed = _problem(usual, direction, 0.2, 0.0)
+    np.testing.assert_allclose(fixed.hand_axes, usual.problems[0].hand_axes, atol=1e-6)

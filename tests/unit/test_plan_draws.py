@@ -10,6 +10,7 @@ from scipy import stats
 
 from physid_drake.effects.body import Restitution
 from physid_drake.effects.drag import QuadraticDrag
+from physid_drake.effects.fields import Tether
 from physid_drake.effects.friction import StribeckFriction
 from physid_drake.effects.liquid import Sloshing
 from physid_drake.errors import ConfigError
@@ -85,6 +86,19 @@ def test_draws_have_their_interval_wherever_in_it_or_beside_it_the_value_is(valu
     )
     drawn = np.array([m.body.hand_friction for m in models_from(model, 1024)])
     np.testing.assert_allclose(np.quantile(drawn, [0.05, 0.95]), interval, rtol=0.05)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_draws_of_a_spring_keep_the_pull_that_pushes_told_on_either_side(side):
+    """Of a far anchor only stiffness times place is told: both are unsure by a factor of two, and go oppositely."""
+    names = ("tether.stiffness", "tether.x")
+    ends = sorted([side * 0.15, side * 0.6])
+    sprung = replace(
+        MODEL, effects=(Tether(stiffness=1.0, x=side * 0.3),), intervals={names[0]: [0.5, 2.0], names[1]: ends},
+        correlation=Correlation(names=names, matrix=((1.0, -side), (-side, 1.0))),
+    )  # fmt: skip
+    pulls = np.array([m.effects[0].stiffness * m.effects[0].x for m in models_from(sprung)])
+    np.testing.assert_allclose(pulls, side * 0.3, rtol=0.02)
 
 
 def test_a_draw_of_an_object_that_cannot_be_is_one_that_diverged():

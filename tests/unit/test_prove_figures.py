@@ -1,5 +1,6 @@
 """Figures of hand-made outcomes, and the page that shows them."""
 
+import dataclasses as dc
 import json
 import math
 import re
@@ -7,9 +8,9 @@ import re
 import pytest
 
 from physid_drake.prove.diagnosing import Attempt
-from physid_drake.prove.figures import NOT_CATALOGUED, NOTHING, figures_of, table
+from physid_drake.prove.figures import NOT_CATALOGUED, NOTHING, figures_of, json_of, table
 from physid_drake.prove.score import HeldOut, Outcome, failed_outcome, outcome
-from physid_drake.report.proof import Proof, proof_json, proof_markdown, proof_tables
+from physid_drake.report.proof import Proof, outcomes_in, proof_json, proof_markdown, proof_tables
 from physid_drake.report.proof_page import proof_page
 from physid_drake.report.proof_pictures import confusion_picture
 from physid_drake.report.svg import drawn
@@ -141,6 +142,23 @@ def test_the_json_has_fixed_keys_and_seconds_stand_alone(proof):
     assert content["seconds"] == {"median": 80.0, "max": 100.0, "worlds": {"04": 60.0, "05": 100.0}}
     assert "second" not in json.dumps({k: v for k, v in content.items() if k != "seconds"})
     assert [f["id"] for f in content["faults"]][:2] == ["06", "07"]  # the largest effects first
+
+
+def test_outcomes_are_read_back_from_the_json(proof):
+    content = json.loads(proof_json(proof))
+    again = outcomes_in(content)
+    assert json_of(figures_of(again)) == json_of(proof.figures)
+    assert json.loads(proof_json(dc.replace(proof, outcomes=again))) == content
+
+
+def test_figures_of_an_older_json_lack_what_it_did_not_write(proof):
+    content = json.loads(proof_json(proof))
+    for one in content["outcomes"]:
+        for key in ("others_covered_90", "theta_errors", "theta_covered_90", "held_out_position_m"):
+            del one[key]
+    figures = figures_of(outcomes_in(content))
+    assert figures.theta_coverage.of == 0
+    assert figures.coverage == proof.figures.coverage
 
 
 def test_the_page_is_self_contained_and_lists_every_fault(proof):

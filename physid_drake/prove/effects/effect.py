@@ -24,6 +24,8 @@ class Moment:
         x: of Bo [m].
         y: of Bo [m].
         yaw: rad.
+        com_x: of the centre of mass [m].
+        com_y: of the centre of mass [m].
         vx: of the centre of mass [m/s].
         vy: of the centre of mass [m/s].
         spin: rad/s.
@@ -41,6 +43,8 @@ class Moment:
     x: float = 0.0
     y: float = 0.0
     yaw: float = 0.0
+    com_x: float = 0.0
+    com_y: float = 0.0
     vx: float = 0.0
     vy: float = 0.0
     spin: float = 0.0

@@ -36,7 +36,7 @@ class Tether(Effect):
     rest_length: float = 0.0
 
     def wrench(self, moment: Moment) -> tuple[float, float, float]:
-        dx, dy = self.x - moment.x, self.y - moment.y
+        dx, dy = self.x - moment.com_x, self.y - moment.com_y
         distance = math.hypot(dx, dy)
         pull = self.stiffness * max(0.0, distance - self.rest_length) / max(distance, 1e-9)
         return pull * dx, pull * dy, 0.0
@@ -44,7 +44,7 @@ class Tether(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class Magnet(Effect):
-    """Attraction ``strength`` / (d^2 + ``core``^2) to a point at distance d from Bo."""
+    """Attraction ``strength`` / (d^2 + ``core``^2) of the centre of mass to a point at distance d."""
 
     name: ClassVar[str] = "magnet"
     strengths: ClassVar[tuple[str, ...]] = ("strength",)
@@ -54,7 +54,7 @@ class Magnet(Effect):
     core: float = 0.03
 
     def wrench(self, moment: Moment) -> tuple[float, float, float]:
-        dx, dy = self.x - moment.x, self.y - moment.y
+        dx, dy = self.x - moment.com_x, self.y - moment.com_y
         squared = dx * dx + dy * dy
         # The unit vector jumps at the point itself; within a millimetre it is faded out.
         pull = self.strength / (squared + self.core**2) / math.sqrt(squared + 1e-6)
