@@ -107,8 +107,9 @@ class Stepper:
                 k = self._skip_rest(k, count) if self._resting(k) else self._tick(k, count)
                 if self._state.height < -FALLEN:
                     return self._log.motion(Outcome.FELL)
-        except (RuntimeError, SystemExit, FloatingPointError):
-            # Drake ends the process from a degenerate contact query; for a search it is one failed trial.
+        except (RuntimeError, SystemExit, ArithmeticError):
+            # Drake ends the process from a degenerate contact query, and a law's numbers may overflow; for a search it
+            # is one failed trial.
             return self._log.motion(Outcome.DIVERGED)
         return self._log.motion(Outcome.COMPLETED)
 
