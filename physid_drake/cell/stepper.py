@@ -108,7 +108,7 @@ class Stepper:
                 if self._state.height < -FALLEN:
                     return self._log.motion(Outcome.FELL)
         except (RuntimeError, SystemExit, ArithmeticError):
-            # Drake ends the process from a degenerate contact query, and a law's numbers may overflow; for a search it
+            # Drake ends the process from a degenerate contact query, a law's numbers may overflow: for a search it
             # is one failed trial.
             return self._log.motion(Outcome.DIVERGED)
         return self._log.motion(Outcome.COMPLETED)
