@@ -54,6 +54,7 @@ Array = NDArray[np.float64]
 
 ALIKE = 0.95  # cosine of two projected signatures that these pushes cannot tell apart
 SURELY = 3.0  # standard errors of a difference of gains: signatures that are alike need more than others
+LIKELY = 0.5  # odds against what was found: so likely a candidate is in its class though nothing confirms it
 CHANCE = 0.05  # of all looks: what explains no more is not worth a word
 FEWEST_PUSHES = 3
 GOOD_PART = 0.25  # of the squared error: less is not worth a word
@@ -198,9 +199,14 @@ def _location(evidence: Evidence, verdict: str, findings: Sequence[EffectFinding
 
 
 def class_of(plain: Fitted, step: Sequence[Candidate]) -> tuple[str, ...]:
-    """Names that explain these pushes as well as the best of a step, or look like it from the plain model."""
+    """Names that explain these pushes as well as the best of a step, or look like it from the plain model.
+
+    Also what one push speaks for so loudly that it is likely, although the others do not confirm it.
+    """
     best = step[0]
     close = {c.name for c in rivals(best, step)}
+    if not best.score.in_order:  # whose gains spread as widely as they are large: odds say nothing then
+        close |= {c.name for c in step[1:] if not out_of_question(best, c) and _odds(best, c) > LIKELY}
     for other in step[1:]:
         if not other.accepted or out_of_question(best, other) or surely_better(best, other, SURELY):
             continue
@@ -224,15 +230,19 @@ def _probability(step: Sequence[Candidate], others: set[str]) -> float:
     """That the best of a step is the right one: odds of each rival from its held-out deficit and standard error."""
     best, total = step[0], 1.0
     for other in step[1:]:
-        if other.name in others or out_of_question(best, other):
-            continue
-        difference = best.gains - other.gains
-        deficit = float(difference.sum())
-        if other.coordinates > best.coordinates:  # a little better for being more complicated is not likelier
-            deficit = max(0.0, deficit)
-        worse = float(stats.norm.sf(deficit / spread(difference)))
-        total += worse / max(1.0 - worse, 1e-9)
+        if other.name not in others and not out_of_question(best, other):
+            total += _odds(best, other)
     return 1.0 / total
+
+
+def _odds(best: Candidate, other: Candidate) -> float:
+    """Of another candidate against the best, from its held-out deficit and the standard error of that."""
+    difference = best.gains - other.gains
+    deficit = float(difference.sum())
+    if other.coordinates > best.coordinates:  # a little better for being more complicated is not likelier
+        deficit = max(0.0, deficit)
+    worse = float(stats.norm.sf(deficit / spread(difference)))
+    return worse / max(1.0 - worse, 1e-9)
 
 
 def _findings(evidence: Evidence) -> tuple[EffectFinding, ...]:

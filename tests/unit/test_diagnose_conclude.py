@@ -1,5 +1,6 @@
 """What is said of a mismatch that an effect takes away in part."""
 
+import dataclasses as dc
 from types import SimpleNamespace
 
 import numpy as np
@@ -180,6 +181,21 @@ def test_an_order_of_many_pushes_is_not_the_work_of_one(in_order, several):
     told.errors_before = errors(40.0)[:1] + errors(10.0)[1:]
     told.errors_after = errors(4.0)[:1] + errors(10.5)[1:]
     assert conclude._by_several(told) is several
+
+
+@pytest.mark.parametrize(
+    ("loudest", "in_order", "alike"),
+    [(160.0, False, ("tracker_bias",)), (40.0, False, ()), (160.0, True, ())],
+)
+def test_what_one_push_speaks_for_loudly_is_no_name_and_yet_in_the_class(loudest, in_order, alike):
+    """As in CMU's ``patch``: a name with a probability of 0.29 was said to explain the pushes."""
+    found = tried("uneven_support", 15.0, model_that_leaves(1.0), in_order)
+    other = tried("tracker_bias", 0.0, model_that_leaves(1.0))
+    gains = np.full(PUSHES, 1.0)
+    gains[0] = loudest
+    other = dc.replace(other, gains=gains)
+    assert found.accepted and not other.accepted
+    assert conclude.class_of(evidence().plain, (found, other)) == alike
 
 
 def test_what_the_model_has_beside_an_effect_is_no_rival_of_it(monkeypatch):
