@@ -67,13 +67,14 @@ def next_push(case: Case, states: Sequence[State]) -> NextPush | None:
     case.pool.count += pool.count
     chances = [_chance(case, ends[k :: len(pushes)], pushes[k]) for k in range(len(pushes))]
     best = int(np.argmax(chances))
-    if chances[best] == 0.0:
+    if chances[best] == -math.inf:
         return None
     direction, speed, offset = _choices()[best]
     return NextPush(
         direction_deg=math.degrees(direction), speed_mps=speed, contact_offset_m=offset * 0.5 * _width(case),
         start_x_m=pushes[best].start.pose[0], start_y_m=pushes[best].start.pose[1],
-        start_yaw_deg=math.degrees(pushes[best].start.pose[2]), settles_with_probability=chances[best],
+        start_yaw_deg=math.degrees(pushes[best].start.pose[2]),
+        settles_with_probability=max(chances[best], 1.0 / len(states)),  # a guess
     )  # fmt: skip
 
 
@@ -129,16 +130,22 @@ def _on_table(case: Case, end: Array) -> bool:
 
 
 def _chance(case: Case, ends: Sequence[Array | None], problem: PushProblem) -> float:
-    """Probability that the end pose names the right one of the models, for the pair that is hardest to tell.
+    """Probability that the end pose names the right one of the models, for the one that is hardest to tell.
 
-    None of a push in which a model diverges or lets the object come near an edge of the table.
+    At least so large: the chances to take it for each of the others add up at most (Boole), which is exact for two,
+    and below zero where nothing tells. Minus infinity for a push in which a model diverges or lets the object come
+    near an edge of the table.
     """
     if any(e is None or not _on_table(case, e) for e in ends):
-        return 0.0
-    chances = []
-    for a, b in itertools.combinations([e for e in ends if e is not None], 2):
-        moved = np.abs(a - np.array(problem.start.pose))
-        reach = float(np.hypot(moved[0], moved[1]))
-        std = np.hypot(case.noise.sigmas, REPEATS * np.array([reach, reach, max(moved[2], reach / 0.05)]))
-        chances.append(float(stats.norm.cdf(0.5 * np.linalg.norm((a - b) / std))))
-    return min(chances)
+        return -math.inf
+    known = np.array([e for e in ends if e is not None])
+    return min(_told(case, known[k], np.delete(known, k, axis=0), problem) for k in range(len(known)))
+
+
+def _told(case: Case, end: Array, others: Array, problem: PushProblem) -> float:
+    """At least the probability that a push which ends at a pose (3,) is not taken for one of the others (n, 3)."""
+    moved = np.abs(end - np.array(problem.start.pose))
+    reach = float(np.hypot(moved[0], moved[1]))
+    std = np.hypot(case.noise.sigmas, REPEATS * np.array([reach, reach, max(moved[2], reach / 0.05)]))
+    apart = np.linalg.norm((others - end) / std, axis=1)
+    return 1.0 - float(stats.norm.sf(0.5 * apart).sum())

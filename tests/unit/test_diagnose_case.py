@@ -4,6 +4,7 @@ import dataclasses as dc
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from physid_drake.diagnose.case import case_of, cell_config
 from physid_drake.diagnose.next_push import LONGEST_TICK, _chance, _problem, brisk_pool
@@ -90,7 +91,7 @@ def test_what_the_reader_left_out_is_said_in_the_answer(recording):
     assert "pushes/002.csv: object: row 4: track lost (all zeros), left out" in case(some).warnings
 
 
-@pytest.mark.parametrize(("x", "chance"), [(0.0, 1.0), (0.30, 0.0)])
+@pytest.mark.parametrize(("x", "chance"), [(0.0, 1.0), (0.30, -np.inf)])
 def test_a_push_that_may_lose_the_object_is_not_proposed(recording, x, chance):
     small = dc.replace(recording, table=dc.replace(recording.table, centre=(0.0, 0.0), size=(0.6, 0.6)))
     one = case(small)
@@ -108,3 +109,13 @@ def test_the_hand_of_the_next_push_turns_as_those_of_the_recording_do(recording,
     np.testing.assert_allclose(push.hand_axes, turned(push.path.heading), atol=1e-6)
     fixed = _problem(usual, direction, 0.2, 0.0)
     np.testing.assert_allclose(fixed.hand_axes, usual.problems[0].hand_axes, atol=1e-6)
+
+
+def test_three_models_are_harder_to_tell_than_two(recording):
+    one = case(recording)
+    pose = np.array(one.problems[0].start.pose)
+    step = 2.0 * one.noise.sigmas[0] * np.array([1.0, 0.0, 0.0])
+    two, three = (_chance(one, [pose + k * step for k in range(n)], one.problems[0]) for n in (2, 3))
+    assert two == pytest.approx(stats.norm.cdf(1.0), rel=0.01)
+    # Of the one in the middle; the others' noise grows with their way.
+    assert three == pytest.approx(1.0 - 2.0 * stats.norm.sf(1.0), rel=0.02)
