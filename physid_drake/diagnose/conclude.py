@@ -194,8 +194,9 @@ def _location(evidence: Evidence, verdict: str, findings: Sequence[EffectFinding
     """Where the mismatch is; the frame is that of the physics found, where some was found."""
     if verdict in ("consistent", "underpowered"):
         return None
-    found = locate(evidence.case, evidence.plain, evidence.wrenches, np.random.default_rng(seed))
-    return dc.replace(found, frame=evidence.steps[0][0].score.kind.frame) if findings else found
+    frame = evidence.steps[0][0].score.kind.frame if findings else None
+    found = locate(evidence.case, evidence.plain, evidence.wrenches, np.random.default_rng(seed), frame)
+    return found if frame is None else dc.replace(found, frame=frame)
 
 
 def class_of(plain: Fitted, step: Sequence[Candidate]) -> tuple[str, ...]:

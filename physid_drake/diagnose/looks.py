@@ -71,7 +71,13 @@ NOWHERE = Location(
 )  # fmt: skip
 
 
-def locate(case: Case, plain: Fitted, wrenches: Sequence[MissingWrench], rng: np.random.Generator) -> Location:
+def locate(
+    case: Case,
+    plain: Fitted,
+    wrenches: Sequence[MissingWrench],
+    rng: np.random.Generator,
+    frame: str | None = None,
+) -> Location:
     """The look that explains most; in no direction where none explains more than the best would by chance.
 
     Args:
@@ -79,6 +85,7 @@ def locate(case: Case, plain: Fitted, wrenches: Sequence[MissingWrench], rng: np
         plain: the model that lacks something.
         wrenches: what it lacks, window by window.
         rng: of the sign flips.
+        frame: of the physics that was found; of the looks those in this frame are in question, if there are any.
     """
     if not wrenches:
         return NOWHERE
@@ -94,7 +101,7 @@ def locate(case: Case, plain: Fitted, wrenches: Sequence[MissingWrench], rng: np
         _Seen(number=number, look=look, phases=phases, gain=gain, coefficients=solution)
         for (number, look, phases), gain, solution in zip(split, gains, solutions, strict=True)
     ]
-    best = max(seen, key=lambda one: one.gain)
+    best = max([one for one in seen if one.look.frame == frame] or seen, key=lambda one: one.gain)
     surely = (best_by_chance >= best.gain).mean() < CHANCE
     return _location(case, wrenches, seen, best if surely else None)
 

@@ -95,6 +95,15 @@ def test_the_frame_of_what_is_planted_is_found(name):
     assert words in found.statement
 
 
+def test_the_statement_is_in_the_frame_of_the_physics_that_was_found():
+    """Of a slope, looks in other frames see a part: what is said may not contradict the frame beside it."""
+    slope = world(PLANTED["a slope of friction"][0])
+    asked = {f: locate(case(), *slope, np.random.default_rng(0), f) for f in ("world", "push_order", "contact")}
+    assert asked["world"] == asked["contact"] == locate(case(), *slope, np.random.default_rng(0))
+    assert asked["push_order"].frame in ("push_order", "none")
+    assert "on the table" not in asked["push_order"].statement
+
+
 @pytest.mark.parametrize("phases", [("contact",), ("free_slide",), ("contact", "free_slide")])
 def test_the_phase_in_which_it_acts_is_said(phases):
     found = locate(case(), *world(lambda m: force(0.06 * (m.phase in phases), 2.0, m)), np.random.default_rng(0))
