@@ -35,6 +35,7 @@ from physid_drake.recording import Box, Cylinder, MeshShape, Prism, Shape
 Array = NDArray[np.float64]
 
 FORMAT = "physid-model/1"
+COMPLETE = "complete"
 ROUND_OFF = 1e-9  # of a correlation's roots
 SHAPES: dict[str, type[Box] | type[Cylinder] | type[Prism] | type[MeshShape]] = {
     "box": Box, "cylinder": Cylinder, "prism": Prism, "mesh": MeshShape,
@@ -166,6 +167,7 @@ class Model:
             content["tip_height_m"] = self.tip_height
         if self.contact_height is not None:
             content["contact_height_m"] = self.contact_height
+        content[COMPLETE] = True  # the last line: a file that was cut off has not got it
         return str(yaml.safe_dump(content, sort_keys=False))
 
 

@@ -13,9 +13,10 @@ import numpy as np
 from physid_drake.cell import Body, CellConfig
 from physid_drake.cell.checks import check_config
 from physid_drake.cell.config import ContactConfig, SolverConfig
+from physid_drake.cell.solid import solid_of
 from physid_drake.effects import Effect, effect_named
 from physid_drake.errors import ConfigError
-from physid_drake.model import AS_W, FORMAT, SHAPES, Correlation, Model
+from physid_drake.model import AS_W, COMPLETE, FORMAT, SHAPES, Correlation, Model
 from physid_drake.ranges import ANY, NOT_NEGATIVE, POSITIVE, Range
 from physid_drake.recording import Shape
 from physid_drake.yaml_text import read_yaml
@@ -37,6 +38,8 @@ def load_model(path: Path | str) -> Model:
     found = content.get("format") if isinstance(content, dict) else None
     if found != FORMAT:
         raise ConfigError(f"{where}: the format must be '{FORMAT}', but is {found!r}; diagnose again.")
+    if content.get(COMPLETE) is not True:
+        raise ConfigError(f"{where}: is cut off: its last line must be '{COMPLETE}: true'.")
     try:
         return _model(content, file)
     except ConfigError as error:
@@ -60,14 +63,17 @@ def _model(content: dict[str, Any], file: Path) -> Model:
         raise ConfigError(f"key 'effects': none may be there twice, but they are {', '.join(names)}.")
     intervals = _intervals(content.get("intervals", {}), effects)
     radius = content["hand_radius_m"]
+    shape = _shape(content["object"], file.parent)
+    # The contact is at the object; an upright tip's P may be above it.
+    ranges = {"tip_height": POSITIVE, "contact_height": Range(above=0.0, most=solid_of(shape).height)}
     heights = {
-        name: None if (value := content.get(f"{name}_m")) is None else _number(f"{name}_m", value)
-        for name in ("tip_height", "contact_height")
+        name: None if (value := content.get(f"{name}_m")) is None else _number(f"{name}_m", value, allowed)
+        for name, allowed in ranges.items()
     }
     (x0, y0), (x1, y1) = _rows("table_m", content["table_m"])
     return Model(
         recording=str(content["recording"]),
-        shape=_shape(content["object"], file.parent),
+        shape=shape,
         hand_radius=None if radius is None else _number("hand_radius_m", radius, POSITIVE),
         table=(
             (x0, y0),
@@ -126,6 +132,9 @@ def _effect(content: Mapping[str, Any]) -> Effect:
             parameters[name] = _grid(key, value)
         else:
             parameters[name] = _number(key, value, ranges.get(name, ANY))
+    missing = [name for name in nulls if name not in parameters]
+    if missing:
+        raise ConfigError(f"key 'effects.{kind.name}.{missing[0]}' is missing.")
     return kind(**parameters)
 
 

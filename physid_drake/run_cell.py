@@ -23,7 +23,7 @@ from physid_drake.identify.problem import usual_heights
 from physid_drake.identify.rollouts import Task, simulate
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
 from physid_drake.model import Model
-from physid_drake.plan import Hindsight, Plan, outcome_under
+from physid_drake.plan import Hindsight, Plan, caveat_of, outcome_under
 from physid_drake.plan.system import Planner, PolicySystem, identified_model, planner_of
 from physid_drake.progress import Progress
 from physid_drake.recording import Recording, digest_of, read_recording
@@ -62,7 +62,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("error: " + " ".join(str(error).split()), file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("interrupted; the same command goes on from what is kept", file=sys.stderr)
+        print("interrupted; the same command goes on from what is kept, if anything is", file=sys.stderr)
         return 130
     return 0
 
@@ -98,11 +98,12 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     recording = read_recording(recording_folder(scenario.recording))
     out = arguments.out or Path("runs") / name
     # Everything that can be refused is refused before anything is written.
+    RunFolder.check(out, "run_cell")
     identifier = _identifier(scenario, recording, out)
     planner = None if arguments.no_plan else _planner(scenario, recording, identifier, console)
     # A comment, so that the file is still a configuration that can be given to this command.
     made_by = f"{dump_scenario(name, scenario)}# of recording {digest_of(recording)}\n# by {made_with()}\n"
-    folder = RunFolder.open(out, made_by, files=(BELIEF, STATE, *RESULTS))
+    folder = RunFolder.open(out, made_by, state=(BELIEF, STATE), results=RESULTS)
     stage = None if arguments.no_view else _live(recording, console)
     result, plan = _identify(identifier, planner, scenario, recording, console)
     heights = usual_heights(identifier.problems)
@@ -117,17 +118,19 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     for stale in DIAGNOSIS:  # an earlier run's, of another model
         folder.forget(stale)
     folder.write("model.yaml", model.dump())
+    _keep_plan(plan, scenario, folder)
     _show(result, identifier, recording, console)  # what is printed may go to a pipe that closes
     console.print(f"written: result.json, page.html and model.yaml in {folder.path}")
-    _keep_plan(plan, scenario, folder, console)
+    _show_plan(plan, folder, console)
     if not arguments.no_diagnosis:
         diagnosis, found = _diagnose(scenario, recording, folder, console)
         page = partial(page, diagnosis=(diagnosis.verdict, diagnosis.sentence))
         folder.write("page.html", page(plan=plan))
         if planner is not None and plan is not None and (found.effects or _caveat(diagnosis)):
             plan, hindsight = _planned_again(planner, plan, diagnosis, found, console)
-            _keep_plan(plan, scenario, folder, console, hindsight=hindsight)
+            _keep_plan(plan, scenario, folder, hindsight=hindsight)
             folder.write("page.html", page(plan=plan, hindsight=hindsight))
+            _show_plan(plan, folder, console, hindsight=hindsight)
         folder.forget(STATE)
     folder.forget(BELIEF)
     _keep_serving(arguments.no_view, stage, console)
@@ -150,15 +153,18 @@ def _show(result: Identification, identifier: Identifier, recording: Recording, 
 
 
 def _keep_plan(
-    plan: Plan | None, scenario: Scenario, folder: RunFolder, console: Console, *, hindsight: Hindsight | None = None
+    plan: Plan | None, scenario: Scenario, folder: RunFolder, *, hindsight: Hindsight | None = None
 ) -> None:
-    """Show and write the plan; an earlier one is dropped."""
+    """Write the plan; an earlier one is dropped."""
     forget_plan(folder)
-    if plan is None:
-        return
-    write_plan(folder, plan, seed=scenario.seed, hindsight=hindsight, page=None)
-    console.print(plan_table(plan, hindsight=hindsight))
-    console.print(f"written: plan.json and {', '.join(push_files(plan))} in {folder.path}")
+    if plan is not None:
+        write_plan(folder, plan, seed=scenario.seed, hindsight=hindsight, page=None)
+
+
+def _show_plan(plan: Plan | None, folder: RunFolder, console: Console, *, hindsight: Hindsight | None = None) -> None:
+    if plan is not None:
+        console.print(plan_table(plan, hindsight=hindsight))
+        console.print(f"written: plan.json and {', '.join(push_files(plan))} in {folder.path}")
 
 
 def _diagnose(
@@ -190,14 +196,7 @@ def _planned_again(
 
 
 def _caveat(diagnosis: Diagnosis) -> str:
-    """What a diagnosis leaves open that may change what comes of a plan; empty if nothing."""
-    rivals = {e.name: e.indistinguishable_from for e in diagnosis.effects if e.indistinguishable_from}
-    if rivals:
-        unsure = "; nor ".join(f"{name} from {' or '.join(others)}" for name, others in rivals.items())
-        return f"these pushes cannot tell {unsure}, which may move the object elsewhere"
-    if diagnosis.verdict == "unexplained":
-        return "the plain cell does not account for the recorded pushes, and this is its plan: it may not hold"
-    return ""
+    return caveat_of(diagnosis.verdict, {e.name: e.indistinguishable_from for e in diagnosis.effects})
 
 
 def _live(recording: Recording, console: Console) -> Stage:
@@ -221,10 +220,10 @@ def _identifier(scenario: Scenario, recording: Recording, out: Path) -> Identifi
 
 def _planner(scenario: Scenario, recording: Recording, identifier: Identifier, console: Console) -> Planner | None:
     """What plans a push with an identification; None where nothing pushes, or no goal was asked for and none fits."""
-    if recording.hand is None:
-        return None
     asked = scenario.plan.goal_m or scenario.plan.start_m
     try:
+        if recording.hand is None:
+            raise ConfigError("plan: no hand pushes in this recording.")
         return planner_of(scenario.plan, identifier.pool.spec, identifier.problems, recording.name, scenario.seed)
     except ConfigError as error:
         if asked:

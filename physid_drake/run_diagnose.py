@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses as dc
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -27,8 +26,9 @@ from physid_drake.report.scene_page import scene_page
 from physid_drake.report.stage import ShownMotion, Stage
 from physid_drake.report.terminal import terminal
 from physid_drake.resources import shipped
-from physid_drake.run_folder import RunFolder, named_after, versions
+from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text, versions
 
+COMMAND = "diagnose"
 STATE = "stages.npz"
 FILES = ("diagnosis.json", "page.html", "scene.html", "model.yaml")
 SHOWN = 12  # pushes in the animation
@@ -61,13 +61,15 @@ def run(arguments: argparse.Namespace) -> int:
     recording = read_recording(source)
     config = cell_config(recording, contact=arguments.contact, time_step=arguments.time_step)
     case = case_of(recording, config, ThetaConfig(), jobs=arguments.jobs, most=arguments.pushes)
-    settings = {"seed": arguments.seed, "alpha": arguments.alpha, "effects": arguments.effects,
-                "cell": dc.asdict(config), "pushes": arguments.pushes, "recording": digest_of(recording),
-                "versions": versions()}  # fmt: skip
+    settings = settings_text(COMMAND, {
+        "seed": arguments.seed, "alpha": arguments.alpha, "effects": arguments.effects, "cell": dc.asdict(config),
+        "pushes": arguments.pushes, "recording": digest_of(recording), "versions": versions(),
+    })  # fmt: skip
     # Not the recording's name, which those that were converted from one data set share.
     out = arguments.out or Path("diagnoses") / named_after(source.resolve().name)
+    RunFolder.check(out, COMMAND)
     had_one = (out / FILES[0]).exists()
-    folder = RunFolder.open(out, json.dumps(settings, indent=2) + "\n", name="settings.json", files=(STATE, *FILES))
+    folder = RunFolder.open(out, settings, name=SETTINGS, state=(STATE,), results=FILES)
     if had_one and not (out / FILES[0]).exists():
         console.print(f"Note: {out} held a diagnosis of another recording, or with other settings; it is gone.")
     memory = Memory(folder.path / STATE)
@@ -78,7 +80,8 @@ def run(arguments: argparse.Namespace) -> int:
             case, console, seed=arguments.seed, alpha=arguments.alpha, effects=arguments.effects, memory=memory
         )
     except KeyboardInterrupt:
-        console.print("what was found is kept, and the same command goes on from there")
+        if memory.stages:
+            console.print("what was found is kept, and the same command goes on from there")
         raise
     write(folder, diagnosis, evidence)
     folder.forget(STATE)

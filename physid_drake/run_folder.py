@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import re
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 from physid_drake.errors import ConfigError, OutputError
 
+CONFIG, SETTINGS = "config.yaml", "settings.json"  # what a folder was made with: by run_cell, by other commands
 PACKAGES = ("physid_drake", "drake", "mujoco", "numpy", "scipy", "scikit-learn")
 
 
@@ -37,6 +40,22 @@ def named_after(name: str) -> str:
     return re.sub(r"[^\w.-]+", "_", name).strip("._") or "recording"
 
 
+def settings_text(command: str, settings: Mapping[str, Any]) -> str:
+    """The text of ``settings.json``: which command wrote the folder, and with what."""
+    return json.dumps({"command": command, **settings}, indent=2) + "\n"
+
+
+def command_of(path: Path) -> str | None:
+    """The command that wrote a folder; None where nothing says so."""
+    try:
+        if (path / CONFIG).exists():
+            return "run_cell"
+        content = json.loads((path / SETTINGS).read_text(encoding="utf-8"))
+        return str(content["command"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
 @dataclass(frozen=True, kw_only=True)
 class RunFolder:
     """A run's folder: its configuration, the state to go on from, the results."""
@@ -45,7 +64,13 @@ class RunFolder:
 
     @classmethod
     def open(
-        cls, path: Path, configuration: str, *, name: str = "config.yaml", files: Sequence[str] = ()
+        cls,
+        path: Path,
+        configuration: str,
+        *,
+        name: str = CONFIG,
+        state: Sequence[str] = (),
+        results: Sequence[str] = (),
     ) -> RunFolder:
         """Make the folder, or go on in one; the files of a run with another configuration are dropped.
 
@@ -53,7 +78,8 @@ class RunFolder:
             path: of the folder.
             configuration: text that says what the run is; kept in the folder.
             name: of the file that keeps it.
-            files: names of those that an interrupted run goes on from, and of its results.
+            state: names of the files that an interrupted run goes on from; dropped, too, where nothing says whose.
+            results: names of its results.
 
         Raises:
             OutputError: if it cannot be written.
@@ -62,21 +88,29 @@ class RunFolder:
         try:
             path.mkdir(parents=True, exist_ok=True)
             config = path / name
-            if config.exists() and config.read_text(encoding="utf-8") != configuration:
-                for file in files:
-                    folder.forget(file)
+            same = config.exists() and config.read_text(encoding="utf-8") == configuration
+            for file in () if same else (*state, *(results if config.exists() else ())):
+                folder.forget(file)
         except (OSError, UnicodeDecodeError) as error:
             raise OutputError(f"output folder '{path}': cannot be written: {error}.") from error
         folder.write(name, configuration)
         return folder
 
     @staticmethod
-    def check(path: Path) -> None:
-        """Refuse a folder that cannot be written to, before anything is computed for it.
+    def check(path: Path, command: str) -> None:
+        """Refuse a folder that cannot be written to or belongs to another command, before anything is computed.
+
+        Args:
+            path: of the folder.
+            command: that is to write there.
 
         Raises:
             OutputError: if it is no folder, or may not be written to.
+            ConfigError: if results of another command are in it, whose files have the same names.
         """
+        other = command_of(path)
+        if other not in (None, command):
+            raise ConfigError(f"output folder '{path}': holds what {other} wrote; choose another --out.")
         existing = next(one for one in (path, *path.absolute().parents) if one.exists())
         if not existing.is_dir() or not os.access(existing, os.W_OK):
             raise OutputError(f"output folder '{path}': cannot be written: '{existing}' is no folder to write to.")

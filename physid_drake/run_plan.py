@@ -15,7 +15,7 @@ from physid_drake.errors import ConfigError
 from physid_drake.identify.polish import scatter_freedom
 from physid_drake.model import Model
 from physid_drake.model_reading import load_model
-from physid_drake.plan import DistanceToGoal, Hindsight, Outcome, Plan, Situation, plan
+from physid_drake.plan import DistanceToGoal, Ending, Hindsight, Outcome, Plan, Situation, caveat_of, plan
 from physid_drake.plan.draws import uncertain_names
 from physid_drake.plan.story import outcome_under
 from physid_drake.plan.task import Choices, policy_for
@@ -25,8 +25,9 @@ from physid_drake.report.plan import plan_json, plan_table, push_files
 from physid_drake.report.plan_page import plan_page, plan_png
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.terminal import terminal
-from physid_drake.run_folder import RunFolder, named_after
+from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text
 
+COMMAND = "plan"
 FILES = ("plan.json", "push.csv", "push_1.csv", "push_2.csv")
 FEWEST_TRIALS, TRIALS_PER_SETTING = 24, 16  # of a search
 
@@ -36,11 +37,13 @@ class Learnt:
     """What a run's folder says beside its model.
 
     Attributes:
+        caveat: what a diagnosis leaves open; empty if nothing.
         friction_scatter: of support friction from push to push [-].
         scatter_freedom: degrees of freedom with which it is known.
         pushes: in its recording.
     """
 
+    caveat: str = ""
     friction_scatter: float = 0.0
     scatter_freedom: float = math.inf
     pushes: int = 0
@@ -64,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     )  # fmt: skip
     policy = policy_for(arguments.policy, model, start, goal, choices)
     out = arguments.out or Path("plans") / named_after(model.recording)
-    RunFolder.check(out)
+    RunFolder.check(out, COMMAND)
     console = terminal()
     with progress_bar(console) as tick:
         made = plan(
@@ -76,10 +79,19 @@ def run(arguments: argparse.Namespace) -> int:
         )  # fmt: skip
     if not math.isfinite(made.cost):
         raise ConfigError(f"model '{model.recording}': every rollout diverged, so that there is no push to make.")
+    if made.predicted.ending is not Ending.AT_REST:
+        raise ConfigError(
+            f"model '{model.recording}': the best push that was found does not bring the object to rest on the table"
+            f" ({made.predicted.ending.value}); nothing is written. Choose another start, goal or direction."
+        )
     with_effects = outcome_under(made, full) if arguments.plain and full.effects else None
-    folder = RunFolder.open(out, json.dumps(_settings(arguments), indent=2) + "\n", name="settings.json")
-    write(folder, made, seed=arguments.seed, with_effects=with_effects)
-    console.print(plan_table(made, with_effects=with_effects))
+    hindsight = Hindsight(caveat=learnt.caveat) if learnt.caveat else None
+    folder = RunFolder.open(out, settings_text(COMMAND, _settings(arguments)), name=SETTINGS)
+    write(folder, made, seed=arguments.seed, with_effects=with_effects, hindsight=hindsight)
+    console.print(plan_table(made, with_effects=with_effects, hindsight=hindsight))
+    nothing = made.cost_function.at(np.array(start[:2]))
+    if made.cost > nothing:
+        console.print(f"No push at all would leave the object nearer: {1e3 * nothing:.1f} mm.")
     if made.spread is None and arguments.draws:
         console.print("The model has no intervals to draw from: no spread, no success rate.")
     names = ["plan.json", *push_files(made), "plan.png", "page.html"]
@@ -107,7 +119,7 @@ def write(
         folder.write(name, push_csv(path, height))
     if page is not None:
         folder.write_bytes("plan.png", plan_png(made))
-        folder.write(page, plan_page(made, seed=seed, with_effects=with_effects))
+        folder.write(page, plan_page(made, seed=seed, with_effects=with_effects, hindsight=hindsight))
     # Last: where it is, all is.
     folder.write("plan.json", plan_json(made, seed=seed, with_effects=with_effects, hindsight=hindsight))
 
@@ -145,19 +157,23 @@ def _learnt(folder: Path) -> Learnt:
             continue
         try:
             content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-            scatter = float(content["friction_scatter"])
+            scatter, caveat = float(content["friction_scatter"]), ""
             if name == "diagnosis.json":
                 fitted = len(content["fit"]["per_push"])
                 pushes = int(content.get("pushes", fitted))
+                alike = {e["name"]: e["indistinguishable_from"] for e in content["effects"]}
+                caveat = caveat_of(content["verdict"], alike)
             else:
                 fitted = len(content["training"]["pushes"])
                 pushes = fitted + len(content["held_out"]["pushes"])
-        except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError) as error:
+        except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError, OverflowError, AttributeError) as error:
             text = " ".join(str(error).split())
             raise ConfigError(f"'{file}': cannot be read: {type(error).__name__}: {text}.") from error
         if not 0.0 <= scatter < 1.0:
             raise ConfigError(f"'{file}': friction_scatter must be in [0, 1), but is {scatter:g}.")
-        return Learnt(friction_scatter=scatter, scatter_freedom=scatter_freedom(fitted), pushes=pushes)
+        if pushes < 0:
+            raise ConfigError(f"'{file}': pushes must be at least 0, but is {pushes}.")
+        return Learnt(caveat=caveat, friction_scatter=scatter, scatter_freedom=scatter_freedom(fitted), pushes=pushes)
     return Learnt()
 
 

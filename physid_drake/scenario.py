@@ -73,7 +73,8 @@ def dump_scenario(name: str, scenario: Scenario) -> str:
 
 
 def _locate(config: str) -> tuple[Path, str | None]:
-    file, _, name = config.partition(":")
+    file, _, name = (config, "", "") if Path(config).exists() else config.rpartition(":")
+    file, name = (file, name) if file else (name, "")
     path = Path(file)
     if not path.exists() and path.parent == Path():
         for candidate in (shipped("configs") / file, shipped("configs") / f"{file}.yaml"):

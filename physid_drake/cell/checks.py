@@ -40,6 +40,9 @@ def check_config(config: CellConfig) -> None:
         ("default_density_kgpm3", config.default_density_kgpm3, LIGHTEST <= config.default_density_kgpm3 <= HEAVIEST,
          f"from {LIGHTEST:g} to {HEAVIEST:g} kg/m^3"),
     ]  # fmt: skip
+    switches = ("impact_law", "drift_feedforward", "trapezoid_slide")
+    values = {name: getattr(solver, name) for name in switches}
+    rules += [(f"solver.{k}", v, isinstance(v, bool), "true or false") for k, v in values.items()]
     for key, value, fine, rule in rules:
         if not fine:
             raise ConfigError(f"key 'cell.{key}': must be {rule}, but is {value!r}.")

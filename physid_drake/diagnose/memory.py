@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from physid_drake.errors import OutputError
+
 Array = NDArray[np.float64]
 
 
@@ -35,10 +37,18 @@ class Memory:
         return None if count is None else [self._kept[f"{name}/{k}"] for k in range(int(count))]
 
     def keep(self, name: str, arrays: list[Array]) -> None:
-        """Keep arrays under a name."""
+        """Keep arrays under a name.
+
+        Raises:
+            OutputError: if the file cannot be written.
+        """
         self._kept[f"{name}/count"] = np.array(float(len(arrays)))
         self._kept.update({f"{name}/{k}": np.asarray(a) for k, a in enumerate(arrays)})
-        if self._path is not None:
-            part = self._path.with_suffix(".part.npz")
+        if self._path is None:
+            return
+        part = self._path.with_suffix(".part.npz")
+        try:
             np.savez(part, allow_pickle=False, **self._kept)
             part.replace(self._path)
+        except OSError as error:
+            raise OutputError(f"'{self._path}': cannot be written: {error}.") from error

@@ -45,10 +45,13 @@ def applicable(around: Surroundings, names: Sequence[str] | None = None) -> tupl
     """The effects, all or those named, that can be in a recording.
 
     Raises:
-        ConfigError: if a name is unknown.
+        ConfigError: if a name is unknown, or none of those named can be in it.
     """
     kinds: Iterable[type[Effect]] = CATALOGUE if names is None else [effect_named(name) for name in names]
-    return tuple(kind for kind in kinds if kind.applies(around))
+    found = tuple(kind for kind in kinds if kind.applies(around))
+    if names and not found:
+        raise ConfigError(f"effects {', '.join(names)}: none of them can be in this recording.")
+    return found
 
 
 def tolerated(around: Surroundings) -> tuple[type[Effect], ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,8 +192,9 @@ def plan(
         search_named(search), budget=budget, rng=streams[2], refine_every=REFINE_EVERY, entropy_tolerance=0.0,
         on_trial=lambda belief: story.tell_search(belief, budget),
     )  # fmt: skip
-    rows = story.sweep(found.theta_best, sweep)
-    best = _better(policy, found, rows, risk=risk)
+    tried = story.best if math.isfinite(story.best[1]) else (np.array(found.theta_best), math.inf)
+    rows = story.sweep(tried[0], sweep)
+    best = _better(policy, tried, rows, risk=risk)
     predicted = story.trajectory(model, best)
     pushes = policy.pushes(best)
     # What was made small on its own draws looks better there than it is.
@@ -242,6 +243,22 @@ class Hindsight:
     caveat: str = ""
 
 
+def caveat_of(verdict: str, alike: Mapping[str, Sequence[str]]) -> str:
+    """What a diagnosis leaves open that may change what comes of a plan; empty if nothing.
+
+    Args:
+        verdict: of the diagnosis.
+        alike: per effect that was found, what these pushes cannot tell it from.
+    """
+    rivals = {name: others for name, others in alike.items() if others}
+    if rivals:
+        unsure = "; nor ".join(f"{name} from {' or '.join(others)}" for name, others in rivals.items())
+        return f"these pushes cannot tell {unsure}, which may move the object elsewhere"
+    if verdict == "unexplained":
+        return "the plain cell does not account for the recorded pushes, and this is its plan: it may not hold"
+    return ""
+
+
 def outcome_under(made: Plan, model: Model) -> Outcome:
     """What another model says of a plan's push: its trajectory and cost [m]."""
     pushes, path = made.policy.pushes(made.settings), made.predicted.paths[0]
@@ -249,9 +266,9 @@ def outcome_under(made: Plan, model: Model) -> Outcome:
     return trajectory, cost_of(made.cost_function, trajectory, model.table)
 
 
-def _better(policy: Policy, found: SearchResult, rows: Sequence[SweepRow], *, risk: bool) -> Array:
-    """The best setting (d,) of the search, or of the sweep along the swept one where that is better."""
-    best, least = np.array(found.theta_best), found.error_best
+def _better(policy: Policy, tried: tuple[Array, float], rows: Sequence[SweepRow], *, risk: bool) -> Array:
+    """The best setting (d,), of one that was tried, with its cost [m], and of the sweep along the swept one."""
+    best, least = tried[0].copy(), tried[1]
     index = policy.space.index(policy.swept)
     for row in rows:
         cost = row.spread.mean if risk and row.spread is not None else row.cost
@@ -278,6 +295,7 @@ class _Story:
         self._model, self._draws, self._policy = model, draws, policy
         self._cost, self._situation, self._tick = cost, situation, tick
         self.loss = loss_of(cost, model.table)
+        self.best = np.zeros(policy.space.dimension), math.inf  # settings that were tried, and their cost [m]
 
     def trajectory(self, model: Model, settings: Array) -> Trajectory:
         return trajectory_of(model, self._policy.pushes(settings), self._situation)
@@ -285,15 +303,18 @@ class _Story:
     def likely_costs(self, settings: Array) -> Array:
         """Costs (k,) of settings (k, d) under the likely theta, as the search sees them."""
         return self._capped(
-            [cost_of(self._cost, self.trajectory(self._model, s), self._model.table) for s in settings]
+            settings, [cost_of(self._cost, self.trajectory(self._model, s), self._model.table) for s in settings]
         )
 
     def mean_costs(self, settings: Array) -> Array:
         """Mean costs (k,) of settings (k, d) under the belief, as the search sees them."""
-        return self._capped([self.spread(s).mean for s in settings])
+        return self._capped(settings, [self.spread(s).mean for s in settings])
 
-    def _capped(self, costs: Sequence[float]) -> Array:
-        """No more than that of no push at all; infinite ones, of what diverged, stay so."""
+    def _capped(self, settings: Array, costs: Sequence[float]) -> Array:
+        """No more than that of no push at all; infinite ones, of what diverged, stay so. The best is remembered."""
+        least = int(np.argmin(costs))
+        if costs[least] < self.best[1]:
+            self.best = np.array(settings[least]), float(costs[least])
         most = max(self._cost.at(np.array(self._situation.start[:2])), LEAST_CAP)
         return np.array([min(cost, most) if math.isfinite(cost) else cost for cost in costs])
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from physid_drake.cell.outline import Disc, Outline
 from physid_drake.cell.outline import Polygon as OutlinePolygon
 from physid_drake.cell.solid import solid_of
-from physid_drake.plan import DistanceToGoal, Ending, InsideRegion, Outcome, Plan, SweepRow
+from physid_drake.plan import DistanceToGoal, Ending, Hindsight, InsideRegion, Outcome, Plan, SweepRow
 from physid_drake.report.plan import plan_rows, push_files, title_of
 from physid_drake.report.svg import MUTED, drawn, svg_of
 
@@ -48,7 +48,9 @@ def plan_png(plan: Plan) -> bytes:
         return file.getvalue()
 
 
-def plan_page(plan: Plan, *, seed: int, with_effects: Outcome | None = None) -> str:
+def plan_page(
+    plan: Plan, *, seed: int, with_effects: Outcome | None = None, hindsight: Hindsight | None = None
+) -> str:
     """The page as HTML.
 
     Args:
@@ -56,6 +58,7 @@ def plan_page(plan: Plan, *, seed: int, with_effects: Outcome | None = None) -> 
         seed: of the run.
         with_effects: trajectory and cost of the same push under the model with its effects, where it was planned
             without them.
+        hindsight: what a diagnosis leaves open.
     """
     with drawn():
         above = Figure(figsize=(6.4, 4.4), layout="constrained")
@@ -63,7 +66,8 @@ def plan_page(plan: Plan, *, seed: int, with_effects: Outcome | None = None) -> 
         picture = svg_of(above, "plan above", "The table from above: the object, its predicted path, the goal")
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     return environment.from_string(_PAGE).render(
-        title=title_of(plan), rows=plan_rows(plan, with_effects=with_effects), above=picture,
+        title=title_of(plan), rows=plan_rows(plan, with_effects=with_effects, hindsight=hindsight),
+        above=picture,
         curve=curve_svg(plan) if plan.sweep else None, caption=caption_of(plan), files=push_files(plan),
         seed=seed, other=with_effects is not None, trials=plan.search.belief.n_trials,
     ) + "\n"  # fmt: skip

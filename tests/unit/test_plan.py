@@ -53,6 +53,13 @@ def test_the_belief_spreads_the_end_as_friction_says(planned):
     assert rate == spread.successes(planned.tolerance) / 4 and low < rate <= high <= 1.0
 
 
+def test_of_pushes_that_all_lead_away_the_one_that_leads_away_least_is_taken():
+    """To the search they are all as bad as no push at all, and the first one tried was the answer."""
+    away = made(goal=(-0.15, 0.0), choices=Choices(direction=0.0))
+    assert away.cost == min(away.cost, *(row.cost for row in away.sweep))
+    assert away.cost > 0.15 and away.settings[0] < 0.1
+
+
 def test_the_sweep_goes_over_all_speeds_and_its_best_is_no_better_than_the_plan(planned):
     assert [row.value for row in planned.sweep] == pytest.approx([0.02, 0.51, 1.0])
     assert min(row.cost for row in planned.sweep) >= planned.cost

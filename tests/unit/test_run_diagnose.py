@@ -19,7 +19,7 @@ from physid_drake.diagnose.memory import Memory
 from physid_drake.effects.body import UnevenSupport
 from physid_drake.effects.drag import ViscousDrag
 from physid_drake.effects.hand import HandOffset
-from physid_drake.errors import ConfigError
+from physid_drake.errors import ConfigError, OutputError
 from physid_drake.model import AS_W, Correlation, Model
 from physid_drake.recording import Prism
 from physid_drake.resources import shipped
@@ -189,7 +189,7 @@ def test_what_a_correlation_does_not_hold_is_independent():
         ({"correlation": 3}, "model"),
         ({"format": "physid-model/0"}, "physid-model/1"),
         ({"effects": [{"name": "phlogiston", "parameters": {}}]}, "phlogiston"),
-        ({"effects": [{"name": "viscous_drag", "parameters": {"colour": 1.0}}]}, "colour"),
+        ({"effects": [{"name": "viscous_drag", "parameters": {"coefficient": 0.1, "colour": 1.0}}]}, "colour"),
         ({"theta": {"mass": 1.0}}, "model"),
         ({"object": {"shape": "sphere"}}, "sphere"),
         ({"intervals": None}, "intervals"),
@@ -211,7 +211,11 @@ def test_what_a_correlation_does_not_hold_is_independent():
         ),
         ({"effects": [{"name": "uneven_support", "parameters": {"weights": [[1.0], [1.0, 2.0]]}}]}, "equally many"),
         ({"effects": [{"name": "table_tilt", "parameters": {"x": float("inf")}}]}, "table_tilt.x"),
-        ({"effects": [{"name": "table_tilt", "parameters": {}}] * 2}, "twice"),
+        ({"effects": [{"name": "table_tilt", "parameters": {"x": 0.0, "y": 0.0}}] * 2}, "twice"),
+        ({"effects": [{"name": "table_tilt", "parameters": {"x": 0.1}}]}, "table_tilt.y' is missing"),
+        ({"tip_height_m": -1.0}, "tip_height_m"),
+        ({"contact_height_m": 3.0}, "contact_height_m"),
+        ({"complete": "tr"}, "cut off"),
     ],
 )
 def test_a_model_of_another_kind_is_refused_by_name(model, tmp_path, change, named):
@@ -234,6 +238,7 @@ def test_a_model_of_another_kind_is_refused_by_name(model, tmp_path, change, nam
         ("cell", {"friction_cells": [1]}, "cell.friction_cells"),
         ("cell", {"solver": {"scheme": "foo"}}, "cell.solver.scheme"),
         ("cell", {"solver": {"time_step_s": 0.0}}, "cell.solver.time_step_s"),
+        ("cell", {"solver": {"impact_law": "abc"}}, "true or false"),
         ("cell", {"contact": {"model": "foo"}}, "cell.contact.model"),
     ],
 )
@@ -249,7 +254,8 @@ def test_a_relative_mesh_is_one_beside_the_model(model, tmp_path, monkeypatch):
     content = yaml.safe_load(model.dump())
     content["object"] = {"shape": "mesh", "file": "cube.obj", "scale": 1.0}
     (tmp_path / "model.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
-    (tmp_path / "cube.obj").write_text("", encoding="utf-8")
+    vertices = (f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 1))
+    (tmp_path / "cube.obj").write_text("\n".join(vertices), encoding="utf-8")
     monkeypatch.chdir(tmp_path.parent)
     assert load_model(tmp_path.name).shape.file == (tmp_path / "cube.obj").resolve()
 
@@ -261,6 +267,23 @@ def test_a_model_that_is_not_there_or_no_yaml_is_refused(tmp_path):
         (tmp_path / "model.yaml").write_text(text, encoding="utf-8")
         with pytest.raises(ConfigError, match="is no YAML"):
             load_model(tmp_path)
+
+
+def test_a_model_that_was_cut_off_is_refused_wherever_it_was_cut(model, tmp_path):
+    """Half of the keys may be left out, and a cut number is a number."""
+    text = model.dump()
+    for count in (*range(40, len(text) - 1, 97), len(text) - 2):
+        (tmp_path / "model.yaml").write_text(text[:count], encoding="utf-8")
+        with pytest.raises(ConfigError):
+            load_model(tmp_path)
+
+
+def test_a_memory_that_cannot_be_written_is_one_line(tmp_path):
+    (tmp_path / "gone").mkdir()
+    memory = Memory(tmp_path / "gone" / "stages.npz")
+    (tmp_path / "gone").rmdir()
+    with pytest.raises(OutputError, match="cannot be written"):
+        memory.keep("plain", [np.arange(3.0)])
 
 
 def test_a_memory_that_was_cut_off_begins_again(tmp_path):

@@ -80,9 +80,48 @@ def test_the_results_beside_a_model_give_scatter_and_order(folder, tmp_path, few
     assert belief["ends"][0]["x_m"] != belief["ends"][1]["x_m"]
     # Two pushes tell no scatter, so that it is as sure as its first guess; five add theirs.
     assert run_plan._learnt(folder) == run_plan.Learnt(friction_scatter=0.05, scatter_freedom=4.0, pushes=3)
-    diagnosis = {"friction_scatter": 0.02, "fit": {"per_push": [1, 2, 3, 4, 5]}, "pushes": 30}
+    diagnosis = {
+        "friction_scatter": 0.02, "fit": {"per_push": [1, 2, 3, 4, 5]}, "pushes": 30, "verdict": "explained",
+        "effects": [{"name": "table_tilt", "indistinguishable_from": []}],
+    }  # fmt: skip
     (folder / "diagnosis.json").write_text(json.dumps(diagnosis))
     assert run_plan._learnt(folder) == run_plan.Learnt(friction_scatter=0.02, scatter_freedom=9.0, pushes=30)
+    for odd in (float("inf"), -5):
+        (folder / "diagnosis.json").write_text(json.dumps(diagnosis | {"pushes": odd}))
+        with pytest.raises(ConfigError, match=r"diagnosis\.json"):
+            run_plan._learnt(folder)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "alike", "said"),
+    [
+        ("unexplained", [], "does not account for"), ("ambiguous", ["tether"], "cannot tell table_tilt from tether"),
+        ("explained", [], None),
+    ],
+)  # fmt: skip
+def test_what_a_diagnosis_leaves_open_stands_beside_a_plan(folder, tmp_path, capsys, few_rows, verdict, alike, said):
+    effects = [{"name": "table_tilt", "indistinguishable_from": alike}]
+    diagnosis = {"friction_scatter": 0.0, "fit": {"per_push": [1] * 5}, "verdict": verdict, "effects": effects}
+    (folder / "diagnosis.json").write_text(json.dumps(diagnosis))
+    files = planned_files(folder, tmp_path / "out")
+    caveat = json.loads(files["plan.json"])["caveat"]
+    assert caveat is None if said is None else said in caveat
+    assert ("beware" in capsys.readouterr().out) is ("beware" in files["page.html"].decode()) is (said is not None)
+
+
+def test_a_plan_takes_no_other_commands_folder(folder, capsys):
+    (folder / "settings.json").write_text(json.dumps({"command": "diagnose"}))
+    assert main(["plan", str(folder), *QUICK, "--out", str(folder)]) == 1
+    assert "holds what diagnose wrote" in capsys.readouterr().err
+    assert not (folder / "plan.json").exists()
+
+
+def test_a_push_that_loses_the_object_is_no_plan(folder, tmp_path, capsys, few_rows):
+    edge = ["--start", "0.45", "0", "0", "--direction", "0", "--goal", "0.3", "0"]
+    status = main(["plan", str(folder), *QUICK, *edge, "--out", str(tmp_path / "out")])
+    assert status == 1
+    assert "does not bring the object to rest" in capsys.readouterr().err
+    assert not (tmp_path / "out" / "push.csv").exists()
 
 
 @pytest.mark.parametrize(
@@ -252,6 +291,15 @@ def test_the_planner_starts_where_the_recording_began():
     assert planner.dimension == 3
     z = float(np.median(shipped_pushes(1).pushes[0].hand.positions[:, 2]))
     assert planner.heights[0] == pytest.approx(z)
+
+
+def test_without_a_hand_no_push_is_planned_and_a_goal_is_refused(capsys):
+    known = shipped_pushes(2)
+    toss = replace(known, hand=None, pushes=tuple(replace(p, hand=None, force=None) for p in known.pushes))
+    assert run_cell._planner(Scenario(), toss, None, Console()) is None
+    assert "No push is planned" in " ".join(capsys.readouterr().out.split())
+    with pytest.raises(ConfigError, match="no hand"):
+        run_cell._planner(Scenario(plan=PlanConfig(goal_m=[0.3, 0.1])), toss, None, Console())
 
 
 def test_no_goal_that_fits_is_no_reason_to_stop_but_a_wrong_one_is(capsys):

@@ -52,6 +52,13 @@ def test_the_first_scenario_is_taken_where_none_is_named(tmp_path):
     assert load_scenario(f"{file}:first", None)[1].seed == 1
 
 
+def test_a_path_with_a_colon_is_a_path(tmp_path):
+    (tmp_path / "a:b").mkdir()
+    file = config(tmp_path / "a:b", "second: {seed: 2}\nfirst: {seed: 1}\n")
+    assert load_scenario(file, None)[0] == "second"
+    assert load_scenario(f"{file}:first", None)[1].seed == 1
+
+
 def test_an_empty_scenario_is_the_defaults(tmp_path):
     assert load_scenario(config(tmp_path, "plain:\n"), None) == ("plain", Scenario())
 
