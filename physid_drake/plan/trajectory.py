@@ -27,7 +27,7 @@ Pose = tuple[float, float, float]
 HORIZON = 4.0  # s after the hand has stopped
 MOST_SAMPLES = 200
 TOPPLED = math.cos(math.radians(30.0))
-STILL = 2e-3  # m/s
+STILL = 2e-3  # m/s, of any point
 LONGEST_STEP = 2.5e-4  # m of the hand in one tick, within the bounds below
 SHORTEST_TICK, LONGEST_TICK = 2e-3, 4e-3  # s, unless the model's own tick is shorter, or longer
 
@@ -215,11 +215,14 @@ def _ending(model: Model, motion: Motion) -> Ending:
         place = motion.poses[-1, 4:6]
         return Ending.TOPPLED if ((place >= low) & (place <= high)).all() else Ending.FELL
     w, x, y, z = motion.poses[-1, :4]
-    rolls = _solid(model.shape).rolling_radius is not None
+    solid = _solid(model.shape)
+    rolls = solid.rolling_radius is not None
     # What stays upright, or level where the object rolls: B's z axis, or its y axis.
     upright = 1.0 - 2.0 * (x * x + y * y) if not rolls else math.sqrt(max(0.0, 1.0 - 4.0 * (y * z + w * x) ** 2))
     if upright < TOPPLED:
         return Ending.TOPPLED
     end = float(motion.times[-1])
-    last = motion.planar_at(np.array([end - 0.05, end]))
-    return Ending.MOVING if float(np.hypot(*(last[1, :2] - last[0, :2]))) > 0.05 * STILL else Ending.AT_REST
+    dx, dy, turn = np.abs(np.diff(motion.planar_at(np.array([end - 0.05, end])), axis=0))[0].tolist()
+    x0, y0, x1, y1 = solid.outline.extent()
+    rim = math.hypot(dx, dy) + turn * 0.5 * math.hypot(x1 - x0, y1 - y0)
+    return Ending.MOVING if rim > 0.05 * STILL else Ending.AT_REST

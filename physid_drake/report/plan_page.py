@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from physid_drake.cell.outline import Disc, Outline
 from physid_drake.cell.outline import Polygon as OutlinePolygon
 from physid_drake.cell.solid import solid_of
+from physid_drake.effects.rollout import Geometry, geometry_with
 from physid_drake.plan import DistanceToGoal, Ending, Hindsight, InsideRegion, Outcome, Plan, SweepRow
 from physid_drake.report.plan import plan_rows, push_files, title_of
 from physid_drake.report.svg import MUTED, drawn, svg_of
@@ -119,7 +120,9 @@ def _curve(plan: Plan) -> list[SweepRow]:
 
 
 def _draw_table(axes: Axes, plan: Plan, other: Outcome | None = None) -> None:
-    outline = _corners(solid_of(plan.model.shape).outline)
+    # As large as effects make it.
+    shape = geometry_with(plan.model.effects, Geometry(shape=plan.model.shape)).shape
+    outline = _corners(solid_of(shape).outline)
     start, poses = np.array(plan.situation.start), plan.predicted.poses
     (x0, y0), (x1, y1) = plan.model.table
     axes.add_patch(

@@ -2,16 +2,18 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from plans import GOAL, MODEL, START
 from twin import body_of
 
+from physid_drake.cell import Outcome
 from physid_drake.errors import ConfigError
 from physid_drake.plan import DistanceToGoal, Ending, InsideRegion, Situation
 from physid_drake.plan.costs import cost_of, loss_of
-from physid_drake.plan.trajectory import trajectory_of
+from physid_drake.plan.trajectory import _ending, trajectory_of
 from physid_drake.policies import PlannedPush
 from physid_drake.recording import Box, Cylinder
 
@@ -72,3 +74,17 @@ def test_a_push_touches_where_the_recorded_ones_did(height, ending):
     tall = replace(MODEL, shape=Box(size=(0.05, 0.1, 0.15)), body=body_of(0.3, 0.4), contact_height=height)
     push = PlannedPush(direction=0.0, speed=0.05, travel=0.1)
     assert trajectory_of(tall, (push,), Situation(start=START)).ending is ending
+
+
+@pytest.mark.parametrize(("spin", "ending"), [(0.5, Ending.MOVING), (0.005, Ending.AT_REST)])
+def test_an_object_that_still_turns_is_not_at_rest(spin, ending):
+    times = np.array([0.0, 0.05])
+    half = 0.5 * spin * times
+    upright = np.column_stack(
+        [np.cos(half), 0.0 * half, 0.0 * half, np.sin(half), np.zeros((2, 2)), 0.0 * half + 0.015]
+    )
+    motion = SimpleNamespace(
+        outcome=Outcome.COMPLETED, poses=upright, times=times,
+        planar_at=lambda at: np.column_stack([0.0 * at, 0.0 * at, spin * at]),
+    )  # fmt: skip
+    assert _ending(MODEL, motion) is ending
