@@ -39,7 +39,9 @@ def load_model(path: Path | str) -> Model:
     if found != FORMAT:
         raise ConfigError(f"{where}: the format must be '{FORMAT}', but is {found!r}; diagnose again.")
     if content.get(COMPLETE) is not True:
-        raise ConfigError(f"{where}: is cut off: its last line must be '{COMPLETE}: true'.")
+        raise ConfigError(
+            f"{where}: is cut off, or of an earlier revision: its last line must be '{COMPLETE}: true'."
+        )
     try:
         return _model(content, file)
     except ConfigError as error:

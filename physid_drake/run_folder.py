@@ -15,6 +15,7 @@ from typing import Any
 
 from physid_drake.errors import ConfigError, OutputError
 
+SEAL = "seal.sha256"  # of a proof
 CONFIG, SETTINGS = "config.yaml", "settings.json"  # what a folder was made with: by run_cell, by other commands
 PACKAGES = ("physid_drake", "drake", "mujoco", "numpy", "scipy", "scikit-learn")
 
@@ -50,6 +51,8 @@ def command_of(path: Path) -> str | None:
     try:
         if (path / CONFIG).exists():
             return "run_cell"
+        if (path / SEAL).exists():
+            return "prove"
         content = json.loads((path / SETTINGS).read_text(encoding="utf-8"))
         return str(content["command"])
     except (OSError, ValueError, KeyError, TypeError):

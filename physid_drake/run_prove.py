@@ -28,10 +28,10 @@ from physid_drake.report.proof_page import proof_page
 from physid_drake.report.proof_pictures import confusion_picture
 from physid_drake.report.svg import drawn
 from physid_drake.report.terminal import terminal
-from physid_drake.run_folder import RunFolder, versions
+from physid_drake.run_folder import SETTINGS, RunFolder, versions
 
 WORLDS, QUICK = 200, 10
-SETTINGS = "settings.json"
+COMMAND = "prove"
 Commander = Callable[..., tuple[str, ...]]
 """Recording, folder of the results, what must not be seen (one or more): the words of the command that diagnoses."""
 
@@ -99,6 +99,7 @@ def check_running(arguments: argparse.Namespace) -> None:
 
 def claim(out: Path, settings: dict[str, object]) -> RunFolder:
     """The folder of a proof, refused where it holds another."""
+    RunFolder.check(out, COMMAND)
     return RunFolder.claim(out, json.dumps(settings, indent=2) + "\n", name=SETTINGS, what="proof")
 
 

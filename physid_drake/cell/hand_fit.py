@@ -57,7 +57,7 @@ def fit_uncertain_paths(
 
     Args:
         streams: per push times (n,) [s], n >= 2, and positions (n, 2) [m].
-        std: standard deviation of one position [m]; None estimates it from third differences.
+        std: standard deviation of one position [m]; None estimates it from differences (``stream_std``).
         least: errors that move the hand by less [m] are left out.
         memory: correlation time of the noise [s], a first-order autoregressive process; 0 is white.
 

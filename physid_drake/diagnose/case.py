@@ -209,7 +209,7 @@ def cell_config(recording: Recording, *, contact: str = "point", time_step: floa
 
 
 def _tick(recording: Recording) -> float:
-    """1 ms; longer where the hand goes less than a tenth of a millimetre in it."""
+    """1 ms; of slow hands as long as the fastest takes for a tenth of a millimetre, up to ``LONGEST_TICK``."""
     fastest = 0.0
     for push in recording.pushes:
         if push.hand is None or len(push.hand) < 3:

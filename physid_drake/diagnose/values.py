@@ -182,7 +182,7 @@ class Detectable:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class NextPush:
-    """The push that would tell the rivals apart, or that would teach most.
+    """The push that would tell the rivals apart.
 
     Attributes:
         direction_deg: of the hand's way in W.

@@ -13,9 +13,9 @@ from typing import Any
 from physid_drake.errors import OutputError
 from physid_drake.experiments.values import Experiment, Record
 from physid_drake.progress import Progress
-from physid_drake.run_folder import RunFolder
+from physid_drake.run_folder import SETTINGS, RunFolder, settings_text
 
-SETTINGS = "settings.json"
+COMMAND = "experiment"
 KEPT = "repetitions"
 
 
@@ -26,7 +26,8 @@ def claim(name: str, experiment: Experiment, out: Path) -> RunFolder:
         ConfigError: if it does.
         OutputError: if it cannot be written.
     """
-    text = json.dumps({"experiment": name, **settings_of(experiment)}, indent=2) + "\n"
+    RunFolder.check(out, COMMAND)
+    text = settings_text(COMMAND, {"experiment": name, **settings_of(experiment)})
     folder = RunFolder.claim(out, text, name=SETTINGS, what="experiment")
     try:
         (out / KEPT).mkdir(exist_ok=True)
