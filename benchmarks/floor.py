@@ -64,7 +64,7 @@ def row_of(folder, seal):
 def scene_of(truth):
     for attempt in range(ATTEMPTS):
         scene = draw_scene(np.random.default_rng([truth["seed"], truth["index"], 4, attempt]))
-        if scene.plan.mass == truth["theta"]["mass"]:
+        if all(getattr(scene.plan, name) == truth["theta"][name] for name in ("mass", "support_friction")):
             return scene
     raise SystemExit(f"error: world {truth['id']} was drawn by another version.")
 

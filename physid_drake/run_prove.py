@@ -77,11 +77,22 @@ def _checked(arguments: argparse.Namespace) -> int:
     """How many worlds."""
     if arguments.quick and arguments.worlds is not None:
         raise ConfigError("--quick means ten worlds: give it or --worlds, not both.")
-    worlds = QUICK if arguments.quick else WORLDS if arguments.worlds is None else int(arguments.worlds)
+    sealed = arguments.open and arguments.out is not None and arguments.worlds is None
+    asked = WORLDS if arguments.worlds is None else int(arguments.worlds)
+    # An opened proof has as many worlds as were sealed.
+    worlds = QUICK if arguments.quick else _sealed_in(arguments.out) or asked if sealed else asked
     if worlds < 1:
         raise ConfigError(f"--worlds must be at least 1, but is {worlds}.")
     check_running(arguments)
     return worlds
+
+
+def _sealed_in(out: Path) -> int:
+    """How many worlds a proof's seal is of; 0 where there is none."""
+    try:
+        return sum(f"{SEALED}/" in line for line in (out / "seal.txt").read_text(encoding="utf-8").splitlines())
+    except OSError:
+        return 0
 
 
 def check_running(arguments: argparse.Namespace) -> None:

@@ -71,9 +71,9 @@ def attempt_of(folder: Path) -> Attempt | None:
         noted = json.loads((folder / ATTEMPT).read_text(encoding="utf-8"))
     seconds = noted.get("seconds")
     taken = float(seconds) if isinstance(seconds, int | float) else float("nan")
-    if (folder / RESULT).is_file():
-        return Attempt(seconds=taken, error=None)
-    return Attempt(seconds=taken, error=str(noted["error"])) if noted.get("error") else None
+    if noted.get("error"):  # also of one that failed after its answer was written
+        return Attempt(seconds=taken, error=str(noted["error"]))
+    return Attempt(seconds=taken, error=None) if (folder / RESULT).is_file() else None
 
 
 def diagnose_all(

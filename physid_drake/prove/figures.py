@@ -338,7 +338,9 @@ def _errors(members: Sequence[Outcome]) -> Errors:
 
     def medians(name: str) -> tuple[float, float, float]:
         rows = np.array([getattr(h, name) for h in known]).reshape(-1, 3)
-        before, after, floor = (float(np.median(c)) if len(c) else math.nan for c in rows.T)
+        before, after, floor = (
+            float(np.median(c[np.isfinite(c)])) if np.isfinite(c).any() else math.nan for c in rows.T
+        )
         return before, after, floor
 
     return Errors(

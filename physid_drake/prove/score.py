@@ -89,8 +89,8 @@ class Outcome:
 
     @property
     def right(self) -> bool:
-        """Whether the name is right, or in a class of at most two."""
-        return any(_names(names, name) for name in self.true for names in self.classes)
+        """Whether the name is right, or in a class of at most two, and no wrong one is beside it."""
+        return not self.wrong_name and any(_names(names, name) for name in self.true for names in self.classes)
 
     @property
     def first(self) -> bool:
@@ -217,9 +217,7 @@ def _parameters(true: Sequence[dict[str, Any]], effect: dict[str, Any]) -> list[
         vector = next((names for names in _VECTORS if name in names), (name,))
         scale = math.hypot(*(_leaves(match, effect, part) for part in vector))
         if scale > 0.0:
-            compared.append(
-                (abs(found["value"] - value) / scale, bool(found["ci90"][0] <= value <= found["ci90"][1]))
-            )
+            compared.append((abs(found["value"] - value) / scale, _holds(found["ci90"], value)))
     return compared
 
 
@@ -231,17 +229,23 @@ def _others_covered(true: Sequence[dict[str, Any]], effect: dict[str, Any]) -> l
         value, ends = match.get(name), found["ci90"]
         if isinstance(value, float) and isinstance(found["value"], float) and found["null"] is None and ends:
             turns = (-_HALF_TURN, 0.0, _HALF_TURN) if name == "angle" else (0.0,)
-            covered.append(any(ends[0] <= value + turn <= ends[1] for turn in turns))
+            covered.append(any(_holds(ends, value + turn) for turn in turns))
     return covered
 
 
 def _theta(true: dict[str, float], found: dict[str, Any]) -> list[tuple[float, bool]]:
     """Relative error of each parameter of theta that the pushes tell, and whether its interval holds the truth."""
     return [
-        (abs(one["value"] / true[name] - 1.0), bool(one["ci90"][0] <= true[name] <= one["ci90"][1]))
+        (abs(one["value"] / true[name] - 1.0), _holds(one["ci90"], true[name]))
         for name, one in found.items()
         if one["value"] is not None and true.get(name)
     ]
+
+
+def _holds(ends: Sequence[float | None], value: float) -> bool:
+    """Whether an interval holds a value; an end that JSON has no number for is infinite."""
+    low, high = (number(end) for end in ends)
+    return not (value < low or value > high)
 
 
 def _leaves(true: dict[str, Any] | None, effect: dict[str, Any], name: str) -> float:

@@ -167,7 +167,7 @@ def load_description(folder: Path) -> Section:
         mark = error.problem_mark or error.context_mark
         line = mark.line + 1 if mark is not None else 1
         raise RecordingError(f"{file}: line {line}: not valid YAML: {error.problem}; correct it.") from error
-    except (yaml.YAMLError, ValueError, RecursionError, TypeError) as error:
+    except (yaml.YAMLError, ValueError, RecursionError, TypeError, LookupError) as error:
         if isinstance(error, RecordingError):
             raise
         cause = " ".join(str(error).split()) or type(error).__name__
@@ -274,12 +274,20 @@ def push_entries(top: Section, folder: Path) -> list[tuple[str, Path, str]]:
         path = inside(folder, name)
         if path is None:
             raise section.refuse("file", f"must lie inside the recording's folder, but got {name!r}; move it.")
-        if not path.is_file():
+        if not _is_file(path):
             raise section.refuse("file", f"missing file {name!r}; add it or remove this push.")
         if any(path == other for _, other, _ in found):
             raise section.refuse("file", f"{name!r} is listed twice; remove one.")
         found.append((name, path, section.text("note", "")))
     return found
+
+
+def _is_file(path: Path) -> bool:
+    """Whether it is there; a name that is too long for any file is not."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 def _shape_from(section: Section, kind: str, folder: Path) -> Shape:
@@ -294,7 +302,7 @@ def _shape_from(section: Section, kind: str, folder: Path) -> Shape:
         return Prism(polygon=polygon, height=section.number("height_m"))
     name = section.text("file")
     path = inside(folder, name)
-    if path is None or not path.is_file():
+    if path is None or not _is_file(path):
         problem = "must lie inside the recording's folder" if path is None else "is missing"
         raise RecordingError(f"the mesh {name!r} {problem}; put it into the folder.")
     return MeshShape(file=path, scale=section.number("scale") if section.has("scale") else 1.0)

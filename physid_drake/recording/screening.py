@@ -32,6 +32,12 @@ HELD: Final = 1.5
 FEWEST_HELD: Final = 10
 """Poses of such a tracker: what rests without noise has fewer."""
 
+MOST_HELD: Final = 0.8
+"""Share of its poses that are shown so often; the others are those of rests, which repeat for longer."""
+
+PLATEAU: Final = 2.0
+"""Times the steps of what is lost meanwhile: so large are those there and back."""
+
 LONGEST_LEAP: Final = 0.1
 """From before a leap to after it [s]: what is away for longer may have been there."""
 
@@ -159,6 +165,8 @@ def _find_leaps(times: Array, positions: Array, quaternions: Array) -> tuple[lis
                 break
             both = min(steps[first - 1], steps[last])
             sudden = both > max(floor, LEAP_FACTOR * max(padded[first - 1], padded[last + 2]))
+            # Lost, it is somewhere else meanwhile; a tap goes there and back, fastest in between.
+            sudden = sudden and both > PLATEAU * float(steps[first:last].max(initial=0.0))
             ends = slice(first - 1, first), slice(last + 1, last + 2)
             if sudden and float(_distances(positions, quaternions, *ends)[0]) < 0.3 * both:
                 leaps.append((first, last))
@@ -175,8 +183,8 @@ def _find_leaps(times: Array, positions: Array, quaternions: Array) -> tuple[lis
 def _find_repeats(positions: Array, quaternions: Array) -> Flags:
     """Samples (n,) that repeat the one before because the tracker is slower than the log; none of other repeats.
 
-    A slower clock shows all its poses about equally often. Rounded noise repeats as chance has it, and what rests
-    without noise repeats for as long as it rests.
+    A slower clock shows all its poses about equally often while the body moves. Rounded noise repeats as chance has
+    it, and what rests without noise repeats for as long as it rests.
     """
     poses = np.column_stack([positions, quaternions])
     none = np.zeros(len(poses), dtype=np.bool_)
@@ -186,10 +194,15 @@ def _find_repeats(positions: Array, quaternions: Array) -> Flags:
     runs = np.diff(np.append(np.flatnonzero(~same), len(poses)))
     if len(runs) < FEWEST_HELD:
         return none
-    low, high = np.quantile(runs, [0.05, 0.95])
-    usual = runs[(runs >= low) & (runs <= high)]
-    held = high - low <= 1.0 and float(usual.mean()) >= HELD
-    return same if held else none
+    low = float(np.quantile(runs, 0.05))
+    usual = (runs >= low) & (runs <= low + 1.0)
+    if usual.mean() < MOST_HELD or float(runs[usual].mean()) < HELD:
+        return none
+    # In a rest the tracker's poses are alike, too: it still shows one in so many samples.
+    period = round(float(runs[usual].mean()))
+    for first, count in zip(np.flatnonzero(~same)[runs > low + 1.0], runs[runs > low + 1.0], strict=True):
+        same[first : first + count : period] = False
+    return same
 
 
 def _find_stalls(positions: Array, quaternions: Array) -> list[tuple[int, int]]:

@@ -85,7 +85,7 @@ def _push_files(recording: Recording) -> list[str]:
         path = PurePosixPath(name)
         if path.is_absolute() or ".." in path.parts or "\\" in name or "\0" in name or str(path) in files:
             raise OutputError(f"push {push.name!r}: cannot be a file of its own within a folder; rename the push.")
-        files.append(name)
+        files.append(str(path))
     return files
 
 

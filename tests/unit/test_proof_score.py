@@ -1,11 +1,12 @@
 """Scores of diagnoses against sealed truths."""
 
+import dataclasses as dc
 import json
 
 import pytest
 
 from physid_drake.prove.figures import figures_of, table
-from physid_drake.prove.score import outcome, read_outcomes
+from physid_drake.prove.score import Outcome, _holds, outcome, read_outcomes
 
 
 def truth(kind="effect", names=("viscous_drag",), size=8.0, value=0.4):
@@ -44,6 +45,17 @@ def test_what_the_pushes_tell_of_theta_is_compared_too():
     o = outcome(truth(), said())
     assert o.theta_errors == (pytest.approx(0.01), pytest.approx(0.05))
     assert o.theta_covered == (True, False)
+
+
+def test_a_right_name_with_a_wrong_one_beside_it_is_not_right():
+    both = Outcome(id="1", kind="effect", true=("tether",), size=9.0, verdict="explained",
+                   classes=(("tether",), ("magnet",)), probabilities=(0.9, 0.9))  # fmt: skip
+    assert both.wrong_name and not both.right and both.fault == "wrong name"
+    assert dc.replace(both, classes=(("tether", "table_tilt"),), probabilities=(0.9,)).right
+
+
+def test_an_end_that_json_has_no_number_for_is_infinite():
+    assert _holds([None, 1.0], 0.5) and _holds([0.0, None], 0.5) and not _holds([None, 0.0], 0.5)
 
 
 @pytest.mark.parametrize(

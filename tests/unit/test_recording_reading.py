@@ -360,6 +360,34 @@ def test_a_bounce_is_no_jump(written):
     assert read_recording(written(rows=long_table(bounce))).pushes[0].warnings == ()
 
 
+@pytest.mark.parametrize("period", [2, 3])
+def test_rests_of_a_slow_tracker_that_rounds_stay(written, period):
+    """All poses of a rest are one: without them, nothing says how long it rested."""
+
+    def slow(poses):
+        times, count = poses[:, 0].copy(), len(poses)
+        way = np.clip((np.arange(count) - 120) / 160, 0.0, 1.0)
+        poses[:, 1] = np.round(0.1 * way**2 * (3 - 2 * way), 4)
+        poses[:, 1:] = poses[period * (np.arange(count) // period), 1:]
+        poses[:, 0] = times
+        return poses
+
+    push = read_recording(written(rows=long_table(slow, count=400))).pushes[0]
+    assert len(push.object) == pytest.approx(400 / period, abs=4)
+    assert np.diff(push.object.times).max() < 2.1 * period * np.diff(push.object.times).min()
+
+
+@pytest.mark.parametrize(("size", "samples"), [(0.010, 9), (0.005, 8)])
+def test_a_tap_is_no_jump(written, size, samples):
+    def tap(poses):
+        turn = np.clip((np.arange(len(poses)) - 60.0) / samples, 0.0, 1.0)
+        poses[:, 1] = 0.5 * size * (1.0 - np.cos(2.0 * np.pi * turn))
+        return poses
+
+    push = read_recording(written(rows=long_table(tap, noise=5e-5, count=200))).pushes[0]
+    assert not any("left out" in w for w in push.warnings) and len(push.object) == 200
+
+
 def test_too_few_poses_left_after_track_loss_are_refused(written):
     rows = [ROWS[0], "0.1,,,,0,0,0,0,0,0,0", "0.2,,,,0,0,0,0,0,0,0"]
     assert "at least two object poses" in refusal(written(rows=rows))

@@ -272,7 +272,8 @@ def _mounting_of(pushes: list[_RawPush]) -> _Mounting:
 
 
 def _convert(raw: _RawPush, name: str, mounting: _Mounting) -> Push | None:
-    force_rows, robot_rows = _increasing(raw.force), _increasing(raw.robot)
+    kept = _increasing(raw.force[:, 0])
+    force_rows, robot_rows = raw.force[kept], raw.robot[_increasing(raw.robot[:, 0])]
     if min(len(force_rows), len(robot_rows)) < 2 * _TARE_SAMPLES:
         _warn(f"{raw.label}: its clock stands still; left out.")
         return None
@@ -280,7 +281,7 @@ def _convert(raw: _RawPush, name: str, mounting: _Mounting) -> Push | None:
     yaws = _yaws(robot_rows[:, 4:])
     hand = robot_rows[:, 1:3] * 1e-3 + turned(yaws, np.tile(mounting.tip, (len(yaws), 1)))
     hand_times, hand = _continued(robot_rows[:, 0] - start, hand)
-    forces = _hand_forces(raw, mounting)[np.isin(raw.force[:, 0], force_rows[:, 0])][: len(force_rows)]
+    forces = _hand_forces(raw, mounting)[kept]
     force_yaws = np.interp(force_rows[:, 0], robot_rows[:, 0], np.unwrap(yaws))
     forces = turned(force_yaws, forces)
     flat = np.zeros(len(hand_times))
@@ -296,14 +297,14 @@ def _convert(raw: _RawPush, name: str, mounting: _Mounting) -> Push | None:
     )
 
 
-def _increasing(rows: Array) -> Array:
-    """Rows whose time is at least a millisecond after the row before; the logger repeats some."""
+def _increasing(times: Array) -> list[int]:
+    """Indices of times (n,) that are at least a millisecond after the one before; the logger repeats some."""
     latest, kept = -np.inf, []
-    for k, time in enumerate(rows[:, 0]):
+    for k, time in enumerate(times):
         if time - latest >= _SHORTEST_INTERVAL:
             kept.append(k)
             latest = time
-    return rows[kept]
+    return kept
 
 
 def _continued(times: Array, path: Array) -> tuple[Array, Array]:

@@ -100,12 +100,14 @@ def _read(source: Path) -> list[Array]:
     try:
         with np.load(file, allow_pickle=False) as content:
             rows, lengths = np.asarray(content["traj"], dtype=np.float64), np.asarray(content["length"], dtype=int)
-    except (OSError, KeyError, ValueError, TypeError, BadZipFile) as error:
+    except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
         raise RecordingError(f"{file}: is no table of tosses: {error}.") from error
     if rows.ndim != 2 or rows.shape[1] != _COLUMNS or lengths.ndim != 1 or lengths.sum() != len(rows):
         raise RecordingError(f"{file}: must hold rows of 13 numbers and their lengths, but got {rows.shape}.")
-    if (lengths < 1).any() or not (np.linalg.norm(rows[:, 3:7], axis=1) > 0.5).all():
-        raise RecordingError(f"{file}: every toss needs a row, and every row a quaternion of length 1.")
+    if not len(lengths) or (lengths < 1).any() or not (np.linalg.norm(rows[:, 3:7], axis=1) > 0.5).all():
+        raise RecordingError(
+            f"{file}: there must be tosses, every toss needs a row, and every row a quaternion of length 1."
+        )
     return np.split(rows, np.cumsum(lengths)[:-1])
 
 

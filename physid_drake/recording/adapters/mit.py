@@ -155,11 +155,19 @@ def _raw_pushes(
     files: tuple[Path, ...], published: PublishedObject, limit: int | None, rng: np.random.Generator
 ) -> list[Push]:
     pushes: list[Push] = []
+    refused: RecordingError | None = None
     for k in drawn(len(files), limit, rng):
-        push = read_push(files[k], f"pushes/{len(pushes) + 1:04d}.csv", published)
+        try:
+            push = read_push(files[k], f"pushes/{len(pushes) + 1:04d}.csv", published)
+        except RecordingError as error:
+            warnings.warn(f"{files[k].name}: left out: {error}", UserWarning, stacklevel=3)
+            refused = error
+            continue
         for warning in push.warnings:
             warnings.warn(f"{files[k].name}: {warning}", UserWarning, stacklevel=3)
         pushes.append(push)
+    if refused is not None and not pushes:
+        raise refused
     return pushes
 
 
