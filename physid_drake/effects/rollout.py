@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.cell import Body, Cell, HandPath, Motion, Start
+from physid_drake.cell import Body, Cell, HandPath, Motion, Outcome, Start
 from physid_drake.cell.diagram import GRAVITY
 from physid_drake.cell.forces import FrictionLaw, Frictions
 from physid_drake.cell.soft_tip import Mount
@@ -95,6 +95,8 @@ def roll(
             frictions=frictions_of(present, facts),
             mount=mount_of(present, facts),
         )
+        if motion.outcome is Outcome.DIVERGED:  # perhaps before its first pose
+            break
         # Forces may lead further than the hand's speed would, onto a patch beyond.
         wider = dc.replace(facts, region=_reached(cell, motion, facts.region))
         if _as_rough(frictions_of(present, wider), frictions_of(present, facts)):
