@@ -164,7 +164,7 @@ def test_scatter_of_friction_is_found_push_by_push():
     for seed in (2, 3):  # of the noise, which four pushes feel
         recording = recorded(BOX, TRUTH, pushes_of(BOX, 4, seed=9), seed=seed, friction_changes=changes)
         result = identified(recording, *FRICTIONS)
-        assert_recovered(result, "support_friction", 0.27, 0.1, widest=0.12)  # -7.6 and -1.8 %; half an interval 10.5 and 6.4 %
+        assert_recovered(result, "support_friction", 0.27, 0.1, widest=0.12)  # -7.6 %; half an interval is 10.5 %
         assert 0.03 < result.polished.friction_scatter < 0.15  # 0.046 and 0.092; 0.102 is true
         found = [unknowns["friction"] for unknowns in result.polished.unknowns]
         alike.append(np.corrcoef(found, changes)[0, 1])
