@@ -11,7 +11,8 @@ from physid_drake.effects.effect import Surroundings
 
 Array = NDArray[np.float64]
 
-FEWEST, MOST = 3, 6  # places along a side
+FEWEST = 3  # places along a side
+MOST = 36  # places
 CLOSE = 1.2  # radii of the object: from further off a fit may not find a patch that is as large as the object
 
 
@@ -23,9 +24,13 @@ def grid_of_places(around: Surroundings) -> tuple[Array, float]:
 def close_grid_of_places(around: Surroundings) -> tuple[Array, float]:
     """A grid of places (n, 2) [m] no further apart than 1.2 radii of the object, as far as few do; their spacing."""
     low, high = around.region
-    wanted = (math.ceil(side / (CLOSE * around.radius)) for side in (high - low).tolist())
-    columns, rows = (min(max(count, FEWEST), MOST) for count in wanted)
-    return _grid(around, (columns, rows))
+    sides = (high - low).tolist()
+    counts = [max(math.ceil(side / (CLOSE * around.radius)), FEWEST) for side in sides]
+    # A long narrow region may have many along it: the cap is on all of them.
+    narrow = int(counts[1] < counts[0])
+    counts[narrow] = min(counts[narrow], math.isqrt(MOST))
+    counts[1 - narrow] = min(counts[1 - narrow], MOST // counts[narrow])
+    return _grid(around, (counts[0], counts[1]))
 
 
 def _grid(around: Surroundings, counts: tuple[int, int]) -> tuple[Array, float]:

@@ -35,4 +35,14 @@ def test_places_for_a_patch_are_as_close_as_the_object_is_wide():
 
 def test_there_are_never_many_places():
     tiny = around((0.02, 0.02), [[-1.0, -1.0], [1.0, 1.0]])
-    assert len(close_grid_of_places(tiny)[0]) == MOST**2
+    assert len(close_grid_of_places(tiny)[0]) == MOST
+
+
+@pytest.mark.parametrize("along", [0, 1])
+def test_a_lane_has_places_all_along_it(along):
+    high = np.array([0.12, 0.12])
+    high[along] = 0.8
+    lane = around((0.1, 0.08), [[0.0, 0.0], high])
+    places, _ = close_grid_of_places(lane)
+    assert len(places) <= MOST
+    assert np.diff(np.unique(places[:, along])).max() < 1.3 * CLOSE * lane.radius  # with six it was 2.6 times
