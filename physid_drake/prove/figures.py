@@ -130,6 +130,8 @@ class Figures:
             like, of every effect that was named rightly, of pairs, too.
         theta_error, theta_coverage: the same of friction and mass, in worlds of which the right thing was said.
         held_out: per kind of world; ``effect`` where it is clear and named rightly.
+        held_out_ratio: each world's error after over that of the true world, which is told the start exactly: of
+            ``none``, the plain cell's where it is not called wrong, and of ``effect`` as above.
         reliability: stated probabilities against what came true.
         brier: mean square of probability minus what came true; nan without names.
         confusion: counts of (truth, said).
@@ -151,6 +153,7 @@ class Figures:
     theta_error: Quantiles
     theta_coverage: Share
     held_out: dict[str, Errors]
+    held_out_ratio: dict[str, Quantiles]
     reliability: tuple[Reliability, ...]
     brier: float
     confusion: dict[tuple[str, str], int]
@@ -190,6 +193,10 @@ def figures_of(outcomes: Sequence[Outcome]) -> Figures:
             "other": _errors(kinds["other"]),
             "pair": _errors(kinds["pair"]),
         },
+        held_out_ratio={
+            "none": _quantiles(_ratios(o for o in kinds["none"] if not o.found)),
+            "effect": _quantiles(_ratios(o for o in clear if o.right)),
+        },
         reliability=bins,
         brier=brier,
         confusion=confusion(outcomes),
@@ -224,12 +231,14 @@ def confusion(outcomes: Sequence[Outcome]) -> dict[tuple[str, str], int]:
 
 def table(figures: Figures) -> list[tuple[str, str, str, str]]:
     """Rows for people: what, the figure with its counts, its 95 % interval, what was asked for."""
-    error = figures.parameter_error
+    error, ratio = figures.parameter_error, figures.held_out_ratio
     return [
         _row("no effect: called a mismatch", figures.false_alarms, "at most 1 %"),
+        ("  left-out pushes of the others: error over the true world's, median", _times(ratio["none"]), "", ""),
         *_naming_rows(f"effect of {CLEAR:g} sigma or more", figures.clear, ("95 %", "90 %")),
         ("  error of its amplitudes, median", _percent(error), "", "10 %"),
         ("  error of its amplitudes, 90th percentile", _percent(error, tail=True), "", ""),
+        ("  left-out pushes of those named: error over the true world's, median", _times(ratio["effect"]), "", "1.2"),
         *_naming_rows(f"effect below {CLEAR:g} sigma", figures.faint, ("", "")),
         _row("amplitudes, of pairs, too: 90 % intervals that hold the truth", figures.coverage, "85 to 95 %"),
         _row("  of their places, angles, speeds and the like", figures.others_coverage, "85 to 95 %"),
@@ -298,6 +307,7 @@ def json_of(figures: Figures) -> dict[str, Any]:
         "others_coverage_90": _plain(figures.others_coverage),
         "theta": {"error": _plain(figures.theta_error), "coverage_90": _plain(figures.theta_coverage)},
         "held_out": {kind: _plain(errors) for kind, errors in figures.held_out.items()},
+        "held_out_ratio": {kind: _plain(ratio) for kind, ratio in figures.held_out_ratio.items()},
         "calibration": {"brier": _plain(figures.brier), "bins": [_plain(b) for b in figures.reliability]},
         "confusion": [{"true": t, "said": s, "worlds": n} for (t, s), n in figures.confusion.items()],
         "seconds": {"median": _plain(figures.seconds[0]), "max": _plain(figures.seconds[1])},
@@ -348,6 +358,12 @@ def _errors(members: Sequence[Outcome]) -> Errors:
     )  # fmt: skip
 
 
+def _ratios(members: Iterable[Outcome]) -> list[float]:
+    """Errors of left-out pushes after the fix over those of the true world, in standard deviations."""
+    pairs = [o.held_out.rms[1:] for o in members]
+    return [after / floor for after, floor in pairs if math.isfinite(after) and floor > 0.0]
+
+
 def _count(flags: Iterable[bool]) -> Share:
     every = list(flags)
     return Share(count=sum(every), of=len(every))
@@ -372,6 +388,10 @@ def _row(what: str, share: Share, asked: str) -> tuple[str, str, str, str]:
 
 def _percent(error: Quantiles, *, tail: bool = False) -> str:
     return f"{100 * (error.p90 if tail else error.median):.1f} % (of {error.count})" if error.count else "-"
+
+
+def _times(ratio: Quantiles) -> str:
+    return f"{ratio.median:.2f} (90 %: {ratio.p90:.2f}; of {ratio.count})" if ratio.count else "-"
 
 
 def decimals(value: float) -> str:

@@ -26,8 +26,10 @@ def world(name, kind, true, verdict, said=(), size=8.0, probability=0.9, **more)
 
 
 OUTCOMES = (
-    world("01", "none", (), "consistent", size=0.0, theta_errors=(0.02, 0.04), theta_covered=(True, False)),
-    world("02", "none", (), "unexplained", size=0.0, theta_errors=(0.9,), theta_covered=(False,)),
+    world("01", "none", (), "consistent", size=0.0, theta_errors=(0.02, 0.04), theta_covered=(True, False),
+          held_out=HeldOut(rms=(0.9, 0.9, 0.8))),
+    world("02", "none", (), "unexplained", size=0.0, theta_errors=(0.9,), theta_covered=(False,),
+          held_out=HeldOut(rms=(7.0, 7.0, 1.0))),
     world("03", "none", (), "failed", size=0.0, error="error: out of memory"),
     world("04", "effect", DRAG, "explained", (DRAG,), errors=(0.1, 0.3), covered=(True, False), seconds=60.0,
           held_out=HeldOut(rms=(5.0, 1.2, 1.1), position=(4e-3, 4e-4, 3e-4), rotation=(0.1, 0.01, 0.009))),
@@ -65,6 +67,8 @@ def test_figures_of_known_outcomes():
     assert f.theta_error.median == pytest.approx(0.03)  # of the world of which the right thing was said
     assert (f.theta_coverage.count, f.theta_coverage.of) == (1, 2)
     assert f.held_out["effect"].worlds == 2
+    assert (f.held_out_ratio["effect"].median, f.held_out_ratio["effect"].count) == (pytest.approx(1.2 / 1.1), 1)
+    assert (f.held_out_ratio["none"].median, f.held_out_ratio["none"].count) == (pytest.approx(0.9 / 0.8), 1)
     assert f.seconds == (80.0, 100.0)
 
 
