@@ -113,6 +113,7 @@ class Model:
         hand_turns: whether the hand turns with its pushes: then ``hand_axes`` are along and across a push's heading.
         tip_height: of P above the table in what it was learnt from [m]; None where nobody knows.
         contact_height: of where the tip touched the object [m]; None where nobody knows.
+        top_speed: of the hand in the fastest push that it was learnt from [m/s]; None where nobody knows.
     """
 
     recording: str
@@ -128,6 +129,7 @@ class Model:
     hand_turns: bool = False
     tip_height: float | None = None
     contact_height: float | None = None
+    top_speed: float | None = None
 
     def axes_on(self, path: HandPath | None) -> Array:
         """The axes (2, 2) of P, as columns, along x and y of W, in a push along a path."""
@@ -167,6 +169,8 @@ class Model:
             content["tip_height_m"] = self.tip_height
         if self.contact_height is not None:
             content["contact_height_m"] = self.contact_height
+        if self.top_speed is not None:
+            content["top_speed_mps"] = self.top_speed
         content[COMPLETE] = True  # the last line: a file that was cut off has not got it
         return str(yaml.safe_dump(content, sort_keys=False))
 

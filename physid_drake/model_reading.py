@@ -67,10 +67,14 @@ def _model(content: dict[str, Any], file: Path) -> Model:
     radius = content["hand_radius_m"]
     shape = _shape(content["object"], file.parent)
     # The contact is at the object; an upright tip's P may be above it.
-    ranges = {"tip_height": POSITIVE, "contact_height": Range(above=0.0, most=solid_of(shape).height)}
-    heights = {
-        name: None if (value := content.get(f"{name}_m")) is None else _number(f"{name}_m", value, allowed)
-        for name, allowed in ranges.items()
+    ranges = {
+        "tip_height_m": POSITIVE,
+        "contact_height_m": Range(above=0.0, most=solid_of(shape).height),
+        "top_speed_mps": NOT_NEGATIVE,
+    }
+    hand = {
+        key.rpartition("_")[0]: None if (value := content.get(key)) is None else _number(key, value, allowed)
+        for key, allowed in ranges.items()
     }
     (x0, y0), (x1, y1) = _rows("table_m", content["table_m"])
     return Model(
@@ -88,7 +92,7 @@ def _model(content: dict[str, Any], file: Path) -> Model:
         correlation=_correlation(content, intervals),
         hand_axes=_axes(content.get("hand_axes")),
         hand_turns=bool(content.get("hand_turns", False)),
-        **heights,
+        **hand,
     )
 
 

@@ -19,7 +19,7 @@ from physid_drake.errors import ConfigError, PhysidError
 from physid_drake.identify import Identification, Identifier, OnlineIdentifier
 from physid_drake.identify.doubts import doubts
 from physid_drake.identify.nuisance import nuisance_of
-from physid_drake.identify.problem import usual_heights
+from physid_drake.identify.problem import HandUse
 from physid_drake.identify.rollouts import Task, simulate
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
 from physid_drake.model import Model
@@ -106,8 +106,8 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     folder = RunFolder.open(out, made_by, state=(BELIEF, STATE), results=RESULTS)
     stage = None if arguments.no_view else _live(recording, console)
     result, plan = _identify(identifier, planner, scenario, recording, console)
-    heights = usual_heights(identifier.problems)
-    model = identified_model(result, identifier.pool.spec, recording.name, heights=heights)
+    hand = HandUse.of(identifier.problems)
+    model = identified_model(result, identifier.pool.spec, recording.name, hand=hand)
     stage = stage or Stage(recording)
     marks = stage.play(_scenes(result, identifier, recording))
     note = f"{recording.description} Seed {scenario.seed}; {identifier.pool.count} rollouts."

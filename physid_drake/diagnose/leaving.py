@@ -11,7 +11,7 @@ from physid_drake.diagnose.estimates import correlation_of, theta_intervals
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import Diagnosis
-from physid_drake.identify.problem import PushProblem, usual_heights
+from physid_drake.identify.problem import HandUse, PushProblem
 from physid_drake.model import AS_W, Axes, Correlation, Model, turned
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
         intervals |= {f"{effect.name}.{name}": p.ci90 for name, p in effect.parameters.items()}
     names, matrix = correlation_of(case, fitted)
     hand_axes, hand_turns = hand_frame(case.problems)
-    tip_height, contact_height = usual_heights(case.problems)
+    hand = HandUse.of(case.problems)
     kept = [k for k, name in enumerate(names) if name in intervals]
     return Model(
         recording=case.recording.name,
@@ -54,8 +54,9 @@ def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
         correlation=Correlation.of([names[k] for k in kept], matrix[np.ix_(kept, kept)]),
         hand_axes=hand_axes,
         hand_turns=hand_turns,
-        tip_height=tip_height,
-        contact_height=contact_height,
+        tip_height=hand.tip_height,
+        contact_height=hand.contact_height,
+        top_speed=hand.top_speed,
     )
 
 

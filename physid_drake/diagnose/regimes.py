@@ -8,6 +8,7 @@ from physid_drake.diagnose.candidate import push_scores, standard_error
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import RegimeGain
+from physid_drake.identify.problem import push_speed
 
 FEWEST = 3  # pushes of a regime
 FASTER = 2.0  # the median of the fast over that of the slow pushes: less is one regime
@@ -52,11 +53,8 @@ def _by_speed(case: Case) -> Halves | None:
 
 
 def speed_of(case: Case, i: int) -> float:
-    """Largest speed of the hand once the object moves [m/s], of the object where there is no hand."""
-    problem = case.problems[i]
-    if problem.path is not None:
-        return problem.path.top_speed(problem.moving[0])
-    return float(np.hypot(*problem.start.velocity[:2]))
+    """Of push i, as of ``push_speed`` [m/s]."""
+    return push_speed(case.problems[i])
 
 
 def _by_heading(case: Case) -> Halves | None:

@@ -288,13 +288,38 @@ def _first_motion(problem: PushProblem, sigma: float) -> float:
     return float(problem.times[max(0, beyond[0] - 1)]) if len(beyond) else problem.begin
 
 
-def usual_heights(problems: Sequence[PushProblem]) -> tuple[float | None, float | None]:
-    """Medians over pushes of the heights of P and of its contact above the table [m]; None without a hand."""
-    pairs = [(problem.tip_height, problem.hand_height) for problem in problems if problem.tip_height is not None]
-    if not pairs:
-        return None, None
-    tip, contact = np.median(pairs, axis=0).tolist()
-    return tip, contact
+def push_speed(problem: PushProblem) -> float:
+    """Largest speed of the hand once the object moves [m/s], of the object where there is no hand."""
+    if problem.path is not None:
+        return problem.path.top_speed(problem.moving[0])
+    return float(np.hypot(*problem.start.velocity[:2]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandUse:
+    """How recorded pushes used the hand; None where nobody knows, or without one.
+
+    Attributes:
+        tip_height: of P above the table, the median over pushes [m].
+        contact_height: of where the tip touched the object, likewise [m].
+        top_speed: the fastest push's [m/s].
+    """
+
+    tip_height: float | None = None
+    contact_height: float | None = None
+    top_speed: float | None = None
+
+    @classmethod
+    def of(cls, problems: Sequence[PushProblem]) -> HandUse:
+        """Of the pushes that have a hand."""
+        pushed = [(p.tip_height, p.hand_height, push_speed(p)) for p in problems if p.tip_height is not None]
+        if not pushed:
+            return cls()
+        tip, contact, _ = np.median(pushed, axis=0).tolist()
+        return cls(tip_height=tip, contact_height=contact, top_speed=max(speed for _, _, speed in pushed))
+
+
+UNKNOWN_HAND = HandUse()
 
 
 def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[Start, Array, int]:

@@ -12,6 +12,7 @@ from physid_drake.plan.story import Plan as Plan
 from physid_drake.plan.story import Spread as Spread
 from physid_drake.plan.story import SweepRow as SweepRow
 from physid_drake.plan.story import caveat_of as caveat_of
+from physid_drake.plan.story import caveats_of as caveats_of
 from physid_drake.plan.story import outcome_under as outcome_under
 from physid_drake.plan.story import plan as plan
 from physid_drake.plan.task import policy_for as policy_for

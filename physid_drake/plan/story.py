@@ -29,6 +29,7 @@ TOLERANCE = 0.01  # m
 # m: costs are capped at that of no push, and no lower than here. A lost object costs a metre and more; beside such a
 # cliff a Gaussian process does not see the millimetres before it.
 LEAST_CAP = 0.1
+FASTER = 1.2  # times the speed of the fastest recorded push, which noise may make larger than it was
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
@@ -257,6 +258,18 @@ def caveat_of(verdict: str, alike: Mapping[str, Sequence[str]]) -> str:
     if verdict == "unexplained":
         return "the plain cell does not account for the recorded pushes, and this is its plan: it may not hold"
     return ""
+
+
+def caveats_of(made: Plan, hindsight: Hindsight | None = None) -> list[str]:
+    """All that may keep a plan from coming true, as far as it is known, a line each."""
+    speed, known = max(push.speed for push in made.policy.pushes(made.settings)), made.model.top_speed
+    caveats = [hindsight.caveat] if hindsight is not None and hindsight.caveat else []
+    if known is not None and speed > FASTER * known:
+        caveats.append(
+            f"it goes at {speed:.2f} m/s and the fastest recorded push at {known:.2f} m/s: what depends on speed may"
+            " be otherwise there"
+        )
+    return caveats
 
 
 def outcome_under(made: Plan, model: Model) -> Outcome:

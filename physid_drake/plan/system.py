@@ -13,7 +13,7 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 
 from physid_drake.identify import Identification
 from physid_drake.identify.polish import scatter_freedom
-from physid_drake.identify.problem import CellSpec, PushProblem, usual_heights
+from physid_drake.identify.problem import UNKNOWN_HAND, CellSpec, HandUse, PushProblem
 from physid_drake.identify.system import PUSH_PERIOD
 from physid_drake.model import Correlation, Model
 from physid_drake.plan.config import PlanConfig
@@ -142,7 +142,7 @@ class Planner:
         goal: x, y [m].
         name: of the recording.
         seed: of the run.
-        heights: of the recorded tip's centre and of its contact above the table [m]; None where nobody knows.
+        hand: how the recorded pushes used it.
     """
 
     config: PlanConfig
@@ -151,7 +151,7 @@ class Planner:
     goal: tuple[float, float]
     name: str
     seed: int
-    heights: tuple[float | None, float | None] = (None, None)
+    hand: HandUse = UNKNOWN_HAND
 
     @property
     def dimension(self) -> int:
@@ -165,7 +165,7 @@ class Planner:
             result: the identification.
             tick: told stage, steps done and steps in all.
         """
-        model = identified_model(result, self.spec, self.name, heights=self.heights)
+        model = identified_model(result, self.spec, self.name, hand=self.hand)
         polished = result.polished
         return self.with_model(
             model, friction_scatter=polished.friction_scatter, pushes=len(polished.residuals), tick=tick
@@ -215,25 +215,23 @@ def planner_of(config: PlanConfig, spec: CellSpec, problems: Sequence[PushProble
     )  # fmt: skip
     return Planner(
         config=config, spec=spec, situation=situation, goal=goal, name=name, seed=seed,
-        heights=usual_heights(problems),
+        hand=HandUse.of(problems),
     )  # fmt: skip
 
 
-def identified_model(
-    result: Identification, spec: CellSpec, name: str, *, heights: tuple[float | None, float | None] = (None, None)
-) -> Model:
+def identified_model(result: Identification, spec: CellSpec, name: str, *, hand: HandUse = UNKNOWN_HAND) -> Model:
     """The plain cell with the identified theta, its intervals and how they vary together.
 
     Args:
         result: the identification.
         spec: of the cell it was made with.
         name: of the recording.
-        heights: of the recorded tip's centre and of its contact above the table [m]; None where nobody knows.
+        hand: how the recorded pushes used it.
     """
     intervals = {f"theta.{e.name}": list(e.ci90) for e in result.estimates}
     return Model(
         recording=name, shape=spec.shape, hand_radius=spec.hand_radius, table=spec.table, config=spec.config,
         body=result.thetas.body(result.theta), intervals=intervals,
         correlation=Correlation.of(tuple(intervals), result.polished.correlation),
-        tip_height=heights[0], contact_height=heights[1],
+        tip_height=hand.tip_height, contact_height=hand.contact_height, top_speed=hand.top_speed,
     )  # fmt: skip

@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from physid_drake.plan import DistanceToGoal, Ending, Hindsight, Outcome, Plan, Spread, SweepRow, Trajectory
+from physid_drake.plan import (
+    DistanceToGoal,
+    Ending,
+    Hindsight,
+    Outcome,
+    Plan,
+    Spread,
+    SweepRow,
+    Trajectory,
+    caveats_of,
+)
 from physid_drake.plan.trajectory import tip_height_of
 
 FORMAT = "physid-plan/1"
@@ -52,7 +62,7 @@ def plan_json(
         "predicted": _outcome(plan.predicted, plan.cost),
         "predicted_with_effects": None if with_effects is None else _outcome(*with_effects),
         "plain_push": None if hindsight is None else _plain_push(hindsight),
-        "caveat": hindsight.caveat if hindsight is not None and hindsight.caveat else None,
+        "caveat": "; ".join(caveats_of(plan, hindsight)) or None,
         "belief": None if plan.spread is None else _belief(plan.spread, plan.tolerance),
         "loss_m": plan.loss,
         "sweep": {"setting": plan.policy.swept, "rows": [_row(row) for row in plan.sweep]},
@@ -105,9 +115,7 @@ def plan_rows(
             ("planned without effects", f"{settings}; thought to be off by {1e3 * hindsight.plain.cost:.1f} mm"),
             ("that push with them", _said(*hindsight.outcome)),
         ]
-    if hindsight is not None and hindsight.caveat:
-        rows.append(("beware", hindsight.caveat))
-    return rows
+    return [*rows, *(("beware", caveat) for caveat in caveats_of(plan, hindsight))]
 
 
 def _settings_rows(plan: Plan) -> list[tuple[str, str]]:

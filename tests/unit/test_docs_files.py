@@ -26,7 +26,7 @@ def test_the_keys_of_a_plan():
 def test_the_keys_of_a_model():
     must = set(yaml.safe_load(TILTED.dump())) - {"format"}
     assert must <= told("model.yaml")
-    may = {"correlation", "hand_axes", "hand_turns", "tip_height_m", "contact_height_m"}
+    may = {"correlation", "hand_axes", "hand_turns", "tip_height_m", "contact_height_m", "top_speed_mps"}
     assert told("model.yaml") - must <= may
 
 

@@ -215,6 +215,7 @@ def test_what_a_correlation_does_not_hold_is_independent():
         ({"effects": [{"name": "table_tilt", "parameters": {"x": 0.1}}]}, "table_tilt.y' is missing"),
         ({"tip_height_m": -1.0}, "tip_height_m"),
         ({"contact_height_m": 3.0}, "contact_height_m"),
+        ({"top_speed_mps": -0.1}, "top_speed_mps"),
         ({"complete": "tr"}, "cut off"),
     ],
 )

@@ -109,6 +109,15 @@ def test_what_a_diagnosis_leaves_open_stands_beside_a_plan(folder, tmp_path, cap
     assert ("beware" in capsys.readouterr().out) is ("beware" in files["page.html"].decode()) is (said is not None)
 
 
+@pytest.mark.parametrize(("known", "warned"), [(0.01, True), (2.0, False), (None, False)])
+def test_a_push_faster_than_every_recorded_one_is_said(folder, tmp_path, few_rows, known, warned):
+    (folder / "model.yaml").write_text(replace(TILTED, top_speed=known).dump())
+    files = planned_files(folder, tmp_path / "out")
+    caveat = json.loads(files["plan.json"])["caveat"] or ""
+    page = files["page.html"].decode()
+    assert ("fastest recorded push at 0.01 m/s" in caveat) is ("fastest recorded push" in page) is warned
+
+
 def test_a_plan_takes_no_other_commands_folder(folder, capsys):
     (folder / "settings.json").write_text(json.dumps({"command": "diagnose"}))
     assert main(["plan", str(folder), *QUICK, "--out", str(folder)]) == 1
@@ -253,7 +262,10 @@ def test_the_main_job_plans_again_with_what_its_diagnosis_found(
     assert content["effects"] == [e.name for e in effects]
     assert ("Planned again, with table_tilt" in shown) == ("with table_tilt" in page) == bool(effects)
     assert ("planned without effects" in shown) == ("planned without effects" in page) == bool(effects)
-    assert (content["caveat"] or "").count(caveat or "-") == page.count(caveat or "<td>beware") == bool(caveat)
+    warned = content["caveat"] or ""
+    assert (page.count("<td>beware") > 0) == bool(warned)
+    for said in ("cannot tell table_tilt from tether or magnet", "it may not hold"):
+        assert warned.count(said) == page.count(said) == (said == caveat)
     plain = content["plain_push"]
     assert (plain is None) == (not effects)
     if effects:
@@ -290,7 +302,8 @@ def test_the_planner_starts_where_the_recording_began():
     assert planner.goal == pytest.approx((planner.situation.start[0] + 0.3, planner.situation.start[1]))
     assert planner.dimension == 3
     z = float(np.median(shipped_pushes(1).pushes[0].hand.positions[:, 2]))
-    assert planner.heights[0] == pytest.approx(z)
+    assert planner.hand.tip_height == pytest.approx(z)
+    assert 0.05 < planner.hand.top_speed < 1.0
 
 
 def test_without_a_hand_no_push_is_planned_and_a_goal_is_refused(capsys):
