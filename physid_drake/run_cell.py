@@ -37,7 +37,7 @@ from physid_drake.report.stage import ShownMotion, Stage
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
 from physid_drake.report.terminal import terminal
 from physid_drake.run_diagnose import ALPHA, STATE, recording_folder, run_case, show, write
-from physid_drake.run_folder import RunFolder, made_with, versions
+from physid_drake.run_folder import RunFolder, made_with, named_after, versions
 from physid_drake.run_plan import FILES as PLAN
 from physid_drake.run_plan import forget as forget_plan
 from physid_drake.run_plan import write as write_plan
@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
         arguments.config, arguments.override, recording=arguments.recording, seed=arguments.seed
     )
     recording = read_recording(recording_folder(scenario.recording))
-    out = arguments.out or Path("runs") / name
+    out = arguments.out or Path("runs") / named_after(name)
     # Everything that can be refused is refused before anything is written.
     RunFolder.check(out, "run_cell")
     identifier = _identifier(scenario, recording, out)

@@ -15,7 +15,7 @@ from physid_drake.cell.config import CellConfig
 from physid_drake.cell.diagram import GRAVITY, Scene, add_scene
 from physid_drake.cell.forces import ForceLaw, FrictionLaw
 from physid_drake.cell.hand_path import HandPath
-from physid_drake.cell.motion import Motion, Start
+from physid_drake.cell.motion import Motion, Outcome, Start
 from physid_drake.cell.setters import (
     Body,
     HandContactSetter,
@@ -94,6 +94,11 @@ class Cell:
             attach(builder, self.scene)
         self.diagram: Diagram = builder.Build()
         self.simulator = Simulator(self.diagram)
+        self._take_integrator()
+        self._stepper = Stepper(self.scene, self.simulator, self.config.solver, hand_radius)
+
+    def _take_integrator(self) -> None:
+        """A new one of Drake's, if the scheme has one."""
         solver = self.config.solver
         if solver.scheme == "cenic":
             ApplySimulatorConfig(
@@ -106,7 +111,6 @@ class Cell:
                 ),
                 self.simulator,
             )
-        self._stepper = Stepper(self.scene, self.simulator, solver, hand_radius)
 
     def set_body(self, body: Body) -> None:
         """Write the parameters into the Context.
@@ -158,6 +162,8 @@ class Cell:
             frictions=frictions,
             mount=mount,
         )
+        if motion.outcome is Outcome.DIVERGED:
+            self._take_integrator()  # one that stopped half way through a step never steps again
         if self._table is None or not len(motion.times) or not self._overhangs(motion):
             return motion
         return self._cell_with_edge().rollout(

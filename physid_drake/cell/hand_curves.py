@@ -20,6 +20,7 @@ SHORTEST_PIECE = 2e-3  # s between knots
 PIECES = 24  # of a smooth ramp: speeds to 0.2 % of its height
 WIDER = 0.2  # at either end: where the fit of a smooth ramp starts
 HAIR = 1e-4  # s: for differences
+ROUND_OFF = 1e-9  # s: a piece no longer than this has parts of no length
 
 STRAIGHT: Final = Polynomial([0, 1])
 
@@ -284,7 +285,7 @@ class SmoothFit(StraightFit):
         speeds = coefficients[1:] if self._moving else np.vstack([np.zeros(2), coefficients[1:]])
         ramps = [STRAIGHT, *(self._ramp_after(k, len(knots)) for k in range(len(knots) - 1))]
         ends, speeds = np.array([min(0.0, knots[0] - SHORTEST_PIECE), *knots]), np.vstack([speeds[:1], speeds])
-        if self._span > knots[-1]:
+        if self._span > knots[-1] + ROUND_OFF:
             ends, speeds = np.append(ends, self._span), np.vstack([speeds, speeds[-1:]])
             ramps.append(STRAIGHT)
         parts = np.arange(PIECES) / PIECES

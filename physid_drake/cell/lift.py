@@ -30,7 +30,7 @@ class Lift:
         points = underside.points
         self._points, self._stiffness = points, stiffness
         self._roughness = underside.weights * underside.friction
-        rough = float(self._roughness.sum())
+        rough = max(float(self._roughness.sum()), TINY)
         middle = complex(self._roughness @ points) / rough
         arms = as_plane(points - middle)
         variances, axes = np.linalg.eigh((self._roughness * arms.T) @ arms / rough)

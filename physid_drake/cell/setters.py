@@ -41,7 +41,8 @@ class Body:
         inertia_ratio: inertia over that of uniform density [-].
         hand_friction: between hand and object [-].
         support_friction: (cells,) kinetic, between object and table [-].
-        static_ratio: static over kinetic support friction [-], >= 1; discrete solvers know only kinetic.
+        static_ratio: static over kinetic support friction [-], >= 1, against the hand; laws' forces, which act as
+            impulses, meet the kinetic one. Discrete solvers know only that.
         restitution: Poisson's, between hand and object [-].
     """
 

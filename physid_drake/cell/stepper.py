@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses as dc
 import math
 from collections.abc import Sequence
 from itertools import pairwise
@@ -41,6 +40,7 @@ FASTEST = 50.0  # m/s: beyond it a rollout has diverged
 # with 100 kg, ticks of 10 ms and a hand of 2 mm/s, forces turned by 5 deg. A hand far heavier than this one hides the
 # contact, as solvers' tolerances are relative to all momenta: 1e5 kg at 0.4 m/s hid three quarters of a push's force.
 SLOWED = 1e-6
+LIGHTEST_HAND = 100.0  # times the object's mass: where there is no friction, nothing slows a hand
 
 
 class Stepper:
@@ -61,7 +61,7 @@ class Stepper:
         self._drift = ContactDrift(self._tip)
         self._rolls, self._gravity = scene.solid.rolling_radius is not None, scene.gravity
         self._discrete = solver.scheme != "cenic"
-        self._slide_ticks = 1 if self._discrete else max(1, round(solver.slide_time_step_s / solver.time_step_s))
+        self._slide_ticks = 1 if self._discrete else max(1, int(solver.slide_time_step_s / solver.time_step_s + 1e-6))
 
     def run(
         self,
@@ -116,7 +116,8 @@ class Stepper:
     def _mass_of_hand(self, body: Body, speed: float) -> float:
         """What contact hardly slows, and what does not hide the contact [kg]."""
         friction = float(body.support_friction.min()) * body.mass * self._gravity
-        return min(HAND_MASS, friction * self._solver.time_step_s / (SLOWED * speed))
+        unslowed = friction * self._solver.time_step_s / (SLOWED * speed)
+        return min(HAND_MASS, max(unslowed, LIGHTEST_HAND * body.mass))
 
     def _soft_tick_of(self, body: Body, speed: float) -> float:
         """The longest tick of a sprung tip whose mount goes at most so fast [s]."""
@@ -130,8 +131,8 @@ class Stepper:
         if self._hand is None:
             state.begin(self._body, start, rest)
         elif self._mount is None:
-            pose = self._clear_of_hand(start.pose, self._hand[0])
-            state.begin(self._body, dc.replace(start, pose=pose), rest)
+            state.begin(self._body, start, rest)
+            self._clear_of_hand(self._hand[0])
             state.weigh_hand(self._hand_mass)
             state.set_hand(self._hand[0], self._height, (0.0, 0.0))
         else:
@@ -140,11 +141,14 @@ class Stepper:
             self._soft.begin(state.section(self._height)[0], self._hand[0], self._move(0, 1).velocity)
         self._restart(0.0)
 
-    def _clear_of_hand(self, pose: Planar, hand: list[float]) -> Planar:
-        """An object recorded a hair inside the hand starts touching it, or the contact would fling it."""
-        gap, nx, ny = self._tip.gap(*pose, *hand)
-        overlap = max(0.0, -gap)
-        return pose[0] + overlap * nx, pose[1] + overlap * ny, pose[2]
+    def _clear_of_hand(self, hand: list[float]) -> None:
+        """An object recorded a hair inside the hand starts touching it, or the contact would fling it.
+
+        Where it leans, it leans into a hand that it touches upright.
+        """
+        gap, nx, ny = self._tip.gap(*self._state.section(self._height)[0], *hand)
+        if gap < 0.0:
+            self._state.shift(-gap * nx, -gap * ny, 0.0)
 
     def _restart(self, time: float) -> None:
         """Let Drake begin anew from the state as it is."""

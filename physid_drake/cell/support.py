@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import sqrtm
 from scipy.special import roots_jacobi
 
 from physid_drake.cell.outline import Disc, Outline, Polygon
@@ -112,8 +113,8 @@ def support_of(
             places, weights = _ring_points(lambda _: radius, rings, points)
         case Polygon(vertices=vertices) if len(vertices) <= FEW_CORNERS:
             places, weights = _fan_points(outline, points)
-        case Polygon():
-            places, weights = _ring_points(outline.reach, rings, points)
+        case Polygon(vertices=vertices):
+            places, weights = _rings_in(np.array(vertices), rings, points)
         case _:
             raise TypeError(f"no quadrature for an outline of type {type(outline).__name__}")
     cells = grid.cell_of(places, outline)
@@ -189,6 +190,18 @@ def _ring_points(reach: Callable[[float], float], rings: int, points: int) -> tu
         places.append(far[:, None] * np.column_stack([np.cos(phi), np.sin(phi)]))
         weights.append(np.full(count, wr[k] / count))
     return np.concatenate(places), np.concatenate(weights)
+
+
+def _rings_in(vertices: Array, rings: int, points: int) -> tuple[Array, Array]:
+    """Rings about a polygon's centroid, stretched by what its corners take from its second moments."""
+    centre = polygon_centroid(vertices)
+    about = vertices - centre
+    places, weights = _ring_points(Polygon([(x, y) for x, y in about.tolist()]).reach, rings, points)
+    middle = weights @ places / weights.sum()
+    xx, xy, yy = second_moments(about)
+    rule = (weights * (places - middle).T) @ (places - middle) / weights.sum()
+    stretch = sqrtm(np.linalg.inv(rule)) @ sqrtm(np.array([[xx, xy], [xy, yy]]))
+    return centre + (places - middle) @ stretch, weights
 
 
 def _fan_points(polygon: Polygon, points: int) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ from reference.planar import HandPath as ReferencePath
 from scipy.integrate import quad
 
 from physid_drake.cell import HandPath
-from physid_drake.cell.hand_fit import fit_hand_path
+from physid_drake.cell.hand_fit import fit_hand_path, fit_hand_paths
 from physid_drake.cell.hand_path import straight_path, subdivided
 
 
@@ -114,3 +114,27 @@ def test_the_fit_of_a_sampled_stream_finds_the_path(noise):
     assert len(fit.times) <= 10
     assert error.max() < (1e-9 if noise == 0.0 else 3e-5)  # measured 3e-15 and 1.3e-5 m
     np.testing.assert_allclose(fit.velocities[[0, -1]], 0.0, atol=1e-3)
+
+
+def least_jerk_brake(seed, *, share, noise=5e-5):
+    """Samples (n,) [s] and (n, 2) [m] of a hand that speeds up and brakes as smoothly as an arm; and its way (n,).
+
+    The stream ends after a share of the brake.
+    """
+    times = np.arange(0.0, 1.0 + 0.2 * share, 0.01)
+    fine = np.arange(0.0, times[-1] + 1e-3, 1e-3)
+    rise, fall = (np.clip((fine - begin) / 0.2, 0.0, 1.0) for begin in (0.2, 1.0))
+    speed = 0.3 * (rise**3 * (10 - 15 * rise + 6 * rise**2) - fall**3 * (10 - 15 * fall + 6 * fall**2))
+    way = np.interp(times, fine, np.concatenate([[0.0], np.cumsum(0.5e-3 * (speed[1:] + speed[:-1]))]))
+    clean = np.column_stack([way, np.zeros_like(way)])
+    return times, clean + noise * np.random.default_rng(seed).standard_normal(clean.shape), clean
+
+
+@pytest.mark.parametrize("share", [0.5, 0.8])
+def test_a_stream_that_ends_in_a_smooth_brake_has_a_path(share):
+    """Of these six, five were nowhere: their last piece had no length."""
+    streams = [least_jerk_brake(seed, share=share) for seed in range(3)]
+    paths = fit_hand_paths([(times, samples) for times, samples, _ in streams], 5e-5)
+    for path, (times, _, clean) in zip(paths, streams, strict=True):
+        assert (np.diff(path.times) > 0.0).all()
+        np.testing.assert_allclose(path.positions(times), clean, atol=2.5e-4)

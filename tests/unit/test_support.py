@@ -17,8 +17,12 @@ ELLIPSE = Polygon([(0.06 * math.cos(2 * math.pi * k / 64), 0.04 * math.sin(2 * m
 HEXAGON = Polygon([(0.05 * math.cos(math.pi * k / 3), 0.05 * math.sin(math.pi * k / 3)) for k in range(6)])
 TRIANGLE = Polygon([(-0.05, -0.03), (0.07, -0.03), (-0.02, 0.06)])
 RECTANGLE = rectangle(0.127, 0.051)
+OCTAGON = Polygon(
+    [(0.05 * math.cos(math.pi * k / 4) + 0.02, 0.03 * math.sin(math.pi * k / 4) - 0.005) for k in range(8)]
+)  # whose centre is beside Bo, as of an object that leans out
 DISC = Disc(radius=0.033)
-OUTLINES = {"rectangle": RECTANGLE, "triangle": TRIANGLE, "hexagon": HEXAGON, "ellipse": ELLIPSE, "disc": DISC}
+OUTLINES = {"rectangle": RECTANGLE, "triangle": TRIANGLE, "hexagon": HEXAGON, "ellipse": ELLIPSE,
+            "octagon": OCTAGON, "disc": DISC}  # fmt: skip
 POINTS = CellConfig().contact.support_points
 GRIDS = [(1, 1), (1, 2), (2, 1), (2, 2), (4, 4)]
 
@@ -72,8 +76,8 @@ def test_first_and_second_moments_are_exact(name, grid, request):
     support = quadrature(name, grid)
     centre, second = exact_moments(OUTLINES[name])
     size = math.sqrt(second.trace())
-    # A 64-gon's equal angles: measured 1.3e-3; a disc cut by cells is a 64-gon: 2e-5; cells' points lie inside.
-    slack = {"ellipse": 2e-3, "disc": 5e-5}.get(name, 1e-8)
+    # A disc cut by cells is a 64-gon: measured 2e-5; cells' points lie inside.
+    slack = {"disc": 5e-5}.get(name, 1e-8)
     got = np.einsum("i,ij,ik->jk", support.weights, support.points, support.points)
     np.testing.assert_allclose(support.weights @ support.points, centre, atol=slack * size + 1e-16)
     np.testing.assert_allclose(got, second, atol=slack * size**2)
@@ -81,7 +85,7 @@ def test_first_and_second_moments_are_exact(name, grid, request):
 
 @every_outline
 def test_torsion_is_within_two_per_cent(name, request):
-    # Measured: rectangle -0.9, hexagon +1.2, ellipse +0.5, disc +1.1 %.
+    # Measured: rectangle -0.9, hexagon +1.2, ellipse +0.5, octagon +0.1, disc +1.1 %.
     # The mean radius sets the torsional friction: what a spinning object is slowed by.
     support = quadrature(name)
     fine = fine_points(OUTLINES[name])
