@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import pairwise
 from typing import ClassVar, Final, NamedTuple
@@ -19,7 +20,7 @@ MOST_KNOTS, KNOTS_PER_SECOND = 24, 12.0  # whichever is more: an approach, a pus
 SHORTEST_PIECE = 2e-3  # s between knots
 PIECES = 24  # of a smooth ramp: speeds to 0.2 % of its height
 WIDER = 0.2  # at either end: where the fit of a smooth ramp starts
-HAIR = 1e-4  # s: for differences
+ASIDE, AWHILE = 2, 0.02  # samples, s: to either side, over which a stream tells its speed
 ROUND_OFF = 1e-9  # s: a piece no longer than this has parts of no length
 
 STRAIGHT: Final = Polynomial([0, 1])
@@ -84,10 +85,15 @@ class StraightFit:
         return np.asarray(left[:, 0] + 1j * left[:, 1])
 
     def velocities(self) -> NDArray[np.complex128]:
-        """Of the fit at the samples (n,), x + iy [m/s]."""
-        path = self.path(0.0)
-        moved = path.positions(self.times + HAIR) - path.positions(self.times - HAIR)
-        return np.asarray((moved[:, 0] + 1j * moved[:, 1]) / (2.0 * HAIR))
+        """About those of the hand at the samples (n,), x + iy [m/s].
+
+        Of the stream and not of the fit, which takes stamps that are late or early for a hand that flies.
+        """
+        samples = np.arange(len(self.times))
+        aside = max(ASIDE, math.ceil(AWHILE / float(np.median(np.diff(self.times)))))
+        first, last = np.maximum(samples - aside, 0), np.minimum(samples + aside, len(samples) - 1)
+        moved = self._p[last] - self._p[first]
+        return np.asarray((moved[:, 0] + 1j * moved[:, 1]) / (self.times[last] - self.times[first]))
 
     def with_jitter(self, jitter: float) -> StraightFit:
         """The stream fitted again, its time stamps being late or early by a standard deviation [s]."""

@@ -26,8 +26,10 @@ SMALLEST_STD = 2e-5  # m: a stream recorded without noise is still sampled and r
 SURE = 10.0  # of the criterion, in all streams: smooth ramps must be that much better
 MOST = 20.0  # what one stream may say for or against them; one of a smooth robot that says more keeps straight ones
 VOTERS = 12  # about so many streams of a robot are asked
-FAST = 0.3  # of the largest speed: samples that show whether time stamps are late or early
+FAST = 0.3  # of a stream's largest speed: samples that show whether time stamps are late or early
 FEWEST_FAST = 40  # of them
+ROUNDS = 3  # of fits, until they show no jitter that is so much
+LARGER = 1.1  # times as large as the one that they were made with
 NOTABLE = 1.3  # times as far off along the way as across it
 MEDIAN_OF_NORMAL = 0.6745  # of the absolute value, over the standard deviation
 DIFFERENCES = (3, 5)  # orders that show a stream's noise
@@ -77,9 +79,7 @@ def _path_of(fit: StraightFit | None, stream: tuple[Array, Array]) -> HandPath:
 def _fits_of(streams: Sequence[tuple[Array, Array]], std: float | None, memory: float) -> dict[int, StraightFit]:
     """Of the streams that are long enough, by their number."""
     best = {k: _fit_of(*stream, std, memory) for k, stream in enumerate(streams) if len(stream[0]) >= 6}
-    jitter = _jitter_of(list(best.values()))
-    if jitter > 0.0:
-        best = {k: fit.with_jitter(jitter) for k, fit in best.items()}
+    best = _with_jitter(best)
     ramped = [fit for fit in best.values() if len(fit.knots) > 1]  # others have no ramps to judge
     asked = ramped[:: max(1, len(ramped) // VOTERS)]
     votes = [sum(_vote(fit, SmoothFit(fit, ramp)) for fit in asked) for ramp in SMOOTH_RAMPS]
@@ -89,15 +89,24 @@ def _fits_of(streams: Sequence[tuple[Array, Array]], std: float | None, memory: 
     return best
 
 
+def _with_jitter(exact: dict[int, StraightFit]) -> dict[int, StraightFit]:
+    """Fits to streams whose stamps are late or early, as far as they show it; the same ones where they do not."""
+    best, believed = exact, 0.0
+    # Fits that take stamps for exact follow a part of the jitter, and show the less of it.
+    for _ in range(ROUNDS):
+        jitter = _jitter_of(list(best.values()))
+        if jitter <= LARGER * believed:
+            break
+        best, believed = {k: fit.with_jitter(jitter) for k, fit in exact.items()}, jitter
+    return best
+
+
 def _jitter_of(fits: Sequence[StraightFit]) -> float:
     """Standard deviation of the time stamps [s]: what fast samples are off by along their way more than across it."""
-    if not fits:
-        return 0.0
-    fastest = max(float(np.abs(fit.velocities()).max()) for fit in fits)
-    along, across = [], []
+    along, across = [np.empty(0)], [np.empty(0)]
     for fit in fits:
         velocities = fit.velocities()
-        fast = np.abs(velocities) > FAST * fastest
+        fast = np.abs(velocities) > FAST * np.abs(velocities).max()
         turned = fit.residuals()[fast] * np.conj(velocities[fast])  # a velocity as x + iy: parts along it and across
         along.append(turned.real / np.abs(velocities[fast]) ** 2)
         across.append(turned.imag / np.abs(velocities[fast]) ** 2)

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+RUN_UP = 0.05  # s: of a hand that is seen late
+
+
 @dataclass(frozen=True, kw_only=True)
 class HandPath:
     """A planar path ``p_WP(t)`` whose velocity is linear between knots; at rest before and after them.
@@ -88,6 +91,20 @@ class HandPath:
         times[last + 1 :] = np.maximum(times[last + 1 :], times[last] + 1e-4 * np.arange(1, len(times) - last))
         moved = replace(self, times=subdivided(times, self.pieces))
         return replace(moved, start=moved.start + self.knot_positions()[-1] - moved.knot_positions()[-1])
+
+    def with_run_up(self, begin: float) -> HandPath:
+        """The same, come as fast as it is at its first knot, from ``begin`` on [s] or for a while.
+
+        Of a stream that begins in motion: a hand that stood where it is seen first would stand in the object.
+        """
+        lead, velocity = min(float(self.times[0]) - begin, RUN_UP), self.velocities[0]
+        if lead <= 0.0 or not velocity.any():
+            return self
+        earlier = self.times[0] - lead * (1.0 - np.arange(self.pieces) / self.pieces)
+        return replace(
+            self, times=np.concatenate([earlier, self.times]), start=self.start - lead * velocity,
+            velocities=np.vstack([np.tile(velocity, (self.pieces, 1)), self.velocities]),
+        )  # fmt: skip
 
     def last_brake(self, begin: float = -math.inf, end: float = math.inf) -> tuple[int, int] | None:
         """Indices of the knots between which the speed falls for the last time, or None.

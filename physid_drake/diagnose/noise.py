@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.identify.problem import FINEST_POSITION, FINEST_ROTATION, Noise, noise_of
+from physid_drake.identify.problem import Noise, finest_position, finest_rotation, noise_of
 from physid_drake.recording import Push, Recording, rest_segments
 from physid_drake.recording.rest_noise import SeenNoise, seen_noise
 
@@ -105,8 +105,8 @@ def tracker_noise(recording: Recording) -> tuple[TrackerNoise, Noise]:
     pieces = _usual(
         [(push.object.times[r], push.object.planar[r]) for push in recording.pushes for r in rest_segments(push)]
     )
-    seen_xy = seen_noise([(t, p[:, k]) for t, p in pieces for k in (0, 1)], FINEST_POSITION)
-    seen_yaw = seen_noise([(t, p[:, 2]) for t, p in pieces], FINEST_ROTATION)
+    seen_xy = seen_noise([(t, p[:, k]) for t, p in pieces for k in (0, 1)], finest_position(recording))
+    seen_yaw = seen_noise([(t, p[:, 2]) for t, p in pieces], finest_rotation(recording))
     warnings: list[str] = []
     position = _chosen("position", plain.position, plain.source["position"], seen_xy, warnings)
     rotation = _chosen("rotation", plain.rotation, plain.source["rotation"], seen_yaw, warnings)

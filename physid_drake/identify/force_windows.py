@@ -70,7 +70,7 @@ def too_seldom(push: Push) -> bool:
 
 def _windows(times: Array) -> list[NDArray[np.intp]]:
     """Indices of the samples of each window; of one sample none is made."""
-    index = np.floor((times - times[0]) / WINDOW).astype(np.intp)
+    index = np.floor((times - times[0]) / WINDOW + 1e-6).astype(np.intp)
     return [np.flatnonzero(index == k) for k in np.unique(index) if np.count_nonzero(index == k) >= 2]
 
 

@@ -28,6 +28,7 @@ from physid_drake.recording import (
 )
 from physid_drake.recording.rest_noise import SILENT, seen_noise
 from physid_drake.recording.rests import rests_of
+from physid_drake.recording.rounding import rounding_std
 
 Array = NDArray[np.float64]
 
@@ -89,6 +90,16 @@ class Noise:
         return np.asarray(self.sigmas / np.sqrt(independent))
 
 
+def finest_position(recording: Recording) -> float:
+    """The least noise of the object's x and y [m]: what their rounding is like."""
+    return max(FINEST_POSITION, rounding_std([push.object.planar[:, :2] for push in recording.pushes]))
+
+
+def finest_rotation(recording: Recording) -> float:
+    """The least noise of the object's yaw [rad], likewise."""
+    return max(FINEST_ROTATION, rounding_std([push.object.planar[:, 2:] for push in recording.pushes]))
+
+
 def noise_of(recording: Recording) -> Noise:
     """The recording's noise: what its sensors state, else what is seen at rest, else an assumption."""
     seen: NoiseEstimate = estimate_noise(recording)
@@ -113,8 +124,8 @@ def noise_of(recording: Recording) -> Noise:
     place = stated.object_position_std, seen.object_position_std
     turn = stated.object_rotation_std, seen.object_rotation_std
     return Noise(
-        position=choose("position", *place, DEFAULT_POSITION_STD, FINEST_POSITION),
-        rotation=choose("rotation", *turn, DEFAULT_ROTATION_STD, FINEST_ROTATION),
+        position=choose("position", *place, DEFAULT_POSITION_STD, finest_position(recording)),
+        rotation=choose("rotation", *turn, DEFAULT_ROTATION_STD, finest_rotation(recording)),
         hand=choose("hand", stated.hand_position_std, hand_std, DEFAULT_HAND_STD, FINEST_HAND),
         force=choose("force", stated.force_std, seen.force_std, DEFAULT_FORCE_STD, FINEST_FORCE),
         position_correlation=_correlation(seen.position_autocorrelation, seen.rotation_autocorrelation),
@@ -139,6 +150,7 @@ def _hand_noise(recording: Recording) -> tuple[float | None, float]:
     if not hands:
         return None, 0.0
     white = float(np.median([stream_std(hand.times, hand.positions[:, :2]) for hand in hands]))
+    white = max(white, rounding_std([hand.positions[:, :2] for hand in hands]))
     rests = [(hand.times[r], hand.positions[r, k]) for hand in hands for r in rests_of(hand) for k in (0, 1)]
     seen = seen_noise(rests, FINEST_HAND)
     interval = float(np.median(np.concatenate([np.diff(hand.times) for hand in hands])))
@@ -251,8 +263,10 @@ def _problem(
     noise: Noise,
     height: float,
 ) -> PushProblem:
-    path, path_errors = fitted
     push = recording.pushes[order]
+    begin = float(push.object.times[0])
+    path = None if fitted[0] is None else fitted[0].with_run_up(begin)
+    path_errors = tuple(replace(error, path=error.path.with_run_up(begin)) for error in fitted[1])
     for check in push_checks_of(recording, push):
         check()
     planar = push.object.planar
@@ -261,7 +275,7 @@ def _problem(
     problem = PushProblem(
         name=push.name,
         order=order,
-        begin=float(push.object.times[0]),
+        begin=begin,
         end=push.end_time,
         start=start,
         start_std=start_std,

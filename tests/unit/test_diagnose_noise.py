@@ -1,6 +1,7 @@
 """Noise of the tracker as seen at rest, and the windows that pushes are compared in."""
 
 import dataclasses as dc
+import math
 
 import numpy as np
 import pytest
@@ -179,6 +180,26 @@ def test_a_simulation_without_noise_has_the_finest_or_an_unknown_one(recording, 
     noise, _ = tracker_noise(dc.replace(recording, pushes=tuple(pushes), sensors=sensors))
     assert noise.known is (std == 0.0) and noise.warnings == ()
     assert noise.position == pytest.approx(1e-5 if std == 0.0 else 5e-4)
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_what_is_rounded_is_as_noisy_as_its_steps_are_wide(recording, stated):
+    """Within a rest all are off by the same: it hardly shows there."""
+
+    def coarse(push):
+        quaternions = push.object.planar[:, 2].round(2)
+        turned = np.column_stack([np.cos(quaternions / 2), 0 * quaternions, 0 * quaternions, np.sin(quaternions / 2)])
+        return dc.replace(
+            push, object=dc.replace(push.object, positions=push.object.positions.round(3), quaternions=turned)
+        )
+
+    pushes = tuple(coarse(push) for push in recording.pushes)
+    sensors = dc.replace(
+        recording.sensors, object_position_std=1e-4 if stated else None, object_rotation_std=1e-3 if stated else None
+    )
+    noise, _ = tracker_noise(dc.replace(recording, pushes=pushes, sensors=sensors))
+    assert 1e-3 / math.sqrt(12.0) < 1.001 * noise.position < 6e-4
+    assert 1e-2 / math.sqrt(12.0) < 1.001 * noise.rotation < 6e-3
 
 
 def _still(push):

@@ -96,6 +96,23 @@ def test_no_change_of_speed_or_brake_changes_no_bit():
     np.testing.assert_allclose(trapezoid().braking(0.0).positions(times), trapezoid().positions(times), atol=1e-16)
 
 
+@pytest.mark.parametrize("pieces", [1, 4])
+def test_a_hand_that_is_seen_late_came_as_fast(pieces):
+    knots, ramp = np.array([1.0, 1.5, 1.6]), np.linspace(0.2, 0.0, pieces + 1)
+    speeds = np.concatenate([np.full(pieces, 0.2), ramp])
+    path = HandPath(
+        times=subdivided(knots, pieces), velocities=np.outer(speeds, [1.0, 0.0]), start=np.zeros(2), pieces=pieces
+    )
+    longer = path.with_run_up(0.0)
+    times = np.linspace(0.9, 1.6, 71)
+    np.testing.assert_allclose(longer.positions(times[10:]), path.positions(times[10:]), atol=1e-15)
+    assert longer.positions(np.array([0.0, 0.97]))[:, 0] == pytest.approx([-0.01, -0.006])
+    assert longer.last_brake() == tuple(knot + pieces for knot in path.last_brake())
+    assert path.with_run_up(1.0) is path and path.with_run_up(0.98).times[0] == pytest.approx(0.98)
+    still = HandPath(times=np.array([0.5, 1.0]), velocities=np.zeros((2, 2)), start=np.zeros(2))
+    assert still.with_run_up(0.0) is still
+
+
 def test_the_last_brake_is_found():
     assert trapezoid().last_brake() == (2, 3)
     still = HandPath(times=np.array([0.0, 1.0]), velocities=np.zeros((2, 2)), start=np.zeros(2))

@@ -146,3 +146,8 @@ def test_windows_with_a_strike_are_left_out(recording, rate):
     assert len(lost) == 1
     np.testing.assert_allclose(once.forces, 2.0 * np.eye(2)[[0] * len(once.forces)])
     assert len(long.force_times) == len(plain.force_times)  # a hard push that lasts is a force
+
+
+def test_one_sample_in_a_tenth_of_a_second_is_no_mean_however_its_stamp_is_rounded():
+    times = np.array([round(0.1 * k, 9) for k in range(40)])
+    assert force_windows._windows(times) == []

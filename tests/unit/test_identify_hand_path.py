@@ -281,6 +281,22 @@ def test_the_jitter_of_stamps_is_seen(jitter):
     assert seen == pytest.approx(jitter / np.sqrt(3.0), rel=0.3, abs=2e-5)
 
 
+@pytest.mark.parametrize("jitter", [1.5e-3, 2e-3])
+def test_the_jitter_of_six_pushes_at_several_speeds_makes_no_hand_fly(jitter):
+    """The fastest fit took it for speeds of 3 to 12 m/s, beside which no other sample was fast enough to tell."""
+    paths = [trapezoid(speed=v, cruise=0.08 / v) for v in (0.06, 0.1, 0.18, 0.3, 0.45, 0.57)]
+    streams = []
+    for seed, path in enumerate(paths):
+        times, _ = sampled(path, float(path.times[-1]) + 0.3)
+        late = times + jitter * np.random.default_rng([5, seed]).standard_normal(len(times))
+        noise = STD * np.random.default_rng([6, seed]).standard_normal((len(times), 2))
+        streams.append((times, path.positions(late) + noise))
+    for path, fit in zip(paths, fit_hand_paths(streams, STD), strict=True):
+        dense = np.arange(0.0, float(path.times[-1]) + 0.25, 1e-3)
+        off = np.linalg.norm(fit.positions(dense) - path.positions(dense), axis=1)
+        assert off.max() < jitter * path.top_speed() + 2.0 * STD
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("touches", [2, 3])
 def test_a_hand_that_comes_and_goes_several_times_is_followed(touches):
