@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 
@@ -24,6 +25,7 @@ AT_ONCE, SOON = 0.05, 0.1  # s
 LONGEST_LOOK = 0.2  # s, of a slow tracker
 SURE = 6.0  # standard deviations
 FEWEST = 4  # samples
+MAY_PUSH = 0.01  # m: from the object's corner, turned to the hand
 STILL_FAST = 0.5  # of a hand's speed: faster, it has not come to a stop
 LIGHTEST, HEAVIEST = 1.0, 23000.0  # kg/m^3, of the box around an object: lighter than air, denser than osmium
 SLOWEST = 1.0  # s between samples: slower, it is no stream of a push
@@ -227,7 +229,7 @@ def unseen_motion(recording: Recording, sigma: float) -> tuple[str, ...]:
     """
     found = {
         "the object already moves in the first poses, as if it had been pushed before": _already_moving,
-        "the hand's stream ends while it moves": _hand_lost,
+        "the hand's stream ends while it moves (poses after that are left out where it may push)": _hand_lost,
         "nothing moves at first, and no hand is recorded that moves it later": _moved_by_nothing,
     }
     return tuple(
@@ -264,3 +266,14 @@ def _hand_lost(push: Push, sigma: float) -> bool:
         return False
     steps = np.linalg.norm(np.diff(push.hand.positions[:, :2], axis=0), axis=1) / np.diff(push.hand.times)
     return float(np.median(steps[-3:])) > STILL_FAST * float(np.quantile(steps, 0.9))
+
+
+def hand_seen_until(recording: Recording, push: Push) -> float:
+    """When a hand that moves beside the object is seen last [s]: from then on, nobody knows what pushes.
+
+    Infinite where it is seen until it stands, or is away from the object by then.
+    """
+    if push.hand is None or recording.hand is None or not _hand_lost(push, 0.0):
+        return math.inf
+    away = float(from_object(push, push.hand)[-1]) - reach_of(recording) - recording.hand.radius
+    return float(push.hand.times[-1]) if away < MAY_PUSH else math.inf

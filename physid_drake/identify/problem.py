@@ -13,7 +13,7 @@ from physid_drake.cell import CellConfig, HandPath, Start
 from physid_drake.cell.hand_fit import fit_uncertain_paths, stream_std
 from physid_drake.cell.hand_path import PathError
 from physid_drake.identify.force_windows import force_windows
-from physid_drake.identify.frames import FEWEST_FREE, checks_of, push_checks_of
+from physid_drake.identify.frames import FEWEST_FREE, checks_of, hand_seen_until, push_checks_of
 from physid_drake.identify.hand_stream import beside_object, vertical_reach, while_pushing
 from physid_drake.recording import Cylinder as CylinderShape
 from physid_drake.recording import (
@@ -38,6 +38,7 @@ DEFAULT_HAND_STD = 1e-4  # m
 DEFAULT_FORCE_STD = 0.05  # N
 LARGEST_CORRELATION = 0.98
 STANDING = 0.3  # area that the x and y axes of the tip span in the plane: less, and the tip lies
+FEWEST_SEEN = 4  # poses that must be left to compare
 NOTABLE_ERROR = 0.05  # of the tracker's deviation: what less of the hand does to the object is not seen
 SLOW_NOISE = 1.5  # samples: a hand's noise that remembers less is white, as one of robots' joints nearly is
 CLEAR = 0.3  # of the logarithm of its variance: noise that is known so well may be slow
@@ -272,22 +273,26 @@ def _problem(
     planar = push.object.planar
     start, start_std, first = _start_of(push, planar, noise, free=path is None)
     forces = force_windows(push, path, noise.force, float(start_std[0]))
+    until = hand_seen_until(recording, push)
+    if np.count_nonzero(push.object.times[first:] <= until) < FEWEST_SEEN:
+        until = math.inf
+    seen, felt = slice(first, int(np.searchsorted(push.object.times, until, side="right"))), forces.middles <= until
     problem = PushProblem(
         name=push.name,
         order=order,
         begin=begin,
-        end=push.end_time,
+        end=min(push.end_time, until),
         start=start,
         start_std=start_std,
         path=path,
         path_errors=path_errors,
         hand_height=_contact_height(recording, hand, height),
         hand_axes=np.eye(2) if hand is None else _plane_axes(hand.quaternions),
-        times=push.object.times[first:].copy(),
-        poses=planar[first:].copy(),
-        force_times=forces.middles,
-        forces=forces.means,
-        force_std=forces.stds,
+        times=push.object.times[seen].copy(),
+        poses=planar[seen].copy(),
+        force_times=forces.middles[felt],
+        forces=forces.means[felt],
+        force_std=forces.stds[felt],
         tip_height=None if hand is None else float(np.median(hand.positions[:, 2])),
     )
     return replace(problem, moving=(_first_motion(problem, noise.position), motion_span(push)[1]))

@@ -1,12 +1,15 @@
 """What a recording does not show: motion before its first pose, and a hand that is lost on its way."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from problems import QUIET
 from runs import shipped_pushes
 
-from physid_drake.identify.frames import unseen_motion
+from physid_drake.identify.frames import hand_seen_until, unseen_motion
+from physid_drake.identify.problem import problems_of
 from physid_drake.recording import PoseStream
 
 SIGMA = 3e-4
@@ -64,6 +67,24 @@ def test_a_hand_that_is_lost_on_its_way_is_said(recording):
 
     (said,) = unseen_motion(with_first(recording, lost), SIGMA)
     assert said.startswith("the hand's stream ends while it moves")
+
+
+def test_poses_after_a_hand_was_lost_beside_the_object_are_not_compared(recording):
+    """Where it goes on pushing, a simulation whose hand stops there would be wrong by centimetres."""
+    push = recording.pushes[0]
+    times = push.object.times
+    moved = np.linalg.norm(push.object.planar[:, :2] - push.object.planar[0, :2], axis=1)
+    when = float(times[np.argmax(moved > 0.3 * moved.max())])
+    lost = replace(push, hand=cut(push.hand, push.hand.times <= when))
+    assert hand_seen_until(recording, push) == math.inf
+    seen = hand_seen_until(recording, lost)
+    assert when - 0.02 < seen <= when
+    (problem, *others) = problems_of(with_first(recording, lambda _: lost), QUIET, 0.03)
+    assert problem.end == seen and problem.times[-1] <= seen and len(problem.times) == len(problem.poses) > 10
+    assert all(other.end == p.end_time for other, p in zip(others, recording.pushes[1:], strict=True))
+
+    far = replace(lost.hand, positions=lost.hand.positions + np.array([0.5, 0.0, 0.0]))
+    assert hand_seen_until(recording, replace(lost, hand=far)) == math.inf
 
 
 def test_without_a_hand_nothing_sets_a_resting_object_moving(recording):
