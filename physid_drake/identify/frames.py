@@ -13,6 +13,7 @@ from physid_drake.cell.solid import solid_of
 from physid_drake.cell.touch import Tip
 from physid_drake.errors import RecordingError
 from physid_drake.recording import Box, Cylinder, PoseStream, Push, Recording
+from physid_drake.recording.screening import find_gaps
 
 Array = NDArray[np.float64]
 Check = Callable[[], None]  # raises RecordingError
@@ -26,6 +27,8 @@ LONGEST_LOOK = 0.2  # s, of a slow tracker
 SURE = 6.0  # standard deviations
 FEWEST = 4  # samples
 MAY_PUSH = 0.01  # m: from the object's corner, turned to the hand
+BESIDE_GAP = 5  # samples that tell a speed
+UNSEEN_WAY = 0.005  # m: what a hand loses of its speed in a gap, times the gap
 STILL_FAST = 0.5  # of a hand's speed: faster, it has not come to a stop
 LIGHTEST, HEAVIEST = 1.0, 23000.0  # kg/m^3, of the box around an object: lighter than air, denser than osmium
 SLOWEST = 1.0  # s between samples: slower, it is no stream of a push
@@ -229,7 +232,8 @@ def unseen_motion(recording: Recording, sigma: float) -> tuple[str, ...]:
     """
     found = {
         "the object already moves in the first poses, as if it had been pushed before": _already_moving,
-        "the hand's stream ends while it moves (poses after that are left out where it may push)": _hand_lost,
+        "the hand's stream ends while it moves, or has a gap in which it brakes"
+        " (poses after that are left out where it may push)": _hand_lost,
         "nothing moves at first, and no hand is recorded that moves it later": _moved_by_nothing,
     }
     return tuple(
@@ -262,18 +266,41 @@ def _way(push: Push, within: float) -> float | None:
 
 def _hand_lost(push: Push, sigma: float) -> bool:
     del sigma
-    if push.hand is None or len(push.hand) < 2 * FEWEST or push.object.times[-1] < push.hand.times[-1] + SOON:
-        return False
-    steps = np.linalg.norm(np.diff(push.hand.positions[:, :2], axis=0), axis=1) / np.diff(push.hand.times)
-    return float(np.median(steps[-3:])) > STILL_FAST * float(np.quantile(steps, 0.9))
+    return push.hand is not None and bool(_lost_at(push, push.hand))
+
+
+def _lost_at(push: Push, hand: PoseStream) -> list[int]:
+    """The last samples of the hand before its way is unknown: where it brakes in a gap, or ends in motion."""
+    ended = len(hand) >= 2 * FEWEST and push.object.times[-1] >= hand.times[-1] + SOON
+    steps = np.linalg.norm(np.diff(hand.positions[:, :2], axis=0), axis=1) / np.diff(hand.times)
+    moves = ended and float(np.median(steps[-3:])) > STILL_FAST * float(np.quantile(steps, 0.9))
+    return _brakes_unseen(hand) + ([len(hand) - 1] if moves else [])
 
 
 def hand_seen_until(recording: Recording, push: Push) -> float:
     """When a hand that moves beside the object is seen last [s]: from then on, nobody knows what pushes.
 
-    Infinite where it is seen until it stands, or is away from the object by then.
+    It is lost where its stream ends in motion, or has a gap in which it brakes by much. Infinite where
+    it is seen all the while, or is away from the object when it is lost.
     """
-    if push.hand is None or recording.hand is None or not _hand_lost(push, 0.0):
+    if push.hand is None or recording.hand is None:
         return math.inf
-    away = float(from_object(push, push.hand)[-1]) - reach_of(recording) - recording.hand.radius
-    return float(push.hand.times[-1]) if away < MAY_PUSH else math.inf
+    lost = _lost_at(push, push.hand)
+    away = from_object(push, push.hand) - reach_of(recording) - recording.hand.radius
+    return next((float(push.hand.times[k]) for k in lost if away[k] < MAY_PUSH), math.inf)
+
+
+def _brakes_unseen(hand: PoseStream) -> list[int]:
+    """The last samples before gaps in which the hand brakes: when it does is when it lets go of the object."""
+    times, places = hand.times, hand.positions[:, :2]
+
+    def speed(samples: slice) -> float:
+        return float(np.hypot(*np.polyfit(times[samples] - times[samples][0], places[samples], 1)[0]))
+
+    found = []
+    for k in find_gaps(times).tolist():
+        before, after = slice(k + 1 - BESIDE_GAP, k + 1), slice(k + 1, k + 1 + BESIDE_GAP)
+        told = before.start >= 0 and after.stop <= len(times)
+        if told and (speed(before) - speed(after)) * (times[k + 1] - times[k]) > UNSEEN_WAY:
+            found.append(k)
+    return found

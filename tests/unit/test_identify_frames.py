@@ -87,6 +87,18 @@ def test_poses_after_a_hand_was_lost_beside_the_object_are_not_compared(recordin
     assert hand_seen_until(recording, replace(lost, hand=far)) == math.inf
 
 
+def test_a_gap_in_which_the_hand_brakes_ends_what_is_compared(recording):
+    push = recording.pushes[0]
+    times, hand = push.hand.times, push.hand
+    speeds = np.linalg.norm(np.gradient(hand.positions[:, :2], times, axis=0), axis=1)
+    fast = np.flatnonzero(speeds > 0.7 * speeds.max())
+    stop, middle = float(times[fast[-1]]), float(times[fast[len(fast) // 2]])
+    for centre, lost in ((stop, True), (middle, False)):  # at the brake, and where it goes straight on
+        gappy = replace(push, hand=cut(hand, np.abs(times - centre) > (0.075 if lost else 0.03)))
+        assert (hand_seen_until(recording, gappy) < centre) is lost
+        assert bool(unseen_motion(with_first(recording, lambda _, gappy=gappy: gappy), SIGMA)) is lost
+
+
 def test_without_a_hand_nothing_sets_a_resting_object_moving(recording):
     bare = replace(recording, hand=None, pushes=tuple(replace(push, hand=None) for push in recording.pushes))
     (said,) = unseen_motion(bare, SIGMA)
