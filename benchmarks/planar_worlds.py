@@ -25,7 +25,7 @@ from twin import shape_of
 from physid_drake.diagnose import case_of, cell_config, diagnose
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.recording import Hand as Tip
-from physid_drake.recording import ObjectModel, PoseStream, Push, Recording, Sensors
+from physid_drake.recording import ObjectModel, Push, Recording, Sensors, planar_poses
 from physid_drake.recording import Table as TableTop
 
 PUSHES = 12
@@ -153,8 +153,8 @@ def recorded(name, world, scatter):
         seen = seen + [POSITION, POSITION, ROTATION] * rng.standard_normal(seen.shape)
         pushes.append(
             Push(
-                name=f"pushes/{k:03d}.csv", object=stream(times, seen, body.height / 2),
-                hand=stream(times, np.column_stack([tip, np.zeros(len(tip))]), push.tip_height), force=None,
+                name=f"pushes/{k:03d}.csv", object=planar_poses(times, seen, body.height / 2),
+                hand=planar_poses(times, np.column_stack([tip, np.zeros(len(tip))]), push.tip_height), force=None,
             )
         )  # fmt: skip
     said = body if world.said == 1.0 else dc.replace(body, polygon=world.said * body.polygon)
@@ -182,15 +182,6 @@ def simulated(world, body, theta, k, push, scatter, rng):
     )  # fmt: skip
     keep = times <= max(min(motion.rest_time, 3.0), push.path.times[-1]) + 0.2
     return times[keep], motion.poses[keep]
-
-
-def stream(times, poses, z):
-    """Planar poses (n, 3) as a recorded stream."""
-    half, zeros = 0.5 * poses[:, 2], np.zeros(len(times))
-    return PoseStream(
-        times=times, positions=np.column_stack([poses[:, :2], np.full(len(times), z)]),
-        quaternions=np.column_stack([np.cos(half), zeros, zeros, np.sin(half)]),
-    )  # fmt: skip
 
 
 def answer(recording, jobs):

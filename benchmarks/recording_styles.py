@@ -29,7 +29,15 @@ from physid_drake.diagnose import case_of, cell_config
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.recording import Hand as Tip
-from physid_drake.recording import ObjectModel, PoseStream, Push, Recording, Sensors, read_recording, write_recording
+from physid_drake.recording import (
+    ObjectModel,
+    Push,
+    Recording,
+    Sensors,
+    planar_poses,
+    read_recording,
+    write_recording,
+)
 from physid_drake.recording import Table as TableTop
 
 SPEEDS = (0.06, 0.1, 0.18, 0.3, 0.45, 0.57)  # m/s
@@ -123,15 +131,15 @@ def push_in(style, rng, k, push, times, poses):
     seen[:, 2] = rounded(seen[:, 2], style.turn) if style.turn else seen[:, 2]
     hand_stamps, taken = sampled(style, rng, times)
     places = rounded(push.path.position(taken) + style.hand * rng.standard_normal((len(taken), 2)), style.hand_place)
-    places = np.column_stack([places, np.full(len(places), push.tip_height)])
+    places = np.column_stack([places, np.zeros(len(places))])
     if style.unseen is not None:
         moved = np.linalg.norm(poses - poses[0], axis=1) > 1e-5
         low, high = style.unseen(float(times[moved.argmax()]), float(push.path.times[-1]))
         kept = (hand_stamps < low) | (hand_stamps > high)
         hand_stamps, places = hand_stamps[kept], places[kept]
     return Push(
-        name=f"pushes/{k:03d}.csv", object=stream(stamps, seen, BODY.height / 2), force=None,
-        hand=PoseStream(times=hand_stamps, positions=places, quaternions=np.tile([1.0, 0, 0, 0], (len(places), 1))),
+        name=f"pushes/{k:03d}.csv", object=planar_poses(stamps, seen, BODY.height / 2), force=None,
+        hand=planar_poses(hand_stamps, places, push.tip_height),
     )  # fmt: skip
 
 
@@ -146,15 +154,6 @@ def sampled(style, rng, times):
 def rounded(values, step):
     """Values to the nearest multiples of a step; 0 leaves them."""
     return np.round(values / step) * step if step else values
-
-
-def stream(times, poses, z):
-    """Planar poses (n, 3) as a recorded stream."""
-    half, zeros = 0.5 * poses[:, 2], np.zeros(len(times))
-    return PoseStream(
-        times=times, positions=np.column_stack([poses[:, :2], np.full(len(times), z)]),
-        quaternions=np.column_stack([np.cos(half), zeros, zeros, np.sin(half)]),
-    )  # fmt: skip
 
 
 def row(name, style, jobs):
