@@ -149,7 +149,7 @@ def least_jerk_brake(seed, *, share, noise=5e-5):
 
 @pytest.mark.parametrize("share", [0.5, 0.8])
 def test_a_stream_that_ends_in_a_smooth_brake_has_a_path(share):
-    """The last piece of some had no length, and they were nowhere. Measured with such streams: off by 0.1 to 0.22 mm."""
+    """The last piece of some had no length, and they were nowhere. Measured: off by 0.1 to 0.22 mm."""
     streams = [least_jerk_brake(seed, share=share) for seed in range(3)]
     paths = fit_hand_paths([(times, samples) for times, samples, _ in streams], 5e-5)
     for path, (times, _, clean) in zip(paths, streams, strict=True):
