@@ -47,7 +47,8 @@ class StraightFit:
     def __init__(self, times: Array, positions: Array, sigmas: Array, memory: float = 0.0) -> None:
         self._take(times, positions, sigmas, memory)
         self._moving = self._starts_moving()
-        self.knots = self._settle(self._prune(self._place(self._grow())))
+        self.unsplit = self._settle(self._prune(self._place(self._grow())))
+        self.knots = self._split(self.unsplit)
 
     def _take(self, times: Array, positions: Array, sigmas: Array, memory: float) -> None:
         """Times (n,) from 0, positions (n, 2), and their noise: standard deviations (n,) and correlation time [s]."""
@@ -61,7 +62,7 @@ class StraightFit:
     @property
     def criterion(self) -> float:
         """Chi-square and the knots' price."""
-        return float(self.curve().chi2 + self._price * len(self.knots))
+        return self._worth(self.knots)
 
     def _white(self, columns: Array) -> Array:
         """Samples (n, c) in standard deviations, less what each keeps of the noise of the one before."""
@@ -231,6 +232,27 @@ class StraightFit:
                 knots = self._place(trials[best], evaluations=15)
         return knots
 
+    def _split(self, knots: Array) -> Array:
+        """Put two knots in the place of one, or into a piece, while that is worth its price.
+
+        A triangle of speed over a trapezoid is the best that three knots can do, as a ramp over a short halt is of
+        two, and no further knot is worth its price alone while they stay.
+        """
+        fine = 2.0 * len(self.times) + self._price
+        while len(knots) > 2 and self._solve(knots, ended=True).chi2 > fine:
+            doubled = [_doubled(knots, j) for j in range(1, len(knots) - 1)]
+            parted = [_parted(knots, j) for j in range(len(knots) - 1)]
+            placed = [self._place(min(trials, key=self._worth), evaluations=15) for trials in (doubled, parted)]
+            best = min(placed, key=self._worth)
+            if self._worth(best) >= self._worth(knots):
+                break
+            knots = self._settle(best)
+        return knots
+
+    def _worth(self, knots: Array) -> float:
+        """The criterion with other knots."""
+        return float(self._solve(knots, ended=True).chi2 + self._price * len(knots))
+
     def as_path(self, knots: Array, coefficients: Array, origin: float) -> HandPath:
         """The path of any knots and coefficients, ``origin`` being the time of the stream's first sample [s]."""
         lead = 2 if self._moving else 1
@@ -253,7 +275,10 @@ class SmoothFit(StraightFit):
         self._take(straight.times, straight._p, straight._sigmas, straight._memory)
         self._moving = straight._moving
         self._ramp, self._way = ramp, ramp.integ()
-        self.knots = self._settle(self._prune(self._place(np.clip(_widened(straight.knots), 0.0, self._span))))
+        # More knots than a straight robot needs may be pieces of a ramp.
+        wide = np.clip(_widened(straight.unsplit), 0.0, self._span)
+        self.unsplit = self._settle(self._prune(self._place(wide)))
+        self.knots = self._split(self.unsplit)
 
     def _ramp_after(self, k: int, count: int) -> Polynomial:
         """The shape of the speed between knots k and k + 1: smooth from and to rest, else straight."""
@@ -302,6 +327,16 @@ class SmoothFit(StraightFit):
         # The coefficients say where the hand is at time 0.
         start = 2.0 * path.start - path.positions(np.zeros(1))[0]
         return replace(path, times=origin + path.times, start=start)
+
+
+def _doubled(knots: Array, k: int) -> Array:
+    """Knots with two in the place of one that is between others, each a quarter of the way to its neighbour."""
+    return np.concatenate([knots[:k], 0.75 * knots[k] + 0.25 * knots[[k - 1, k + 1]], knots[k + 1 :]])
+
+
+def _parted(knots: Array, k: int) -> Array:
+    """Knots with two more between one and the next, at a third of the way from either."""
+    return np.insert(knots, k + 1, knots[k] + np.diff(knots)[k] * np.array([1.0, 2.0]) / 3.0)
 
 
 def _widened(knots: Array) -> Array:

@@ -12,7 +12,7 @@ from scipy import stats
 
 from physid_drake.identify.problem import Noise, finest_position, finest_rotation, noise_of
 from physid_drake.recording import Push, Recording, rest_segments
-from physid_drake.recording.rest_noise import SeenNoise, seen_noise
+from physid_drake.recording.rest_noise import SeenNoise, apart, seen_noise, usual_interval
 
 Array = NDArray[np.float64]
 
@@ -87,10 +87,10 @@ class TrackerNoise:
     def correlation(self, times: Array, dof: int) -> Array:
         """Correlation matrix (n, n) of the noise of x, y (dof 0, 1) or yaw (dof 2) at times (n,)."""
         constant = self.correlation_time[0 if dof < 2 else 1]
-        gaps = np.abs(times[:, None] - times[None, :])
         if constant <= 0.0:
-            white: Array = (gaps == 0.0).astype(np.float64)
-            return white
+            return np.eye(len(times))
+        spread = apart(times, usual_interval(times)) if len(times) > 2 else times
+        gaps = np.abs(spread[:, None] - spread[None, :])
         matrix: Array = np.exp(-gaps / constant)
         return matrix
 

@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.cell.touch import Tip
@@ -24,6 +25,7 @@ OFF_TABLE = 0.01  # m: a caliper's error
 MOVED = 0.01  # m
 AT_ONCE, SOON = 0.05, 0.1  # s
 LONGEST_LOOK = 0.2  # s, of a slow tracker
+AT_A_TIME = 5  # samples, that one of most noise does not count
 SURE = 6.0  # standard deviations
 FEWEST = 4  # samples
 MAY_PUSH = 0.01  # m: from the object's corner, turned to the hand
@@ -193,11 +195,14 @@ def _depth_at_touch(recording: Recording, push: Push) -> float | None:
     if push.hand is None or push.endpoint_only or not moved.any():
         return None
     first = int(np.argmax(moved))
-    time, (x, y, yaw) = push.object.times[first], poses[first]
-    hx, hy = (float(np.interp(time, push.hand.times, column)) for column in push.hand.positions[:, :2].T)
+    times = push.object.times
     tip = Tip(solid_of(recording.object.shape).outline, recording.hand.radius)
-    gap, *_ = tip.gap(float(x), float(y), float(yaw), hx, hy)
-    return -gap
+    # A short hit has let go of an object that has slid so far: what counts is how deep the tip was just before.
+    just = slice(int(np.searchsorted(times, times[first] - LONGEST_LOOK)), first + 1)
+    places = [np.interp(times[just], push.hand.times, column) for column in push.hand.positions[:, :2].T]
+    rows = np.column_stack([poses[just], *places]).tolist()
+    depths = np.array([-tip.gap(x, y, yaw, hx, hy)[0] for x, y, yaw, hx, hy in rows])
+    return float(median_filter(depths, AT_A_TIME, mode="nearest").max())
 
 
 def _moves(push: Push) -> bool:

@@ -64,6 +64,25 @@ def beside_object(recording: Recording, push: Push, height: float, sigma: float)
     return hand
 
 
+def touching_radius(recording: Recording, height: float) -> float | None:
+    """How far a tip's axis is from the face that it touches [m]; None without a hand.
+
+    Less than its radius, where a round tip's middle is above the object's edge.
+
+    Args:
+        recording: the pushes.
+        height: of the object [m].
+    """
+    tip = recording.hand
+    if tip is None or tip.tip == "cylinder":
+        return None if tip is None else tip.radius
+    z = np.concatenate([push.hand.positions[:, 2] for push in recording.pushes if push.hand is not None])
+    above = z - vertical_reach(tip) - height
+    beside = above[above < GRIP * tip.radius]
+    over = max(0.0, float(np.median(beside))) if len(beside) else 0.0
+    return math.sqrt(tip.radius**2 - over**2)
+
+
 def while_pushing(push: Push, hand: PoseStream) -> PoseStream:
     """A hand's stream from its last standstill before the object moves to its first one when that has come to rest.
 

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from physid_drake.cell import CellConfig, HandPath, Start
 from physid_drake.cell.hand_fit import fit_uncertain_paths, stream_std
 from physid_drake.cell.hand_path import PathError
+from physid_drake.cell.solid import solid_of
 from physid_drake.identify.force_windows import force_windows
 from physid_drake.identify.frames import FEWEST_FREE, checks_of, hand_seen_until, push_checks_of
-from physid_drake.identify.hand_stream import beside_object, vertical_reach, while_pushing
+from physid_drake.identify.hand_stream import beside_object, touching_radius, vertical_reach, while_pushing
 from physid_drake.recording import Cylinder as CylinderShape
 from physid_drake.recording import (
     NoiseEstimate,
@@ -224,7 +225,7 @@ def spec_of(recording: Recording, config: CellConfig) -> CellSpec:
     (cx, cy), (sx, sy) = recording.table.centre, recording.table.size
     return CellSpec(
         shape=recording.object.shape,
-        hand_radius=None if recording.hand is None else recording.hand.radius,
+        hand_radius=touching_radius(recording, solid_of(recording.object.shape).height),
         config=config,
         table=((cx - 0.5 * sx, cy - 0.5 * sy), (cx + 0.5 * sx, cy + 0.5 * sy)),
     )

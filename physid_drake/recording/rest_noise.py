@@ -16,6 +16,7 @@ from physid_drake.recording.values import Array
 LOGITS = np.linspace(-5.0, 5.5, 43)
 LOGIT_PRIOR = -0.5 * ((LOGITS + 1.5) / 2.0) ** 2
 LONGEST = 60  # samples of a rest that are looked at together
+CLOSEST = 0.5  # intervals: samples that are stamped closer together come from bursts, or from two clocks
 UNCORRELATED = 0.02  # from sample to sample
 FEWEST = 10  # samples at rest, in all, that tell a noise, if with much doubt
 SILENT = 0.1  # of the finest: a rest that is quieter than that tells no noise
@@ -53,7 +54,7 @@ def seen_noise(pieces: Sequence[tuple[Array, Array]], finest: float) -> SeenNois
     rests = [(t[:LONGEST], v[:LONGEST]) for t, v in pieces if len(t) >= 10]
     if sum(len(t) for t, _ in rests) < FEWEST:
         return None
-    interval = float(np.median(np.concatenate([np.diff(t) for t, _ in rests])))
+    interval = float(np.median([usual_interval(t) for t, _ in rests]))
     spread = math.sqrt(float(np.mean([np.var(v) for _, v in rests])))
     if spread < SILENT * finest:
         return None
@@ -70,11 +71,31 @@ def seen_noise(pieces: Sequence[tuple[Array, Array]], finest: float) -> SeenNois
     return SeenNoise(std=max(math.exp(0.5 * mean), finest), correlation_time=constant, doubt=doubt)
 
 
+def usual_interval(times: Array) -> float:
+    """Between samples at times (n,), n >= 3 [s]: half of the median over two, which may have come together."""
+    return 0.5 * float(np.median(times[2:] - times[:-2]))
+
+
+def apart(times: Array, interval: float) -> Array:
+    """Times (n,) [s], put at least half an interval from one another.
+
+    What little noise two samples at nearly one time do not share is no process' that is seen once in an interval:
+    by their stamps, twins that differ would need any variance.
+    """
+    steps = np.diff(times)
+    least = CLOSEST * interval
+    if (steps >= least).all():
+        return times
+    spread: Array = times[0] + np.cumsum(np.append(0.0, np.maximum(steps, least)))
+    return spread
+
+
 def _restricted(rests: Sequence[tuple[Array, Array]], interval: float, rho: float) -> tuple[float, float]:
     """Squares of rests (times, values), whitened and less their means, and the log determinant, at unit variance."""
     squares = log_determinant = 0.0
     for times, values in rests:
-        gaps = np.abs(times[:, None] - times[None, :]) / interval
+        spread = apart(times, interval)
+        gaps = np.abs(spread[:, None] - spread[None, :]) / interval
         lower = np.linalg.cholesky(rho**gaps + 1e-9 * np.eye(len(times)))
         white = np.linalg.solve(lower, np.column_stack([values, np.ones(len(values))]))
         ones = float(white[:, 1] @ white[:, 1])

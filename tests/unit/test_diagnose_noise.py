@@ -67,6 +67,25 @@ def test_noise_that_one_short_rest_tells_is_called_a_mismatch_as_seldom_as_is_sa
     assert np.mean(called) <= 0.02
 
 
+@pytest.mark.parametrize("gap", [1e-6, 1e-4, 2e-3])
+@pytest.mark.parametrize("every", [1, 10])
+def test_white_noise_of_samples_that_come_in_pairs_is_as_loud_as_it_is(gap, every):
+    """Stamped a microsecond apart, it was said to be 30 times as loud."""
+    rng = np.random.default_rng(4)
+    even = 0.01 * np.arange(60)
+    times = np.sort(np.append(even, even[::every] + gap))
+    seen = seen_noise([(times, 2.0 * rng.standard_normal(len(times))) for _ in range(20)], 1e-5)
+    assert seen.std == pytest.approx(2.0, rel=0.05)
+
+
+def test_pairs_of_samples_are_compared_as_independently_as_others(recording):
+    noise = dc.replace(tracker_noise(recording)[0], correlation_time=(0.005, 0.005))
+    even = 0.01 * np.arange(20)
+    pairs = np.sort(np.append(even, even + 1e-5))
+    np.testing.assert_array_equal(noise.correlation(even, 0)[0, :2], [1.0, np.exp(-2.0)])
+    assert np.linalg.cond(noise.correlation(pairs, 0)) < 20.0
+
+
 def test_a_stream_that_stands_still_at_rest_tells_no_noise():
     still = [(t, 0.0 * v + 0.3) for t, v in rests(np.random.default_rng(1), 10, 20, 0.0)]
     assert seen_noise(still, 1e-5) is None

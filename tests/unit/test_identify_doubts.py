@@ -58,6 +58,19 @@ def test_a_tip_that_is_not_where_it_touches_is_doubted(recording, radius, said):
     assert said in doubt and any(depth in doubt for depth in ("9 mm", "10 mm"))
 
 
+def test_a_tip_that_hits_an_object_and_stays_behind_is_where_it_touched(recording):
+    """The object is 10 mm away as its motion is sure."""
+
+    def hit(push):
+        touched = np.linalg.norm(push.object.positions - push.object.positions[0], axis=1) > 2e-3
+        when = push.object.times[int(np.argmax(touched))]
+        stays = push.hand.positions[int(np.searchsorted(push.hand.times, when))]
+        positions = np.where((push.hand.times > when)[:, None], stays, push.hand.positions)
+        return replace(push, hand=replace(push.hand, positions=positions))
+
+    assert doubts(replace(recording, pushes=tuple(hit(p) for p in recording.pushes))) == ()
+
+
 def test_a_force_on_the_sensor_instead_of_the_object_is_refused(recording):
     check_force_direction(with_forces(recording, 1.0))
     wrong = with_forces(recording, -1.0)

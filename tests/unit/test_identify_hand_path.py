@@ -312,3 +312,25 @@ def test_a_hand_that_comes_and_goes_several_times_is_followed(touches):
     times, stream = sampled(path, float(path.times[-1]) + 0.2)
     away = np.linalg.norm(fit_hand_path(times, stream, STD).positions(times) - path.positions(times), axis=1)
     assert away.max() < 3e-4  # measured: 0.04 to 0.16 mm; 2 and 4.5 mm with 24 knots
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_short_push_of_a_noisy_hand_is_no_triangle_of_speed(seed):
+    """Three knots were all that some of such streams kept, and the hand came to 4 mm beside its way."""
+    path, std = trapezoid(speed=0.48, ramp=0.03, cruise=0.16, brake=0.06), 1e-3
+    times, stream = sampled(path, 1.05, std=std, seed=seed)
+    dense = np.arange(0.0, 1.0, 1e-3)
+    off = np.linalg.norm(fit_hand_path(times, stream, std).positions(dense) - path.positions(dense), axis=1).max()
+    assert off < 2.0 * std
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_hand_that_halts_before_it_withdraws_does(seed):
+    """A ramp from forth to back is the best that one piece can do over a halt of two samples."""
+    knots = np.cumsum([0.2, 0.06, 0.87, 0.05, 0.02, 0.06, 0.3, 0.06])
+    along = np.array([0.0, 0.22, 0.22, 0.0, 0.0, -0.3, -0.3, 0.0])
+    path = HandPath(times=knots, velocities=np.outer(along, [0.8, 0.6]), start=np.array([0.1, 0.2]))
+    times, stream = sampled(path, 2.1, seed=seed)
+    dense = np.arange(0.0, 2.0, 1e-3)
+    off = np.linalg.norm(fit_hand_path(times, stream, STD).positions(dense) - path.positions(dense), axis=1).max()
+    assert off < 5.0 * STD

@@ -8,7 +8,7 @@ from problems import QUIET, ends, first, with_pushes
 from runs import shipped_pushes
 
 from physid_drake.errors import RecordingError
-from physid_drake.identify.hand_stream import while_pushing
+from physid_drake.identify.hand_stream import touching_radius, while_pushing
 from physid_drake.identify.nuisance import nuisance_of
 from physid_drake.identify.problem import problems_of
 from physid_drake.recording import Box, Hand, ObjectModel, PoseStream, Push
@@ -42,6 +42,23 @@ def test_a_hand_that_lifts_off_and_goes_back_above_the_object_pushes_as_if_it_ha
     times = np.linspace(plain.begin, lifted.end, 50)
     assert lifted.end > plain.end and lifted.hand_height == plain.hand_height
     assert np.array_equal(lifted.path.positions(times), plain.path.positions(times))
+
+
+@pytest.mark.parametrize(
+    ("tip", "over", "share"),
+    [("sphere", 0.4, 0.84), ("sphere", -0.3, 1.0), ("capsule", 0.4, 0.84), ("cylinder", 0.4, 1.0)],
+)
+def test_a_round_tip_above_an_edge_touches_it_nearer_to_its_axis(recording, tip, over, share):
+    """With the circle that a plane at the height of the edge cuts out of a sphere."""
+    height, radius = 0.02, 0.01
+    length = None if tip == "sphere" else 0.03
+    reach = 0.5 * length if length else 0.0
+    z = height + reach + over * radius
+    low = with_pushes(
+        recording, lambda p: replace(p, hand=replace(p.hand, positions=p.hand.positions * [1, 1, 0] + [0, 0, z]))
+    )
+    hand = Hand(tip=tip, radius=radius, length=length, stream="measured")
+    assert touching_radius(replace(low, hand=hand), height) == pytest.approx(radius * np.sqrt(share))
 
 
 def lifted(push, when):

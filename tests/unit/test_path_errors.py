@@ -54,8 +54,7 @@ def features(path):
 def test_each_error_is_one_standard_deviation_of_the_stream_and_independent_of_the_others(ramp):
     for path, errors in fitted(path_of(RAMPS[ramp]), range(ENOUGH)):
         moved = changes(path, errors, lambda p: p.positions(TIMES).ravel() / STD)
-        # 0.09 where ramps are smooth; a corner of straight ones moves in a straight line for a part of its way only.
-        np.testing.assert_allclose(moved @ moved.T, np.eye(len(errors)), atol=0.15 if ramp == "smooth" else 0.6)
+        np.testing.assert_allclose(moved @ moved.T, np.eye(len(errors)), atol=0.02)  # 0.01
         assert len(errors) == 10  # three coefficients each for x and y, and four knots
 
 
