@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from physid_drake.identify.force_windows import WINDOW, too_seldom
-from physid_drake.identify.frames import depths_at_touch
+from physid_drake.identify.frames import SELDOM, UNSEEN_WAY, depths_at_touch
 from physid_drake.recording import Cylinder, Push, Recording
 
 LEANS = 8.0  # degrees by which an object's lean changes: on a table it stands on its face
@@ -14,7 +14,12 @@ BESIDE = 3e-3  # m between tip and face as objects begin to move: 1 mm at most w
 
 def doubts(recording: Recording) -> tuple[str, ...]:
     """What to look at again, in words."""
-    return (*_leaning(recording), *_beside_the_tip(recording), *_sparse_forces(recording))
+    return (
+        *_leaning(recording),
+        *_beside_the_tip(recording),
+        *_sparse_forces(recording),
+        *_hand_seldom_seen(recording),
+    )
 
 
 def _leaning(recording: Recording) -> tuple[str, ...]:
@@ -40,6 +45,25 @@ def _sparse_forces(recording: Recording) -> tuple[str, ...]:
         f"forces are compared as means over {WINDOW:g} s, and in none of these are two samples: {', '.join(names)};"
         " they are not used",
     )
+
+
+def _hand_seldom_seen(recording: Recording) -> tuple[str, ...]:
+    """Hands that go far from sample to sample: nobody knows when they touch the object and when they brake."""
+    names = [push.name for push in recording.pushes if not push.endpoint_only and _goes_unseen(push)]
+    if not names:
+        return ()
+    return (
+        f"the hand is seen less often than every {SELDOM:g} s and goes more than {1e3 * UNSEEN_WAY:.0f} mm in"
+        f" between: {', '.join(names)}; when it touches the object and when it brakes is hardly known, so record it at 100 Hz",
+    )
+
+
+def _goes_unseen(push: Push) -> bool:
+    if push.hand is None:
+        return False
+    intervals, steps = np.diff(push.hand.times), np.diff(push.hand.positions[:, :2], axis=0)
+    seldom = float(np.median(intervals)) > SELDOM
+    return seldom and float(np.linalg.norm(steps, axis=1).max()) > UNSEEN_WAY
 
 
 def _lean_changes(push: Push) -> float:

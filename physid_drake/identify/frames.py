@@ -30,6 +30,7 @@ SURE = 6.0  # standard deviations
 FEWEST = 4  # samples
 MAY_PUSH = 0.01  # m: from the object's corner, turned to the hand
 BESIDE_GAP = 5  # samples that tell a speed
+SELDOM = 0.09  # s between samples of a hand: at 12 Hz, the errors of its path still cover what it may do
 UNSEEN_WAY = 0.005  # m: what a hand loses of its speed in a gap, times the gap
 STILL_FAST = 0.5  # of a hand's speed: faster, it has not come to a stop
 LIGHTEST, HEAVIEST = 1.0, 23000.0  # kg/m^3, of the box around an object: lighter than air, denser than osmium
@@ -279,7 +280,7 @@ def _lost_at(push: Push, hand: PoseStream) -> list[int]:
     ended = len(hand) >= 2 * FEWEST and push.object.times[-1] >= hand.times[-1] + SOON
     steps = np.linalg.norm(np.diff(hand.positions[:, :2], axis=0), axis=1) / np.diff(hand.times)
     moves = ended and float(np.median(steps[-3:])) > STILL_FAST * float(np.quantile(steps, 0.9))
-    return _brakes_unseen(hand) + ([len(hand) - 1] if moves else [])
+    return sorted({*_brakes_unseen(hand), *_brakes_hardly_seen(hand)}) + ([len(hand) - 1] if moves else [])
 
 
 def hand_seen_until(recording: Recording, push: Push) -> float:
@@ -293,6 +294,20 @@ def hand_seen_until(recording: Recording, push: Push) -> float:
     lost = _lost_at(push, push.hand)
     away = from_object(push, push.hand) - reach_of(recording) - recording.hand.radius
     return next((float(push.hand.times[k]) for k in lost if away[k] < MAY_PUSH), math.inf)
+
+
+def _brakes_hardly_seen(hand: PoseStream) -> list[int]:
+    """The last samples before a hand that is seen too seldom loses much of its speed, or goes back."""
+    intervals = np.diff(hand.times)
+    velocities = np.diff(hand.positions[:, :2], axis=0) / intervals[:, None]
+    speeds = np.linalg.norm(velocities, axis=1)
+    kept = (velocities[:-2] * velocities[2:]).sum(axis=1) / np.maximum(speeds[:-2], 1e-9)
+    between = intervals[1:-1]
+    # A hand that stood has no way that it could go back.
+    lost = (speeds[:-2] - kept) * between > UNSEEN_WAY
+    moved = speeds[:-2] * between > UNSEEN_WAY  # the way of one that stood is noise
+    found: list[int] = (np.flatnonzero((between > SELDOM) & moved & lost) + 1).tolist()
+    return found
 
 
 def _brakes_unseen(hand: PoseStream) -> list[int]:

@@ -45,6 +45,7 @@ SLOW_NOISE = 1.5  # samples: a hand's noise that remembers less is white, as one
 CLEAR = 0.3  # of the logarithm of its variance: noise that is known so well may be slow
 ROUGHER = 1.3  # times the third differences of the noise at rest
 FIRST_SIGMAS = 4.0  # of the tracker: motion that is surely none of its noise
+SLOW_HAND = 0.06  # s between samples: of slower streams, differences show a hand's ramps and not its noise
 DISPROVED = 2.0  # times what is stated of hand or force: noise that is seen to be louder is believed
 # A simulation without noise, or a tracker that is quiet at rest: below these the cell's own error is what differs.
 FINEST_POSITION = 1e-5  # m
@@ -107,12 +108,15 @@ def noise_of(recording: Recording) -> Noise:
     seen: NoiseEstimate = estimate_noise(recording)
     stated = recording.sensors
     hand_std, hand_memory = _hand_noise(recording)
+    often = _hand_interval(recording) < SLOW_HAND
     source: dict[str, str] = {}
 
     def choose(name: str, said: float | None, estimate: float | None, assumed: float, finest: float) -> float:
         # The object's is judged by a diagnosis, which knows how slow its noise is.
         disproved = (
-            name in ("hand", "force") and estimate is not None and estimate > DISPROVED * max(said or 0.0, finest)
+            (name == "force" or (name == "hand" and often))
+            and estimate is not None
+            and estimate > DISPROVED * max(said or 0.0, finest)
         )
         if said is not None and not disproved:
             source[name] = "stated"
@@ -141,6 +145,12 @@ def _correlation(own: float | None, other: float | None) -> float:
     """What the rests tell of one noise, or of the other: it is the same tracker's filter."""
     seen = other if own is None else own
     return 0.0 if seen is None else float(np.clip(seen, 0.0, LARGEST_CORRELATION))
+
+
+def _hand_interval(recording: Recording) -> float:
+    """Between two samples of the hand, the median [s]; 0 where it has none."""
+    gaps = [np.diff(push.hand.times) for push in recording.pushes if push.hand is not None]
+    return float(np.median(np.concatenate(gaps))) if gaps else 0.0
 
 
 def _hand_noise(recording: Recording) -> tuple[float | None, float]:

@@ -71,6 +71,31 @@ def test_a_tip_that_hits_an_object_and_stays_behind_is_where_it_touched(recordin
     assert doubts(replace(recording, pushes=tuple(hit(p) for p in recording.pushes))) == ()
 
 
+@pytest.mark.parametrize(("every", "said"), [(5, False), (10, True), (20, True)])
+def test_a_hand_that_is_seen_too_seldom_is_doubted(recording, every, said):
+    """Of 100 Hz."""
+    seldom = replace(recording, pushes=tuple(replace(p, hand=thinned(p.hand, every)) for p in recording.pushes))
+    assert any("the hand is seen less often than every 0.09 s" in doubt for doubt in doubts(seldom)) == said
+
+
+def test_poses_after_a_brake_that_is_hardly_seen_are_not_compared(recording):
+    seldom = replace(recording, pushes=tuple(replace(p, hand=thinned(p.hand, 10)) for p in recording.pushes))
+    for push, full, thin in zip(recording.pushes, problems(recording), problems(seldom), strict=True):
+        begin, end = full.path.last_brake(*full.moving)
+        assert push.object.times[-1] > full.path.times[end]
+        assert full.path.times[begin] - 0.21 < thin.times[-1] < full.path.times[end]
+
+
+def thinned(stream, every):
+    return PoseStream(
+        times=stream.times[::every], positions=stream.positions[::every], quaternions=stream.quaternions[::every]
+    )
+
+
+def problems(recording):
+    return problems_of(recording, QUIET, 0.03)
+
+
 def test_a_force_on_the_sensor_instead_of_the_object_is_refused(recording):
     check_force_direction(with_forces(recording, 1.0))
     wrong = with_forces(recording, -1.0)
