@@ -55,6 +55,8 @@ class Style:
 
     Attributes:
         rate: of both streams [Hz].
+        hand_rate: of the hand's alone, if it is another one [Hz].
+        twins: by how much later every tenth sample is taken once more [s].
         jitter: standard deviation of when a sample is taken, beside its stamp [s].
         stamps: what these are rounded to [s].
         place, turn: what the object's poses are rounded to [m, rad].
@@ -65,6 +67,8 @@ class Style:
     """
 
     rate: float = 100.0
+    hand_rate: float | None = None
+    twins: float = 0.0
     jitter: float = 0.0
     stamps: float = 0.0
     place: float = 0.0
@@ -78,7 +82,10 @@ class Style:
 STYLES = {
     "plain": Style(),
     "hand 0.5 mm": Style(hand=5e-4),
+    "hand 1 mm": Style(hand=1e-3),
     "15 Hz": Style(rate=15.0),
+    "hand 10 Hz": Style(hand_rate=10.0),
+    "twins 0.1 ms": Style(twins=1e-4),
     "1 kHz": Style(rate=1000.0),
     "jitter 2 ms": Style(jitter=2e-3),
     "jitter 5 ms": Style(jitter=5e-3),
@@ -125,11 +132,11 @@ def recorded(style):
 
 def push_in(style, rng, k, push, times, poses):
     """One push, as it is logged."""
-    stamps, taken = sampled(style, rng, times)
+    stamps, taken = sampled(style, rng, times, style.rate)
     seen = np.column_stack([np.interp(taken, times, column) for column in poses.T])
     seen = rounded(seen + [POSITION, POSITION, ROTATION] * rng.standard_normal(seen.shape), style.place)
     seen[:, 2] = rounded(seen[:, 2], style.turn) if style.turn else seen[:, 2]
-    hand_stamps, taken = sampled(style, rng, times)
+    hand_stamps, taken = sampled(style, rng, times, style.hand_rate or style.rate)
     places = rounded(push.path.position(taken) + style.hand * rng.standard_normal((len(taken), 2)), style.hand_place)
     places = np.column_stack([places, np.zeros(len(places))])
     if style.unseen is not None:
@@ -143,9 +150,11 @@ def push_in(style, rng, k, push, times, poses):
     )  # fmt: skip
 
 
-def sampled(style, rng, times):
+def sampled(style, rng, times, rate):
     """Stamps (n,) of samples, and when they are taken (n,) [s]."""
-    stamps = np.arange(times[0], times[-1], 1.0 / style.rate)
+    stamps = np.arange(times[0], times[-1], 1.0 / rate)
+    if style.twins:
+        stamps = np.sort(np.append(stamps, stamps[:-1:10] + style.twins))
     taken = np.clip(stamps + style.jitter * rng.standard_normal(len(stamps)), times[0], times[-1])
     stamps, first = np.unique(rounded(stamps, style.stamps), return_index=True)
     return stamps, taken[first]
