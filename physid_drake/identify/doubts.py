@@ -54,7 +54,7 @@ def _hand_seldom_seen(recording: Recording) -> tuple[str, ...]:
         return ()
     return (
         f"the hand is seen less often than every {SELDOM:g} s and goes more than {1e3 * UNSEEN_WAY:.0f} mm in"
-        f" between: {', '.join(names)}; when it touches the object and when it brakes is hardly known, so record it at"
+        f" between: {', '.join(names)}; when it touches the object and when it brakes is hardly known; record it at"
         " 100 Hz",
     )
 
