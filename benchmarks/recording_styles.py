@@ -3,7 +3,8 @@
 Six pushes of a box in the planar integrator of the tests, 0.06 to 0.57 m/s, without an effect, and with a friction
 that does not scatter. They are sampled, rounded, stamped and cut as people's recordings are, written and read back,
 and the plain cell is fitted to them from the true theta, as a diagnosis does it. What costs much more than the plain
-style (0.3 mm, 3 mrad, a hand of 0.1 mm, 100 Hz) would be called missing physics.
+style (0.3 mm, 3 mrad, a hand of 0.1 mm, 100 Hz), also with what the hand's path and the cell itself may be off by,
+would be called missing physics.
 """
 
 import argparse
@@ -27,6 +28,7 @@ from twin import shape_of
 
 from physid_drake.diagnose import case_of, cell_config
 from physid_drake.diagnose.fit import Fitter
+from physid_drake.diagnose.plain import numerics, path_errors
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.recording import Hand as Tip
 from physid_drake.recording import (
@@ -166,7 +168,7 @@ def rounded(values, step):
 
 
 def row(name, style, jobs):
-    """What the plain cell leaves, the friction that it is fitted with, and what is said of the recording."""
+    """What the plain cell leaves, without and with its guard, its friction, and what is said of the recording."""
     with tempfile.TemporaryDirectory() as folder:
         write_recording(recorded(style), Path(folder) / "styles")
         recording = read_recording(Path(folder) / "styles")
@@ -175,7 +177,15 @@ def row(name, style, jobs):
     fitter = Fitter(case)
     fitted = fitter.fit(fitter.start(np.asarray(space.to_unit(np.array([true[p.name] for p in space.parameters])))))
     friction = dict(zip(space.names, space.from_unit(fitted.state.u), strict=True))["support_friction"]
-    return name, f"{fitted.reduced_chi2:.2f}", f"{friction:.4f}", "; ".join(w[:60] for w in case.warnings)
+    costs = [f"{cost:.2f}" for cost in (fitted.reduced_chi2, guarded(case, fitted.state))]
+    return name, *costs, f"{friction:.4f}", "; ".join(w[:60] for w in case.warnings)
+
+
+def guarded(case, state):
+    """The cost with what path and cell may be off by."""
+    extra = zip(numerics(case, state), path_errors(case, state, lambda *_: None), strict=True)
+    fitter = Fitter(case, [np.column_stack(pair) for pair in extra])
+    return fitter.guard(Fitter(case).linearise(state)).reduced_chi2
 
 
 def main():
@@ -187,7 +197,7 @@ def main():
     if unknown:
         parser.error(f"there is no style {unknown[0]!r}; there are {', '.join(STYLES)}.")
     console = Console(width=150, markup=False)
-    made = Table("style", "cost", f"friction ({FRICTION})", "said", title="six pushes, recorded otherwise")
+    made = Table("style", "cost", "guarded", f"friction ({FRICTION})", "said", title="six pushes, recorded otherwise")
     for name in given.styles or STYLES:
         cells = row(name, STYLES[name], given.jobs)
         console.print(*cells, sep=" | ")

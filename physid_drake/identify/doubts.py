@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from physid_drake.identify.force_windows import WINDOW, too_seldom
 from physid_drake.identify.frames import SELDOM, UNSEEN_WAY, depths_at_touch
 from physid_drake.recording import Cylinder, Push, Recording
 
 LEANS = 8.0  # degrees by which an object's lean changes: on a table it stands on its face
+RISES = 8e-3  # m by which an object's height changes: on a table it does not
+AT_A_TIME = 5  # samples, that one of most noise does not count
 BESIDE = 3e-3  # m between tip and face as objects begin to move: 1 mm at most where description and frames agree
 
 
@@ -16,6 +19,7 @@ def doubts(recording: Recording) -> tuple[str, ...]:
     """What to look at again, in words."""
     return (
         *_leaning(recording),
+        *_rising(recording),
         *_beside_the_tip(recording),
         *_sparse_forces(recording),
         *_hand_seldom_seen(recording),
@@ -34,6 +38,22 @@ def _leaning(recording: Recording) -> tuple[str, ...]:
         f"the object's lean changes by more than {LEANS:.0f} degrees while it is on the table; are its quaternions in"
         f" the order w, x, y, z? {', '.join(names)}",
     )
+
+
+def _rising(recording: Recording) -> tuple[str, ...]:
+    """Objects that are lifted, carried or thrown, or frames whose z is not the table's normal."""
+    names = [push.name for push in recording.pushes if _height_change(push) > RISES]
+    if not names:
+        return ()
+    return (
+        f"the object's height changes by more than {1e3 * RISES:.0f} mm; is it on the table all the time, and is z of"
+        f" W the table's normal? {', '.join(names)}",
+    )
+
+
+def _height_change(push: Push) -> float:
+    """By how much the object's height changes [m], but for a few samples."""
+    return float(np.ptp(median_filter(push.object.positions[:, 2], AT_A_TIME, mode="nearest")))
 
 
 def _sparse_forces(recording: Recording) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import RecordingError
 from physid_drake.identify.frames import from_object
-from physid_drake.recording import Hand, PoseStream, Push, Recording, motion_span
+from physid_drake.recording import Cylinder, Hand, PoseStream, Push, Recording, motion_span
 from physid_drake.recording.rests import rests_of
 
 Array = NDArray[np.float64]
@@ -67,7 +67,7 @@ def beside_object(recording: Recording, push: Push, height: float, sigma: float)
 def touching_radius(recording: Recording, height: float) -> float | None:
     """How far a tip's axis is from the face that it touches [m]; None without a hand.
 
-    Less than its radius, where a round tip's middle is above the object's edge.
+    Less than its radius, where a round tip's middle is above the object's edge, or beside a lying cylinder's.
 
     Args:
         recording: the pushes.
@@ -77,10 +77,20 @@ def touching_radius(recording: Recording, height: float) -> float | None:
     if tip is None or tip.tip == "cylinder":
         return None if tip is None else tip.radius
     z = np.concatenate([push.hand.positions[:, 2] for push in recording.pushes if push.hand is not None])
-    above = z - vertical_reach(tip) - height
-    beside = above[above < GRIP * tip.radius]
-    over = max(0.0, float(np.median(beside))) if len(beside) else 0.0
+    shape, reach = recording.object.shape, vertical_reach(tip)
+    if isinstance(shape, Cylinder) and shape.axis == "y":
+        # Two round bodies touch between their middles: the further apart in height these are, the nearer in plan.
+        both = shape.radius + tip.radius
+        over = _usual_height(np.abs(z - shape.radius) - reach, GRIP * both)
+        return math.sqrt(both**2 - over**2) - shape.radius
+    over = _usual_height(z - reach - height, GRIP * tip.radius)
     return math.sqrt(tip.radius**2 - over**2)
+
+
+def _usual_height(above: Array, most: float) -> float:
+    """The median of heights (n,) [m] of a tip over what it touches, where it is near enough to do so; at least 0."""
+    beside = above[above < most]
+    return max(0.0, float(np.median(beside))) if len(beside) else 0.0
 
 
 def while_pushing(push: Push, hand: PoseStream) -> PoseStream:

@@ -71,6 +71,16 @@ def test_a_tip_that_hits_an_object_and_stays_behind_is_where_it_touched(recordin
     assert doubts(replace(recording, pushes=tuple(hit(p) for p in recording.pushes))) == ()
 
 
+def test_an_object_that_is_carried_is_doubted(recording):
+    def carried(push):
+        up = np.clip(push.object.times - push.object.times[-1] + 0.1, 0.0, None)
+        return replace(push.object, positions=push.object.positions + np.outer(up, [0.0, 0.0, 1.0]))
+
+    pushes = (replace(recording.pushes[0], object=carried(recording.pushes[0])), *recording.pushes[1:])
+    (doubt,) = doubts(replace(recording, pushes=pushes))
+    assert "height changes by more than 8 mm" in doubt and doubt.endswith(pushes[0].name)
+
+
 @pytest.mark.parametrize(("every", "said"), [(5, False), (10, True), (20, True)])
 def test_a_hand_that_is_seen_too_seldom_is_doubted(recording, every, said):
     """Of 100 Hz."""

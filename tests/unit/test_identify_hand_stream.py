@@ -11,7 +11,7 @@ from physid_drake.errors import RecordingError
 from physid_drake.identify.hand_stream import touching_radius, while_pushing
 from physid_drake.identify.nuisance import nuisance_of
 from physid_drake.identify.problem import problems_of
-from physid_drake.recording import Box, Hand, ObjectModel, PoseStream, Push
+from physid_drake.recording import Box, Cylinder, Hand, ObjectModel, PoseStream, Push
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +59,21 @@ def test_a_round_tip_above_an_edge_touches_it_nearer_to_its_axis(recording, tip,
     )
     hand = Hand(tip=tip, radius=radius, length=length, stream="measured")
     assert touching_radius(replace(low, hand=hand), height) == pytest.approx(radius * np.sqrt(share))
+
+
+@pytest.mark.parametrize("off", [-0.012, 0.0, 0.012])
+def test_a_round_tip_beside_a_lying_cylinder_touches_it_nearer_to_its_axis(recording, off):
+    """With the distance in plan of two spheres that touch, whose middles are at different heights."""
+    radius, tip = 0.033, 0.01
+    beside = with_pushes(
+        recording,
+        lambda p: replace(p, hand=replace(p.hand, positions=p.hand.positions * [1, 1, 0] + [0, 0, radius + off])),
+    )
+    rolls = replace(
+        beside, hand=Hand(tip="sphere", radius=tip, stream="measured"),
+        object=replace(recording.object, shape=Cylinder(radius=radius, length=0.1, axis="y")),
+    )  # fmt: skip
+    assert touching_radius(rolls, 2.0 * radius) + radius == pytest.approx(np.sqrt((radius + tip) ** 2 - off**2))
 
 
 def lifted(push, when):
