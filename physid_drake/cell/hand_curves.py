@@ -23,6 +23,8 @@ WIDER = 0.2  # at either end: where the fit of a smooth ramp starts
 ASIDE, AWHILE = 2, 0.02  # samples, s: to either side, over which a stream tells its speed
 ROUND_OFF = 1e-9  # s: a piece no longer than this has parts of no length
 
+LEAST_GAIN = 1.0  # of the criterion: what is less is no reason to go on
+
 STRAIGHT: Final = Polynomial([0, 1])
 
 
@@ -243,10 +245,11 @@ class StraightFit:
             doubled = [_doubled(knots, j) for j in range(1, len(knots) - 1)]
             parted = [_parted(knots, j) for j in range(len(knots) - 1)]
             placed = [self._place(min(trials, key=self._worth), evaluations=15) for trials in (doubled, parted)]
-            best = min(placed, key=self._worth)
-            if self._worth(best) >= self._worth(knots):
+            # Where knots settle may be worth less than where they were placed.
+            best = min((self._settle(one) for one in placed), key=self._worth)
+            if self._worth(best) > self._worth(knots) - LEAST_GAIN:
                 break
-            knots = self._settle(best)
+            knots = best
         return knots
 
     def _worth(self, knots: Array) -> float:

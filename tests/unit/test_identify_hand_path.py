@@ -334,3 +334,21 @@ def test_a_hand_that_halts_before_it_withdraws_does(seed):
     dense = np.arange(0.0, 2.0, 1e-3)
     off = np.linalg.norm(fit_hand_path(times, stream, STD).positions(dense) - path.positions(dense), axis=1).max()
     assert off < 5.0 * STD
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_hand_that_brakes_exponentially_is_fitted_in_the_end(seed):
+    """Knots that settle elsewhere are worth less, and were put in and moved away again without end."""
+    rng, std = np.random.default_rng(seed), 2.5e-4
+    streams = []
+    for _ in range(5):
+        speed, heading, cruise = rng.uniform(0.04, 0.5), rng.uniform(0.0, 6.28), 0.3
+        x = np.linspace(0.0, 1.0, 101)[1:]
+        along = speed * np.concatenate([[0.0, 1.0, 1.0], (np.exp(-5.0 * x) - np.exp(-5.0)) / (1.0 - np.exp(-5.0))])
+        knots = np.concatenate([[0.2, 0.3, 0.3 + cruise], 0.3 + cruise + 0.25 * x])
+        way = np.outer(along, [np.cos(heading), np.sin(heading)])
+        path = HandPath(times=knots, velocities=way, start=np.zeros(2))
+        streams.append(sampled(path, knots[-1] + 0.6, rate=60.0, std=std, seed=int(rng.integers(1000))))
+    for (times, positions), path in zip(streams, fit_hand_paths(streams, std), strict=True):
+        misfit = ((path.positions(times) - positions) ** 2).sum() / std**2
+        assert misfit < 2.0 * len(times) + 5.0 * np.sqrt(4.0 * len(times))
