@@ -61,6 +61,7 @@ GOOD_PART = 0.25  # of the squared error: less is not worth a word
 QUIET = 5e-5  # m: a tracker's noise that is no longer what hides the cell's own error
 OWN_POSITION, OWN_ROTATION = 2e-4, 2e-3  # m, rad: of left-out pushes, what the cell itself may be off by
 PART = "takes a part away, and leaves more than noise"
+FAR_OUT = 5.0  # standard deviations: of ten answers of the proof that call as much nothing, four missed an effect
 VISIBLE = 10.0  # standard deviations of motion: pushes that would not show such an effect show nothing
 
 
@@ -72,6 +73,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
     verdict = _verdict(evidence, p_value, alpha, detectable)
     findings = _findings(evidence) if verdict in ("explained", "ambiguous") else ()
     after, shown = (final, final) if findings else (plain, evidence.nearest)
+    fit = _quality(evidence, after)
     partly = _partly(evidence) if verdict == "unexplained" else None
     return Diagnosis(
         recording=case.recording.name,
@@ -88,7 +90,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
         alpha=alpha,
         effects=findings,
         location=_location(evidence, verdict, findings, seed),
-        fit=_quality(evidence, after),
+        fit=fit,
         theta=theta_of(evidence, shown),
         next_push=evidence.next_push if verdict in ("explained", "ambiguous", "unexplained") else None,
         seed=seed,
@@ -106,7 +108,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
             "jitter_s": case.noise.jitter,
             **_noise_of_sensors(case),
         },
-        warnings=(*case.warnings, *_diverged(case, shown)),
+        warnings=(*case.warnings, *_diverged(case, shown), *_hidden(verdict, fit)),
         rollouts=case.pool.count,
         pushes=case.pushes,
     )
@@ -119,6 +121,16 @@ def _diverged(case: Case, shown: Fitted) -> tuple[str, ...]:
         return ()
     return (
         f"the model cannot simulate some pushes (the solver diverges, or no object stands so): {', '.join(names)}",
+    )
+
+
+def _hidden(verdict: str, fit: FitQuality) -> tuple[str, ...]:
+    """That pushes are explained by what each of them has for itself, which those that are left out have not."""
+    if verdict == "unexplained" or not fit.rms_after > FAR_OUT:
+        return ()
+    return (
+        f"left-out pushes are off by {fit.rms_after:.1f} standard deviations, which each push makes up for by itself"
+        " (its start, its friction, its hand's path): a further effect may hide there",
     )
 
 

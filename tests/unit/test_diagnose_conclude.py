@@ -1,6 +1,7 @@
 """What is said of a mismatch that an effect takes away in part."""
 
 import dataclasses as dc
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -94,6 +95,16 @@ def test_what_a_verdict_rests_on_is_said_with_it():
     assert "would have to be large" in sentence("underpowered", (), None, None)
     assert "nobody states" in sentence("consistent", (), None, None, known=False)
     assert "nobody states" not in sentence("consistent", (), None, None)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "rms", "said"),
+    [("explained", 7.2, True), ("consistent", 7.2, True), ("unexplained", 7.2, False), ("explained", 2.0, False),
+     ("consistent", math.nan, False)],
+)  # fmt: skip
+def test_what_only_each_push_for_itself_makes_up_for_is_said(verdict, rms, said):
+    warnings = conclude._hidden(verdict, SimpleNamespace(rms_after=rms))
+    assert [("off by 7.2 standard deviations" in warning) for warning in warnings] == ([True] if said else [])
 
 
 @pytest.mark.parametrize(
