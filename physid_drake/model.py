@@ -102,7 +102,7 @@ class Model:
     Attributes:
         recording: the name of what it was learnt from.
         shape: the object's.
-        hand_radius: of the tip [m]; None without a hand.
+        hand_radius: of the tip where it touches the object [m]; None without a hand.
         table: (2, 2) lower and upper corner of the table top [m].
         config: of the cell.
         body: theta.

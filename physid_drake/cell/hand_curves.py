@@ -22,7 +22,6 @@ PIECES = 24  # of a smooth ramp: speeds to 0.2 % of its height
 WIDER = 0.2  # at either end: where the fit of a smooth ramp starts
 ASIDE, AWHILE = 2, 0.02  # samples, s: to either side, over which a stream tells its speed
 ROUND_OFF = 1e-9  # s: a piece no longer than this has parts of no length
-
 LEAST_GAIN = 1.0  # of the criterion: what is less is no reason to go on
 
 STRAIGHT: Final = Polynomial([0, 1])
@@ -60,6 +59,10 @@ class StraightFit:
         self._span = float(times[-1])
         # One knot costs its place and two coefficients.
         self._price = 3.0 * np.log(len(times)) + 4.0
+
+    @property
+    def _most_knots(self) -> float:
+        return max(MOST_KNOTS, KNOTS_PER_SECOND * self._span)
 
     @property
     def criterion(self) -> float:
@@ -154,7 +157,7 @@ class StraightFit:
         candidates = self.times[1:-1]
         columns = self._white(np.maximum(self.times[:, None] - candidates, 0.0) ** 2 / self._span**2)
         knots = np.array([], dtype=np.float64)
-        while len(knots) < max(MOST_KNOTS, KNOTS_PER_SECOND * self._span):
+        while len(knots) < self._most_knots:
             design = self.design(knots)
             q, _ = np.linalg.qr(design)
             residual = self._scaled - q @ (q.T @ self._scaled)
@@ -241,7 +244,7 @@ class StraightFit:
         two, and no further knot is worth its price alone while they stay.
         """
         fine = 2.0 * len(self.times) + self._price
-        while len(knots) > 2 and self._solve(knots, ended=True).chi2 > fine:
+        while 2 < len(knots) < self._most_knots and self._solve(knots, ended=True).chi2 > fine:
             doubled = [_doubled(knots, j) for j in range(1, len(knots) - 1)]
             parted = [_parted(knots, j) for j in range(len(knots) - 1)]
             placed = [self._place(min(trials, key=self._worth), evaluations=15) for trials in (doubled, parted)]

@@ -108,7 +108,11 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
             "jitter_s": case.noise.jitter,
             **_noise_of_sensors(case),
         },
-        warnings=(*case.warnings, *_diverged(case, shown), *_hidden(verdict, fit)),
+        warnings=(
+            *case.warnings,
+            *_diverged(case, shown),
+            *(() if _is_own_error(evidence) else _hidden(verdict, fit)),
+        ),
         rollouts=case.pool.count,
         pushes=case.pushes,
     )
@@ -126,11 +130,11 @@ def _diverged(case: Case, shown: Fitted) -> tuple[str, ...]:
 
 def _hidden(verdict: str, fit: FitQuality) -> tuple[str, ...]:
     """That pushes are explained by what each of them has for itself, which those that are left out have not."""
-    if verdict == "unexplained" or not fit.rms_after > FAR_OUT:
+    if verdict in ("unexplained", "underpowered") or not fit.rms_after > FAR_OUT:
         return ()
     return (
         f"left-out pushes are off by {fit.rms_after:.1f} standard deviations, which each push makes up for by itself"
-        " (its start, its friction, its hand's path): a further effect may hide there",
+        " (its start, its friction, its hand's path): an effect may hide there",
     )
 
 

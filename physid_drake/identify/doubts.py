@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import median_filter
 
+from physid_drake.cell.solid import solid_of
 from physid_drake.identify.force_windows import WINDOW, too_seldom
-from physid_drake.identify.frames import SELDOM, UNSEEN_WAY, depths_at_touch
+from physid_drake.identify.frames import AT_A_TIME, SELDOM, UNSEEN_WAY, depths_at_touch
+from physid_drake.identify.hand_stream import touching_radius
 from physid_drake.recording import Cylinder, Push, Recording
 
 LEANS = 8.0  # degrees by which an object's lean changes: on a table it stands on its face
 RISES = 8e-3  # m by which an object's height changes: on a table it does not
-AT_A_TIME = 5  # samples, that one of most noise does not count
 BESIDE = 3e-3  # m between tip and face as objects begin to move: 1 mm at most where description and frames agree
 
 
@@ -53,7 +54,7 @@ def _rising(recording: Recording) -> tuple[str, ...]:
 
 def _height_change(push: Push) -> float:
     """By how much the object's height changes [m], but for a few samples."""
-    return float(np.ptp(median_filter(push.object.positions[:, 2], AT_A_TIME, mode="nearest")))
+    return float(np.ptp(median_filter(push.object.positions[:, 2], AT_A_TIME, mode="reflect")))
 
 
 def _sparse_forces(recording: Recording) -> tuple[str, ...]:
@@ -98,6 +99,9 @@ def _lean_changes(push: Push) -> float:
 def _beside_the_tip(recording: Recording) -> tuple[str, ...]:
     """A tip that is not at the face of the objects that it sets moving, by as much in most pushes."""
     depths = np.array(depths_at_touch(recording))
+    if recording.hand is not None:
+        wide = touching_radius(recording, solid_of(recording.object.shape).height)
+        depths -= recording.hand.radius - wide
     if not len(depths) or abs(float(np.median(depths))) <= BESIDE:
         return ()
     where = "inside the object" if np.median(depths) > 0.0 else "away from the object"

@@ -203,7 +203,7 @@ def _depth_at_touch(recording: Recording, push: Push) -> float | None:
     places = [np.interp(times[just], push.hand.times, column) for column in push.hand.positions[:, :2].T]
     rows = np.column_stack([poses[just], *places]).tolist()
     depths = np.array([-tip.gap(x, y, yaw, hx, hy)[0] for x, y, yaw, hx, hy in rows])
-    return float(median_filter(depths, AT_A_TIME, mode="nearest").max())
+    return float(median_filter(depths, AT_A_TIME, mode="reflect").max())
 
 
 def _moves(push: Push) -> bool:
@@ -303,10 +303,11 @@ def _brakes_hardly_seen(hand: PoseStream) -> list[int]:
     speeds = np.linalg.norm(velocities, axis=1)
     kept = (velocities[:-2] * velocities[2:]).sum(axis=1) / np.maximum(speeds[:-2], 1e-9)
     between = intervals[1:-1]
-    # A hand that stood has no way that it could go back.
+    # Beside a gap of a fast stream, the differences of neighbours are noise: those are for ``_brakes_unseen``.
+    seldom = (between > SELDOM) & (np.minimum(intervals[:-2], intervals[2:]) > 0.5 * SELDOM)
     lost = (speeds[:-2] - kept) * between > UNSEEN_WAY
     moved = speeds[:-2] * between > UNSEEN_WAY  # the way of one that stood is noise
-    found: list[int] = (np.flatnonzero((between > SELDOM) & moved & lost) + 1).tolist()
+    found: list[int] = (np.flatnonzero(seldom & moved & lost) + 1).tolist()
     return found
 
 

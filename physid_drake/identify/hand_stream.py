@@ -21,6 +21,7 @@ LONGEST_SLIDE = 1.5  # s: after it a released object rests
 BLINK = 0.1  # s: a hand that is away from the object for so long is not
 SEEN_LATE = 0.25  # s: by so much, the end of one body's rest may be seen before or after that of another
 FEWEST = 20  # samples of a hand of which a part is kept
+THINNEST = 0.1  # of a round tip's radius: how near its axis comes to what it touches
 GRIP = 0.5  # of a round tip's radius: so far beyond the object's edge it still touches it nearly as wide as it is
 
 
@@ -64,25 +65,27 @@ def beside_object(recording: Recording, push: Push, height: float, sigma: float)
     return hand
 
 
-def touching_radius(recording: Recording, height: float) -> float | None:
-    """How far a tip's axis is from the face that it touches [m]; None without a hand.
+def touching_radius(recording: Recording, height: float) -> float:
+    """How far a tip's axis is from the face that it touches [m].
 
     Less than its radius, where a round tip's middle is above the object's edge, or beside a lying cylinder's.
 
     Args:
-        recording: the pushes.
+        recording: of pushes with a hand.
         height: of the object [m].
     """
     tip = recording.hand
-    if tip is None or tip.tip == "cylinder":
-        return None if tip is None else tip.radius
+    assert tip is not None
+    if tip.tip == "cylinder":
+        return tip.radius
     z = np.concatenate([push.hand.positions[:, 2] for push in recording.pushes if push.hand is not None])
     shape, reach = recording.object.shape, vertical_reach(tip)
     if isinstance(shape, Cylinder) and shape.axis == "y":
         # Two round bodies touch between their middles: the further apart in height these are, the nearer in plan.
         both = shape.radius + tip.radius
         over = _usual_height(np.abs(z - shape.radius) - reach, GRIP * both)
-        return math.sqrt(both**2 - over**2) - shape.radius
+        # High on a wide cylinder the tip's axis is within its outline, which no circle in the plane can say.
+        return max(math.sqrt(both**2 - over**2) - shape.radius, THINNEST * tip.radius) if over else tip.radius
     over = _usual_height(z - reach - height, GRIP * tip.radius)
     return math.sqrt(tip.radius**2 - over**2)
 

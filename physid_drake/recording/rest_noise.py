@@ -94,7 +94,7 @@ def _restricted(rests: Sequence[tuple[Array, Array]], interval: float, rho: floa
     """Squares of rests (times, values), whitened and less their means, and the log determinant, at unit variance."""
     squares = log_determinant = 0.0
     for times, values in rests:
-        spread = apart(times, interval)
+        spread = apart(times, usual_interval(times))
         gaps = np.abs(spread[:, None] - spread[None, :]) / interval
         lower = np.linalg.cholesky(rho**gaps + 1e-9 * np.eye(len(times)))
         white = np.linalg.solve(lower, np.column_stack([values, np.ones(len(values))]))

@@ -99,9 +99,15 @@ def test_what_a_verdict_rests_on_is_said_with_it():
 
 @pytest.mark.parametrize(
     ("verdict", "rms", "said"),
-    [("explained", 7.2, True), ("consistent", 7.2, True), ("unexplained", 7.2, False), ("explained", 2.0, False),
-     ("consistent", math.nan, False)],
-)  # fmt: skip
+    [
+        ("explained", 7.2, True),
+        ("consistent", 7.2, True),
+        ("unexplained", 7.2, False),
+        ("underpowered", 7.2, False),
+        ("explained", 2.0, False),
+        ("consistent", math.nan, False),
+    ],
+)
 def test_what_only_each_push_for_itself_makes_up_for_is_said(verdict, rms, said):
     warnings = conclude._hidden(verdict, SimpleNamespace(rms_after=rms))
     assert [("off by 7.2 standard deviations" in warning) for warning in warnings] == ([True] if said else [])

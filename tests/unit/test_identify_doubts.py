@@ -10,7 +10,7 @@ from runs import shipped_pushes
 
 from physid_drake.errors import RecordingError
 from physid_drake.identify.doubts import doubts
-from physid_drake.identify.frames import check_force_direction
+from physid_drake.identify.frames import _brakes_hardly_seen, check_force_direction
 from physid_drake.identify.identify import Estimate
 from physid_drake.identify.problem import problems_of
 from physid_drake.identify.refusals import refusals
@@ -94,6 +94,20 @@ def test_poses_after_a_brake_that_is_hardly_seen_are_not_compared(recording):
         begin, end = full.path.last_brake(*full.moving)
         assert push.object.times[-1] > full.path.times[end]
         assert full.path.times[begin] - 0.21 < thin.times[-1] < full.path.times[end]
+
+
+@pytest.mark.parametrize("gap", [0.12, 0.2])
+def test_a_gap_of_a_fast_stream_that_goes_on_is_no_brake(recording, gap):
+    """The differences of neighbours are noise there."""
+    rng = np.random.default_rng(2)
+    times = 0.01 * np.arange(100)
+    found = 0
+    for _ in range(50):
+        places = np.column_stack([0.1 * times, 0.0 * times, 0.0 * times]) + 3e-4 * rng.standard_normal((100, 3))
+        kept = (times < 0.4) | (times >= 0.4 + gap)
+        turns = np.tile([1.0, 0.0, 0.0, 0.0], (int(kept.sum()), 1))
+        found += len(_brakes_hardly_seen(PoseStream(times=times[kept], positions=places[kept], quaternions=turns)))
+    assert found == 0
 
 
 def thinned(stream, every):

@@ -336,6 +336,14 @@ def test_a_hand_that_halts_before_it_withdraws_does(seed):
     assert off < 5.0 * STD
 
 
+def test_a_hand_that_is_no_polygon_of_speed_keeps_no_more_knots_than_others():
+    times = np.arange(0.0, 2.0, 0.01)
+    angles = 2.0 * np.pi * times
+    circle = 0.1 * np.column_stack([np.cos(angles), np.sin(angles)])
+    fit = fit_hand_path(times, circle + 2e-5 * np.random.default_rng(0).standard_normal(circle.shape), 2e-5)
+    assert len(fit.times) <= MOST_KNOTS + 4
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_a_hand_that_brakes_exponentially_is_fitted_in_the_end(seed):
     """Knots that settle elsewhere are worth less, and were put in and moved away again without end."""

@@ -76,6 +76,18 @@ def test_a_round_tip_beside_a_lying_cylinder_touches_it_nearer_to_its_axis(recor
     assert touching_radius(rolls, 2.0 * radius) + radius == pytest.approx(np.sqrt((radius + tip) ** 2 - off**2))
 
 
+def test_a_tip_high_on_a_wide_lying_cylinder_keeps_some_width(recording):
+    """Its axis is within the outline."""
+    high = with_pushes(
+        recording, lambda p: replace(p, hand=replace(p.hand, positions=p.hand.positions * [1, 1, 0] + [0, 0, 0.0616]))
+    )
+    rolls = replace(
+        high, hand=Hand(tip="sphere", radius=0.005, stream="measured"),
+        object=replace(recording.object, shape=Cylinder(radius=0.04, length=0.1, axis="y")),
+    )  # fmt: skip
+    assert touching_radius(rolls, 0.08) == pytest.approx(5e-4)
+
+
 def lifted(push, when):
     """The push with its hand 0.2 m higher where ``when`` of its times (n,) [s] says."""
     up = np.where(when(push.hand.times - push.hand.times[0]), 0.2, 0.0)
