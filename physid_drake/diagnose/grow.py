@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from physid_drake.diagnose.candidate import A_LAW, EXPLAINED, FAR_OFF, Candidate, push_scores, ranked, rejudged
-from physid_drake.diagnose.conclude import class_of
+from physid_drake.diagnose.classes import class_of
 from physid_drake.diagnose.confirm import (
     ANOTHER_BASIN,
     ENOUGH,

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from physid_drake.diagnose.candidate import Candidate
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.conclude import class_beside, conclude
+from physid_drake.diagnose.classes import class_beside
+from physid_drake.diagnose.conclude import conclude
 from physid_drake.diagnose.confirm import WORTH_A_TRY
 from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, confirmed, unexplained
 from physid_drake.diagnose.fit import Fitter

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from physid_drake.diagnose import conclude
+from physid_drake.diagnose import classes, conclude, ranking, verdict
 from physid_drake.diagnose.candidate import Candidate
 from physid_drake.diagnose.features import PushFeatures
 from physid_drake.diagnose.foils import Foil
@@ -67,7 +67,7 @@ def test_a_foil_that_does_better_takes_the_name_away_and_says_what_it_is():
     foil = Foil(statement="friction grows", instead_of="viscous_drag", gain=20.0)
     steps = ((tried("viscous_drag", 50.0, None),),)
     told = evidence(steps=steps, final=model_that_leaves(1.0), after=1.0, foil=foil)
-    assert not conclude._explained(told) and conclude._partly(told) is None
+    assert not verdict.is_explained(told) and conclude._partly(told) is None
     said = sentence("unexplained", (), None, foil)
     assert said.endswith("viscous_drag explains less than this would: friction grows.")
     assert "friction grows" in conclude._left(told, "unexplained", told.plain, None)
@@ -122,7 +122,7 @@ def test_what_only_each_push_for_itself_makes_up_for_is_said(verdict, rms, said)
     ],
 )
 def test_why_an_effect_that_was_fitted_is_not_what_is_missing(named, gain, why):
-    assert conclude._why("viscous_drag", tried("viscous_drag", gain, None), named, set(), evidence(after=4.0)) == why
+    assert ranking._why("viscous_drag", tried("viscous_drag", gain, None), named, set(), evidence(after=4.0)) == why
 
 
 def test_an_effect_that_was_taken_back_is_said_to_be():
@@ -130,14 +130,14 @@ def test_an_effect_that_was_taken_back_is_said_to_be():
     told = evidence(
         steps=((tried("magnet", 50.0, None),),), superfluous=((one, tried("tether", 9.0, None)),), after=1.0
     )
-    assert conclude._why("viscous_drag", one, {"magnet"}, set(), told).startswith("was taken back")
-    assert conclude._why("tether", told.superfluous[0][1], {"magnet"}, set(), told).startswith("predicts pushes")
+    assert ranking._why("viscous_drag", one, {"magnet"}, set(), told).startswith("was taken back")
+    assert ranking._why("tether", told.superfluous[0][1], {"magnet"}, set(), told).startswith("predicts pushes")
 
 
 def test_a_model_that_predicts_left_out_pushes_worse_explains_nothing(monkeypatch):
     worse = evidence(steps=((tried("magnet", 50.0, model_that_leaves(1.0)),),), after=12.0)
-    assert not conclude._explained(worse)
-    why = conclude._why("magnet", tried("magnet", 50.0, None), set(), set(), worse)
+    assert not verdict.is_explained(worse)
+    why = ranking._why("magnet", tried("magnet", 50.0, None), set(), set(), worse)
     assert why == "pushes that were left out are simulated hardly better with it"
     hidden = SimpleNamespace(reduced_chi2=1.2, state=SimpleNamespace(scatter=4.7))
     hides = "what a friction would hide that scatters by 12 % from push to push"
@@ -163,29 +163,29 @@ def test_an_effect_that_shows_in_no_simulated_push_is_neither_named_nor_a_mismat
     """A likelihood may rise by what an effect takes of the cell's own error; the fit does not visibly improve."""
     told = evidence(steps=((tried("friction_patch", 50.0, model_that_leaves(1.0)),),), after=after)
     told.loud = loud
-    monkeypatch.setattr(conclude, "mismatch", lambda plain, screening: 0.5 if screening is None else 1e-9)
-    assert conclude._predicts(told) is predicts
-    assert conclude._p_value(told) == (1e-9 if predicts else 0.5)
+    monkeypatch.setattr(verdict, "mismatch", lambda plain, screening: 0.5 if screening is None else 1e-9)
+    assert verdict.predicts(told) is predicts
+    assert verdict.p_value_of(told) == (1e-9 if predicts else 0.5)
 
 
 @pytest.mark.parametrize(("odd", "predicts"), [(1, True), (2, False)])
 def test_one_push_that_goes_another_way_does_not_speak_against_a_model(odd, predicts):
     told = evidence(steps=((tried("magnet", 50.0, model_that_leaves(1.0)),),), after=1.0)
     told.errors_after = errors(100.0)[:odd] + told.errors_after[odd:]
-    assert conclude._predicts(told) is predicts
+    assert verdict.predicts(told) is predicts
 
 
 @pytest.mark.parametrize(("others", "explained"), [(10.5, False), (9.5, False), (9.0, True), (7.0, True)])
 def test_a_model_with_which_one_push_alone_comes_nearer_is_no_answer(monkeypatch, others, explained):
     """The mismatch stands; a little nearer will do where all pushes come nearer."""
-    monkeypatch.setattr(conclude, "unexplained", lambda plain, final: False)
+    monkeypatch.setattr(verdict, "unexplained", lambda plain, final: False)
     told = evidence(steps=((tried("friction_patch", 50.0, model_that_leaves(1.0)),),), after=others)
     told.case.noise.known = True
     told.errors_before = errors(40.0)[:1] + told.errors_before[1:]
     told.errors_after = errors(4.0)[:1] + told.errors_after[1:]
-    assert conclude._predicts(told)
-    assert conclude._explained(told) is explained
-    why = conclude._why("friction_patch", told.steps[0][0], set(), set(), told)
+    assert verdict.predicts(told)
+    assert verdict.is_explained(told) is explained
+    why = ranking._why("friction_patch", told.steps[0][0], set(), set(), told)
     assert why.startswith("one push that was left out") is not explained
 
 
@@ -197,7 +197,7 @@ def test_an_order_of_many_pushes_is_not_the_work_of_one(in_order, several):
     told = evidence(steps=tuple((tried("friction_drift", 50.0, None, one),) for one in in_order))
     told.errors_before = errors(40.0)[:1] + errors(10.0)[1:]
     told.errors_after = errors(4.0)[:1] + errors(10.5)[1:]
-    assert conclude._by_several(told) is several
+    assert verdict.by_several(told) is several
 
 
 @pytest.mark.parametrize(
@@ -212,19 +212,19 @@ def test_what_one_push_speaks_for_loudly_is_no_name_and_yet_in_the_class(loudest
     gains[0] = loudest
     other = dc.replace(other, gains=gains)
     assert found.accepted and not other.accepted
-    assert conclude.class_of(evidence().plain, (found, other)) == alike
+    assert classes.class_of(evidence().plain, (found, other)) == alike
 
 
 def test_what_the_model_has_beside_an_effect_is_no_rival_of_it(monkeypatch):
     gains = {"size_error": 50.0, "stribeck_friction": 49.0, "viscous_drag": 49.0}
     size, stribeck, drag = (tried(name, gain, model_that_leaves(1.0)) for name, gain in gains.items())
-    monkeypatch.setattr(conclude, "class_of", lambda plain, step: tuple(c.name for c in step[1:]))
+    monkeypatch.setattr(classes, "class_of", lambda plain, step: tuple(c.name for c in step[1:]))
     alone = evidence(steps=((size, stribeck, drag),))
     both = evidence(steps=((size, stribeck, drag), (stribeck,)))
-    assert conclude.class_beside(alone, 0) == ("stribeck_friction", "viscous_drag")
-    assert conclude.class_beside(both, 0) == ("viscous_drag",)
-    monkeypatch.setattr(conclude, "out_of_question", lambda best, other: False)
-    three, two = (conclude._probability(e.steps[0], conclude._others(e, 0)) for e in (alone, both))
+    assert classes.class_beside(alone, 0) == ("stribeck_friction", "viscous_drag")
+    assert classes.class_beside(both, 0) == ("viscous_drag",)
+    monkeypatch.setattr(classes, "out_of_question", lambda best, other: False)
+    three, two = (classes.probability_of(e.steps[0], classes.others_than(e, 0)) for e in (alone, both))
     assert three < two < 1.0
 
 
@@ -234,11 +234,11 @@ def test_what_the_model_has_beside_an_effect_is_no_rival_of_it(monkeypatch):
     ids=["as near as simulators are", "further off", "noise that hides it"],
 )
 def test_what_a_simulation_without_noise_differs_by_is_no_physics(monkeypatch, noise, times, want):
-    monkeypatch.setattr(conclude, "mismatch", lambda plain, screening: 1e-9)
+    monkeypatch.setattr(verdict, "mismatch", lambda plain, screening: 1e-9)
     clean = evidence()
     clean.case.noise = SimpleNamespace(position=noise)
     clean.errors_before, clean.loud = errors(times), None  # times 1 mm and 10 mrad
-    assert conclude._p_value(clean) == want
+    assert verdict.p_value_of(clean) == want
 
 
 @pytest.mark.parametrize(
@@ -256,7 +256,7 @@ def test_pushes_that_would_not_show_most_effects_show_nothing(sigmas, unfelt, bl
     detectable = [SimpleNamespace(name=f"shown_{i}", sigmas=s) for i, s in enumerate(sigmas)]
     names = [*(d.name for d in detectable), *(f"unfelt_{i}" for i in range(unfelt))]
     told = SimpleNamespace(signatures=[SimpleNamespace(kind=SimpleNamespace(name=name)) for name in names])
-    assert conclude._blind(told, detectable) is blind
+    assert verdict._blind(told, detectable) is blind
 
 
 def test_pushes_that_the_model_cannot_simulate_are_said():
