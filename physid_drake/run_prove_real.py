@@ -12,7 +12,8 @@ import numpy as np
 
 from physid_drake.cell import Outcome
 from physid_drake.errors import ConfigError, OutputError, ParameterError, PhysidError
-from physid_drake.identify.problem import PushProblem, noise_of, problems_of
+from physid_drake.identify.noise import noise_of
+from physid_drake.identify.problem import PushProblem, problems_of
 from physid_drake.model import ModelCell
 from physid_drake.model_reading import load_model
 from physid_drake.prove.diagnosing import RESULT, Task, diagnose_command

@@ -19,8 +19,9 @@ from physid_drake.identify.config import ThetaConfig
 from physid_drake.identify.doubts import doubts
 from physid_drake.identify.force_windows import WINDOW
 from physid_drake.identify.frames import unseen_motion
+from physid_drake.identify.noise import Noise
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
-from physid_drake.identify.problem import Noise, PushProblem, problems_of, spec_of
+from physid_drake.identify.problem import PushProblem, problems_of, spec_of
 from physid_drake.identify.rollouts import RolloutPool
 from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.recording import Recording, thinned

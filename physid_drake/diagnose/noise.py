@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.identify.problem import Noise, finest_position, finest_rotation, noise_of
+from physid_drake.identify.noise import Noise, finest_position, finest_rotation, noise_of
 from physid_drake.recording import Push, Recording, rest_segments
 from physid_drake.recording.rest_noise import SeenNoise, apart, seen_noise, usual_interval
 

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.identify.misfit import Whitener, difference, diverged, whitened_residual
+from physid_drake.identify.noise import Noise
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
 from physid_drake.identify.own_columns import own_columns, own_tasks
 from physid_drake.identify.polish import THETA_STEP, prior_rows, rescaled
-from physid_drake.identify.problem import Noise, PushProblem
+from physid_drake.identify.problem import PushProblem
 from physid_drake.identify.rollouts import RolloutPool
 from physid_drake.space import ParameterSpace
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from physid_drake.identify.noise import Noise
 from physid_drake.identify.nuisance import MODEL_ERROR
-from physid_drake.identify.problem import Noise, PushProblem
+from physid_drake.identify.problem import PushProblem
 from physid_drake.identify.rollouts import Prediction
 
 Array = NDArray[np.float64]

@@ -17,6 +17,7 @@ from physid_drake.identify.frames import checks_of
 from physid_drake.identify.identify import Accuracy, Identification, accuracy_of, estimates_of, pooled
 from physid_drake.identify.linearise import PushTerm, linearised, prior_slope
 from physid_drake.identify.misfit import whitened_residual
+from physid_drake.identify.noise import Noise, noise_of
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
 from physid_drake.identify.polish import (
     SCATTER_PUSHES,
@@ -26,7 +27,7 @@ from physid_drake.identify.polish import (
     prior_rows,
     scatter_of,
 )
-from physid_drake.identify.problem import Noise, PushProblem, noise_of, problems_of, spec_of
+from physid_drake.identify.problem import PushProblem, problems_of, spec_of
 from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.progress import Progress

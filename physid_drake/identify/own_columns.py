@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.identify.misfit import difference, model_error_columns
+from physid_drake.identify.noise import Noise
 from physid_drake.identify.nuisance import Nuisance
-from physid_drake.identify.problem import Noise, PushProblem
+from physid_drake.identify.problem import PushProblem
 from physid_drake.identify.rollouts import Task
 
 Array = NDArray[np.float64]

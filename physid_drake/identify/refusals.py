@@ -9,7 +9,7 @@ from physid_drake.cell.solid import solid_of
 from physid_drake.errors import RecordingError
 from physid_drake.identify.frames import checks_of, push_checks_of
 from physid_drake.identify.hand_stream import beside_object
-from physid_drake.identify.problem import noise_of
+from physid_drake.identify.noise import noise_of
 from physid_drake.recording import Recording
 
 

@@ -13,8 +13,9 @@ from physid_drake.cell import Start
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
 from physid_drake.identify.linearise import linearised, prior_slope
+from physid_drake.identify.noise import Noise
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
-from physid_drake.identify.problem import Noise, PushProblem
+from physid_drake.identify.problem import PushProblem
 from physid_drake.identify.rollouts import RolloutPool, Task
 from physid_drake.policies import PlannedPush
 from physid_drake.policies.planned_push import LEAD

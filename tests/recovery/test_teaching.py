@@ -11,7 +11,7 @@ from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
 from physid_drake.identify import OnlineIdentifier, SearchConfig, ThetaConfig
 from physid_drake.identify.linearise import prior_slope
-from physid_drake.identify.problem import noise_of
+from physid_drake.identify.noise import noise_of
 from physid_drake.plan import most_informative_push
 from physid_drake.policies import PlannedPush
 

@@ -9,7 +9,7 @@ from runs import shipped_pushes
 from scipy.signal import lfilter
 
 from physid_drake.cell import HandPath
-from physid_drake.identify.problem import noise_of
+from physid_drake.identify.noise import noise_of
 from physid_drake.recording import PoseStream, Sensors
 
 STD, INTERVAL = 3e-4, 0.01  # m, s

@@ -7,8 +7,9 @@ import pytest
 from runs import shipped_pushes
 
 from physid_drake.cell import HandPath
+from physid_drake.identify.noise import noise_of
 from physid_drake.identify.nuisance import apply_nuisance, nuisance_of
-from physid_drake.identify.problem import noise_of, problems_of
+from physid_drake.identify.problem import problems_of
 
 
 @pytest.fixture(scope="module")

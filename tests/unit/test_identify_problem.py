@@ -8,7 +8,8 @@ from problems import QUIET, ends, first, with_pushes
 from runs import shipped_pushes
 
 from physid_drake.errors import RecordingError
-from physid_drake.identify.problem import noise_of, problems_of, spec_of
+from physid_drake.identify.noise import noise_of
+from physid_drake.identify.problem import problems_of, spec_of
 from physid_drake.recording import (
     Cylinder,
     Hand,
