@@ -6,7 +6,7 @@ import dataclasses as dc
 import math
 from collections.abc import Sequence
 
-from physid_drake.cell.forces import ForceLaw, FrictionLaw, Frictions, Swinging, Wrench, total_wrenches
+from physid_drake.cell.forces import ForceLaw, FrictionLaw, Frictions, Wrench, swings, total_wrenches
 from physid_drake.cell.object_state import SLOWEST, ObjectState
 from physid_drake.cell.plant_state import PlantState
 
@@ -41,7 +41,7 @@ class AppliedLaws:
         reach = math.sqrt(seen.inertia / seen.mass)
         wrenches = [law.wrench(seen) for law in self._laws]
         pull = sum(math.hypot(w.fx, w.fy) + abs(w.torque) / reach for w in wrenches)
-        pull += sum(law.strongest() for law in self._laws if isinstance(law, Swinging))
+        pull += sum(law.strongest() for law in self._laws if swings(law))
         return pull < SURELY_HELD * self._friction_at_a_creep(seen, wrenches)
 
     def _friction_at_a_creep(self, seen: ObjectState, wrenches: Sequence[Wrench]) -> float:

@@ -11,7 +11,8 @@ import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from functools import cache
+from typing import Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 
@@ -61,6 +62,21 @@ class Braking(Protocol):
         ...
 
 
+def brakes(law: ForceLaw) -> TypeGuard[Braking]:
+    """Whether a law is ``Braking``; it is asked in every tick, and looking a protocol up is slow."""
+    return _has(type(law), Braking)
+
+
+def swings(law: ForceLaw) -> TypeGuard[Swinging]:
+    """Whether a law is ``Swinging``, likewise."""
+    return _has(type(law), Swinging)
+
+
+@cache
+def _has(kind: type, protocol: type) -> bool:
+    return issubclass(kind, protocol)
+
+
 class FrictionLaw(Protocol):
     """A friction that is not one Coulomb coefficient per cell.
 
@@ -106,8 +122,7 @@ class Frictions:
 
 def total_wrenches(state: ObjectState, laws: Sequence[ForceLaw], frictions: Sequence[FrictionLaw]) -> list[Wrench]:
     """What all laws do at a state; those of friction, and turning slip, give back what the contact has too much."""
-    brakes = [law for law in laws if isinstance(law, Braking)]
-    wrenches = [law.wrench(state) for law in laws if not isinstance(law, Braking)]
+    wrenches = [law.wrench(state) for law in laws if not brakes(law)]
     ratio = None
     if frictions:
         together = Frictions(tuple(frictions))
@@ -115,8 +130,9 @@ def total_wrenches(state: ObjectState, laws: Sequence[ForceLaw], frictions: Sequ
         wrenches.append(friction_wrench(state, together.largest - ratio))
     if state.turning:
         wrenches.append(_turning_wrench(state, ratio))
-    for law in brakes:
-        wrenches.append(law.brake(state, wrenches))
+    for law in laws:
+        if brakes(law):
+            wrenches.append(law.brake(state, wrenches))
     return wrenches
 
 
