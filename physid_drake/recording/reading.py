@@ -114,7 +114,7 @@ def _read_push(file: Path, name: str, note: str, *, with_hand: bool) -> Push:
     if with_hand and hand is None:
         raise RecordingError(
             f"{file}: column {HAND_POSITION[0]}: recording.yaml describes a hand, but no row has its "
-            "position; fill it, or remove the hand."
+            "position; fill it, or remove this push's file, or the hand from recording.yaml."
         )
     force = _force_stream(table, warnings) if with_hand and table.has(FORCE) else None
     try:
