@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses as dc
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_ta
 from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.scene_page import scene_page
-from physid_drake.report.stage import ShownMotion, Stage
+from physid_drake.report.stage import LONGEST, ShownMotion, Stage
 from physid_drake.report.terminal import terminal
 from physid_drake.resources import shipped
 from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text, versions
@@ -171,5 +172,7 @@ def staged(diagnosis: Diagnosis, evidence: Evidence, meshcat: Meshcat | None = N
 
 
 def unit_force_of(evidence: Evidence) -> float:
-    """The force whose arrow has unit length [N]: a tenth of the friction."""
-    return 0.1 * evidence.case.around.friction * evidence.case.around.weight
+    """The force whose arrow has unit length [N]: a tenth of the friction, more where more is surely missing."""
+    around, sure = evidence.case.around, [w for w in evidence.wrenches if w.stands_out]
+    strongest = max((math.hypot(*w.wrench[:2]) for w in sure), default=0.0)
+    return max(0.1 * around.friction * around.weight, strongest / LONGEST)

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.recording import read_recording
 from physid_drake.report.stage import Stage
 from physid_drake.resources import shipped
+from physid_drake.run_diagnose import unit_force_of
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +32,14 @@ def test_every_missing_wrench_is_an_arrow(stage):
     assert all(stage.meshcat.HasPath(path) for path in paths)
     stage.show_missing([missing(0.2, 0.0, 0.01)], unit_force=0.1)
     assert stage.meshcat.HasPath(paths[0]) and not stage.meshcat.HasPath(paths[2])
+
+
+@pytest.mark.parametrize(("forces", "unit"), [((0.2,), 0.1), ((0.2, 6.0), 2.0), ((), 0.1)])
+def test_the_largest_force_that_is_surely_missing_sets_the_length_of_arrows(forces, unit):
+    wrenches = [*(missing(force, 0.0, 0.01) for force in forces), missing(30.0, 0.0, 50.0)]
+    around = SimpleNamespace(friction=0.25, weight=4.0)
+    evidence = SimpleNamespace(case=SimpleNamespace(around=around), wrenches=wrenches)
+    assert unit_force_of(evidence) == pytest.approx(unit)
 
 
 def test_a_wrench_stands_out_beyond_two_standard_deviations():
