@@ -24,7 +24,7 @@ from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_ta
 from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.scene_page import scene_page
-from physid_drake.report.stage import LONGEST, ShownMotion, Stage
+from physid_drake.report.stage import MOST_ARROW, ShownMotion, Stage
 from physid_drake.report.terminal import terminal
 from physid_drake.resources import shipped
 from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text, versions
@@ -35,7 +35,7 @@ FILES = ("diagnosis.json", "page.html", "scene.html", "model.yaml")
 SHOWN = 12  # pushes in the animation
 MOST_NOTES = 8  # on the terminal
 ALPHA = 0.01  # false-alarm rate
-LONGEST_STEP = 0.05  # s
+MOST_ARROW_STEP = 0.05  # s
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -49,8 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"--alpha must be between 0 and 1, but is {arguments.alpha:g}.")
     if arguments.seed < 0:
         raise ConfigError(f"--seed must be at least 0, but is {arguments.seed}.")
-    if arguments.time_step is not None and not 0.0 < arguments.time_step <= LONGEST_STEP:
-        raise ConfigError(f"--time-step must be in (0, {LONGEST_STEP}] s, but is {arguments.time_step:g}.")
+    if arguments.time_step is not None and not 0.0 < arguments.time_step <= MOST_ARROW_STEP:
+        raise ConfigError(f"--time-step must be in (0, {MOST_ARROW_STEP}] s, but is {arguments.time_step:g}.")
     if arguments.pushes < 1:
         raise ConfigError(f"--pushes must be at least 1, but is {arguments.pushes}.")
     if arguments.jobs < 0:
@@ -175,4 +175,4 @@ def unit_force_of(evidence: Evidence) -> float:
     """The force whose arrow has unit length [N]: a tenth of the friction, more where more is surely missing."""
     around, sure = evidence.case.around, [w for w in evidence.wrenches if w.stands_out]
     strongest = max((math.hypot(*w.wrench[:2]) for w in sure), default=0.0)
-    return max(0.1 * around.friction * around.weight, strongest / LONGEST)
+    return max(0.1 * around.friction * around.weight, strongest / MOST_ARROW)

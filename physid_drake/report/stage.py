@@ -39,7 +39,7 @@ SIMULATED = np.array([0.20, 0.45, 0.80, 1.0])
 MISSING = (0.80, 0.10, 0.20)
 NOTHING = (0.45, 0.48, 0.55)  # what is within two standard deviations of it
 ARROW = 0.05  # m
-SHORTEST, LONGEST = 0.1, 3.0  # arrows, in that length
+LEAST_ARROW, MOST_ARROW = 0.1, 3.0  # in that length
 FAINT = 0.25
 FRAMES_PER_SECOND = 32.0
 PAUSE = 0.4  # s between two pushes
@@ -160,7 +160,7 @@ class Stage:
         for count, wrench in enumerate(wrenches):
             force = np.hypot(*wrench.wrench[:2])
             heading = wrench.heading + float(np.arctan2(wrench.wrench[1], wrench.wrench[0]))
-            length = ARROW * float(np.clip(force / unit_force, SHORTEST, LONGEST))
+            length = ARROW * float(np.clip(force / unit_force, LEAST_ARROW, MOST_ARROW))
             colour = Rgba(*MISSING, 1.0) if wrench.stands_out else Rgba(*NOTHING, FAINT)
             self._arrow(f"missing/{count}", np.array([*wrench.place, height]), heading, length, colour)
 
