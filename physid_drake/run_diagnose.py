@@ -35,7 +35,7 @@ FILES = ("diagnosis.json", "page.html", "scene.html", "model.yaml")
 SHOWN = 12  # pushes in the animation
 MOST_NOTES = 8  # on the terminal
 ALPHA = 0.01  # false-alarm rate
-MOST_ARROW_STEP = 0.05  # s
+LONGEST_STEP = 0.05  # s
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -49,8 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"--alpha must be between 0 and 1, but is {arguments.alpha:g}.")
     if arguments.seed < 0:
         raise ConfigError(f"--seed must be at least 0, but is {arguments.seed}.")
-    if arguments.time_step is not None and not 0.0 < arguments.time_step <= MOST_ARROW_STEP:
-        raise ConfigError(f"--time-step must be in (0, {MOST_ARROW_STEP}] s, but is {arguments.time_step:g}.")
+    if arguments.time_step is not None and not 0.0 < arguments.time_step <= LONGEST_STEP:
+        raise ConfigError(f"--time-step must be in (0, {LONGEST_STEP}] s, but is {arguments.time_step:g}.")
     if arguments.pushes < 1:
         raise ConfigError(f"--pushes must be at least 1, but is {arguments.pushes}.")
     if arguments.jobs < 0:
