@@ -1,14 +1,16 @@
 """Finds where a tracked stream lost track, jumped, stalled or paused; leaves out only what cannot be a pose.
 
 Left out: rows whose place is all zeros (a tracker's way of saying "lost"), samples that leap away and come straight
-back, and the repeats of a tracker that is slower than the log. Kept and reported: gaps, stalls that the
-tracker caught up from, lone leaps that stay.
+back, the repeats of a tracker that is slower than the log, and what lies beyond a leap of the object that nothing on
+a table does. Kept and reported: gaps, stalls that the tracker caught up from, other leaps that stay.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -43,6 +45,18 @@ LONGEST_LEAP: Final = 0.1
 
 SHORTEST_SCREENED: Final = 25
 """Streams shorter than this have too few steps to tell a leap from motion."""
+
+MOST_BRAKE: Final = 20.0
+"""Deceleration [m/s^2] that a table has for no object: twice that of a friction of 1."""
+
+LEAST_SWAP: Final = 5e-3
+"""A leap of the object that stays and is shorter [m] may be its tracker's noise."""
+
+MOVES: Final = 1e-3
+"""An object that comes less far than this [m] before such a leap, or after it, has not been pushed there."""
+
+NOTABLE_TURN: Final = 5.0
+"""Degrees of a leap that are said."""
 
 _ARM: Final = 0.05
 _SMALLEST_LEAP: Final = 1e-5
@@ -115,19 +129,24 @@ def screen_poses(
     keep = np.zeros(len(lost), dtype=np.bool_)
     keep[tracked] = True
     for first, last in leaps:
-        distance = np.linalg.norm(positions[first] - positions[first - 1])
         there = describe_rows([rows[k] for k in tracked[first : last + 1].tolist()])
-        warnings.append(f"{what}: {there}: jumps {distance:.3g} m away and comes straight back, left out.")
+        far = _how_far(positions, quaternions, first - 1)
+        warnings.append(f"{what}: {there}: jumps {far} away and comes straight back, left out.")
         keep[tracked[first : last + 1]] = False
     stalls = _find_stalls(positions, quaternions)
     for first, last in stalls:
         span = f"rows {rows[tracked[first]]}-{rows[tracked[last]]}"
         warnings.append(f"{what}: {span}: stalls (same pose {last - first + 1} times, then catches up), kept.")
     ends = {last for _, last in stalls}
+    lone = [k for k in lone if k not in ends]
+    swaps = _find_swaps(times, positions, quaternions, lone) if what == "object" else []
+    part = _part_that_moves(positions, quaternions, swaps)
+    keep[tracked[: part.start]] = keep[tracked[part.stop :]] = False
     for k in lone:
-        if k not in ends:
-            distance = np.linalg.norm(positions[k + 1] - positions[k])
-            warnings.append(f"{what}: row {rows[tracked[k + 1]]}: jumps {distance:.3g} m and stays there, kept.")
+        far = _how_far(positions, quaternions, k)
+        left = "what comes before is left out" if k < part.start else "what comes after is left out"
+        fate = f"; {left}" if k in swaps else ", kept"
+        warnings.append(f"{what}: row {rows[tracked[k + 1]]}: jumps {far} and stays there{fate}.")
     warnings.extend(gap_warnings(times, [rows[k] for k in tracked.tolist()], what))
     return Screened(keep=keep, warnings=tuple(warnings))
 
@@ -146,6 +165,14 @@ def _distances(positions: Array, quaternions: Array, first: slice, second: slice
     # arccos loses half the digits near 1: an angle below 1e-6 is rounding.
     distances: Array = travel + _ARM * np.where(angle > 1e-6, angle, 0.0)
     return distances
+
+
+def _how_far(positions: Array, quaternions: Array, k: int) -> str:
+    """The leap after sample k in words."""
+    distance = np.linalg.norm(positions[k + 1] - positions[k])
+    cosine = min(1.0, abs(float(quaternions[k + 1] @ quaternions[k])))
+    angle = math.degrees(2.0 * math.acos(cosine))
+    return f"{distance:.3g} m" + (f" and {angle:.0f} degrees" if angle > NOTABLE_TURN else "")
 
 
 def _find_leaps(times: Array, positions: Array, quaternions: Array) -> tuple[list[tuple[int, int]], list[int]]:
@@ -178,6 +205,28 @@ def _find_leaps(times: Array, positions: Array, quaternions: Array) -> tuple[lis
         if k not in beside and steps[k] > 2.0 * max(floor, LEAP_FACTOR * max(steps[k - 1], steps[k + 1]))
     ]
     return leaps, lone
+
+
+def _find_swaps(times: Array, positions: Array, quaternions: Array, lone: Sequence[int]) -> list[int]:
+    """Of leaps that stay, by the sample before, those that no object makes: the tracker took up something else.
+
+    What leaps within one step of the stream, and hardly moves in the next, has been stopped within it.
+    """
+    far = _distances(positions, quaternions, slice(None, -1), slice(1, None))
+    return [k for k in lone if far[k] > max(LEAST_SWAP, MOST_BRAKE * float(times[k + 1] - times[k]) ** 2)]
+
+
+def _part_that_moves(positions: Array, quaternions: Array, swaps: Sequence[int]) -> slice:
+    """Of the parts between swaps, the first in which the object is pushed; the longest where it never is."""
+    edges = [0, *(k + 1 for k in swaps), len(positions)]
+    parts = [slice(first, last) for first, last in pairwise(edges)]
+    for part in parts if swaps else ():
+        ends = slice(part.start, part.start + 1), slice(part.stop - 1, part.stop)
+        steps = _distances(positions[part], quaternions[part], slice(None, -1), slice(1, None))
+        noise = 2.0 * float(np.median(steps)) if len(steps) else 0.0
+        if float(_distances(positions, quaternions, *ends)[0]) > max(MOVES, noise):
+            return part
+    return max(parts, key=lambda part: part.stop - part.start)
 
 
 def _find_repeats(positions: Array, quaternions: Array) -> Flags:
