@@ -352,7 +352,7 @@ def test_rounded_poses_are_not_taken_for_those_of_a_slow_tracker(written, step):
 def test_what_a_tracker_does_wrong_is_named_by_row(written, change, expected, left, noise):
     push = read_recording(written(rows=long_table(change, noise=noise))).pushes[0]
     warnings = [w for w in push.warnings if w.startswith("object")]
-    assert warnings[0].startswith(expected[:28])
+    assert warnings[0].startswith(expected[:22])
     if noise == 0.0:
         assert warnings[0].startswith(expected)
     assert len(push.object) == left
