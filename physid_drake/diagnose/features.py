@@ -122,9 +122,9 @@ def _averaging(push: Push, problem: PushProblem) -> Array:
     n = len(times)
     rests = rest_segments(push) if not push.endpoint_only else []
     first = rests[0].stop - 1 if rests and rests[0].start == 0 and problem.path is not None else 0
-    offset = len(push.object) - n  # samples that are not compared
-    ends = len(push.object)
-    last = rests[-1].start if rests and rests[-1].stop >= ends and rests[-1].start > first else ends
+    offset = int(np.searchsorted(push.object.times, times[0]))  # the first sample that is compared
+    ends = offset + n
+    last = rests[-1].start if rests and rests[-1].stop >= ends > rests[-1].start > first else ends
     first, last = max(0, first - offset), max(1, last - offset)
     if n < 4 or last - first < 4:
         rows = [np.arange(n)[k:] for k in (max(first, 0) if n > first else n - 1,)]

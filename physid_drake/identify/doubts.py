@@ -97,15 +97,25 @@ def _lean_changes(push: Push) -> float:
 
 
 def _beside_the_tip(recording: Recording) -> tuple[str, ...]:
-    """A tip that is not at the face of the objects that it sets moving, by as much in most pushes."""
+    """A tip that is not at the face of the objects that it sets moving, by as much in most pushes.
+
+    Of a frame that is off its place, it is inside from one side and away from the other.
+    """
     depths = np.array(depths_at_touch(recording))
     if recording.hand is not None:
         wide = touching_radius(recording, solid_of(recording.object.shape).height)
         depths -= recording.hand.radius - wide
-    if not len(depths) or abs(float(np.median(depths))) <= BESIDE:
+    if not len(depths) or float(np.median(np.abs(depths))) <= BESIDE:
         return ()
-    where = "inside the object" if np.median(depths) > 0.0 else "away from the object"
+    middle, usual = float(np.median(depths)), float(np.median(np.abs(depths)))
+    if abs(middle) <= BESIDE:
+        return (
+            f"as objects begin to move, the hand's tip is {1e3 * usual:.0f} mm inside some and away from others"
+            " (median); the object's frame is turned or off its place in it, or its size along x or y is not what is"
+            " said",
+        )
+    where = "inside the object" if middle > 0.0 else "away from the object"
     return (
-        f"as objects begin to move, the hand's tip is {1e3 * abs(float(np.median(depths))):.0f} mm {where} (median);"
+        f"as objects begin to move, the hand's tip is {1e3 * abs(middle):.0f} mm {where} (median);"
         " its radius, the object's size or a frame is not what is said, or it lags or gives way",
     )

@@ -52,7 +52,8 @@ def check_polygon(polygon: Sequence[Sequence[float]]) -> None:
     if float(np.hypot(*centroid)) > CENTROID_TOLERANCE:
         raise RecordingError(
             f"polygon_m must have its centroid at the origin of B within {CENTROID_TOLERANCE} m, but it is "
-            f"at [{centroid[0]:.6f}, {centroid[1]:.6f}] m; subtract that from every vertex."
+            f"at [{centroid[0]:.6f}, {centroid[1]:.6f}] m; subtract that from every vertex, "
+            "and move the recorded poses there: add it, turned by each pose, to each position."
         )
 
 

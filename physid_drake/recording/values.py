@@ -17,6 +17,7 @@ import numpy.typing as npt
 from physid_drake.errors import RecordingError
 from physid_drake.recording.checks import check_choice, check_not_negative, check_positive, check_times, frozen
 from physid_drake.recording.outlines import check_polygon
+from physid_drake.recording.turns import unwrapped
 
 Array: TypeAlias = npt.NDArray[np.float64]
 TipShape = Literal["cylinder", "sphere", "capsule", "reflex_sf"]
@@ -84,8 +85,8 @@ class PoseStream:
         Yaw is the heading of the object's y axis, which a cylinder that rolls about it keeps.
         """
         w, x, y, z = self.quaternions.T
-        yaw = np.unwrap(np.arctan2(2.0 * (w * z - x * y), 1.0 - 2.0 * (x * x + z * z)))
-        return np.column_stack([self.positions[:, :2], yaw])
+        yaw = np.arctan2(2.0 * (w * z - x * y), 1.0 - 2.0 * (x * x + z * z))
+        return np.column_stack([self.positions[:, :2], unwrapped(self.times, yaw)])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -9,7 +9,7 @@ from runs import shipped_pushes
 from physid_drake.cell import CellConfig
 from physid_drake.cell.hand_path import HandPath
 from physid_drake.diagnose import case_of
-from physid_drake.diagnose.features import FORCE_MEMORY, PushFeatures, _averaging, _way
+from physid_drake.diagnose.features import FORCE_MEMORY, WINDOWS, PushFeatures, _averaging, _way
 from physid_drake.diagnose.noise import ForceNoise
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.recording import PoseStream, Push
@@ -64,6 +64,20 @@ def test_the_last_sample_of_a_stream_that_ends_in_motion_counts(count, left_out)
     np.testing.assert_allclose(averaging.sum(axis=1), 1.0)
     assert (averaging[:, -1] > 0.0).sum() == 1
     assert (averaging > 0.0).any(axis=0).all()
+
+
+def test_windows_of_a_push_that_is_not_compared_to_its_end_lie_in_its_motion():
+    times = 0.01 * np.arange(160)
+    way = 0.2 * np.clip(times - 0.4, 0.0, 0.8)
+    stream = PoseStream(
+        times=times, positions=np.column_stack([way, 0.0 * way, 0.0 * way]), quaternions=np.eye(4)[[0] * 160]
+    )
+    push = Push(name="cut", object=stream, hand=stream, force=None)
+    averaging = _averaging(push, SimpleNamespace(times=times[39:80], path=object()))
+    whole = _averaging(push, SimpleNamespace(times=times[39:], path=object()))
+    assert len(averaging) == WINDOWS and len(whole) == WINDOWS + 1
+    assert (averaging > 0.0).sum(axis=1) == pytest.approx(np.full(WINDOWS, 41 / WINDOWS), abs=1.0)
+    assert (whole[-1, -20:] > 0.0).all() and not whole[-1, :80].any()
 
 
 @pytest.fixture(scope="module")

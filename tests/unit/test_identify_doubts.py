@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from problems import QUIET
 from runs import shipped_pushes
+from scipy.spatial.transform import Rotation
 
 from physid_drake.errors import RecordingError
 from physid_drake.identify.doubts import doubts
@@ -56,6 +57,22 @@ def test_a_tip_that_is_not_where_it_touches_is_doubted(recording, radius, said):
     hand = replace(recording.hand, radius=radius * recording.hand.radius)
     (doubt,) = doubts(replace(recording, hand=hand))
     assert said in doubt and any(depth in doubt for depth in ("9 mm", "10 mm"))
+
+
+@pytest.mark.parametrize(("offset", "said"), [(0.02, "the object's frame is turned or off its place"), (2e-3, None)])
+def test_a_frame_that_is_off_its_place_in_the_object_is_doubted(offset, said):
+    """Pushes from both sides: the tip is inside from one, and away from the other."""
+    both = shipped_pushes(12)
+    across = np.array([0.0, offset, 0.0])
+
+    def moved(stream):
+        return replace(
+            stream,
+            positions=stream.positions + Rotation.from_quat(stream.quaternions, scalar_first=True).apply(across),
+        )
+
+    found = [doubt for doubt in doubts(with_objects(both, moved)) if "hand's tip" in doubt]
+    assert found == [] if said is None else said in found[0]
 
 
 def test_a_tip_that_hits_an_object_and_stays_behind_is_where_it_touched(recording):
