@@ -41,8 +41,10 @@ class Stages:
         """``RolloutPool.run`` that counts for the stage under way."""
 
         def counted(pool, tasks, tick=None):
-            self.rollouts[self._stage] += len(tasks)
-            return run(pool, tasks, tick)
+            before = len(pool.kept)
+            made = run(pool, tasks, tick)
+            self.rollouts[self._stage] += len(pool.kept) - before
+            return made
 
         return counted
 

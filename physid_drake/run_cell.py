@@ -14,10 +14,10 @@ from pydrake.systems.framework import DiagramBuilder
 from rich.console import Console
 
 from physid_drake.diagnose import Diagnosis, case_of, model_of
-from physid_drake.diagnose.memory import Memory
 from physid_drake.errors import ConfigError, PhysidError
 from physid_drake.identify import Identification, Identifier, OnlineIdentifier
 from physid_drake.identify.doubts import doubts
+from physid_drake.identify.kept_rollouts import KeptRollouts
 from physid_drake.identify.nuisance import nuisance_of
 from physid_drake.identify.problem import HandUse
 from physid_drake.identify.rollouts import Task, simulate
@@ -173,8 +173,8 @@ def _diagnose(
     """Say what physics is missing, and keep the model with it."""
     console.print("\nDiagnosing: what these pushes say beyond the plain cell")
     case = case_of(recording, scenario.cell, scenario.theta, jobs=scenario.search.jobs)
-    memory = Memory(folder.path / STATE)
-    diagnosis, evidence = run_case(case, console, seed=scenario.seed, alpha=ALPHA, memory=memory)
+    kept = KeptRollouts(folder.path / STATE)
+    diagnosis, evidence = run_case(case, console, seed=scenario.seed, alpha=ALPHA, kept=kept)
     write(folder, diagnosis, evidence, page=DIAGNOSIS_PAGE)
     show(console, diagnosis)
     console.print(f"written: diagnosis.json, diagnosis.html, scene.html and model.yaml in {folder.path}")

@@ -14,10 +14,10 @@ from rich.text import Text
 
 from physid_drake.diagnose import Case, Diagnosis, Evidence, case_of, cell_config, diagnose, model_of
 from physid_drake.diagnose.leaving import fit_that_leaves
-from physid_drake.diagnose.memory import Memory
 from physid_drake.effects import effect_named
 from physid_drake.errors import ConfigError
 from physid_drake.identify.config import ThetaConfig
+from physid_drake.identify.kept_rollouts import KeptRollouts
 from physid_drake.identify.rollouts import simulate
 from physid_drake.recording import digest_of, read_recording
 from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
@@ -30,7 +30,7 @@ from physid_drake.resources import shipped
 from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text, versions
 
 COMMAND = "diagnose"
-STATE = "stages.npz"
+STATE = "rollouts.bin"
 FILES = ("diagnosis.json", "page.html", "scene.html", "model.yaml")
 SHOWN = 12  # pushes in the animation
 MOST_NOTES = 8  # on the terminal
@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     Raises:
         PhysidError: one line that says what is wrong.
-        KeyboardInterrupt: when interrupted; the stages that were done are kept.
+        KeyboardInterrupt: when interrupted; the rollouts that were made are kept.
     """
     if not 0.0 < arguments.alpha < 1.0:
         raise ConfigError(f"--alpha must be between 0 and 1, but is {arguments.alpha:g}.")
@@ -73,15 +73,15 @@ def run(arguments: argparse.Namespace) -> int:
     folder = RunFolder.open(out, settings, name=SETTINGS, state=(STATE,), results=FILES)
     if had_one and not (out / FILES[0]).exists():
         console.print(f"Note: {out} held a diagnosis of another recording, or with other settings; it is gone.")
-    memory = Memory(folder.path / STATE)
-    if memory.stages:
-        console.print(f"going on with what was kept: {', '.join(memory.stages)}")
+    kept = KeptRollouts(folder.path / STATE)
+    if len(kept):
+        console.print(f"going on with {len(kept)} rollouts that were kept")
     try:
         diagnosis, evidence = run_case(
-            case, console, seed=arguments.seed, alpha=arguments.alpha, effects=arguments.effects, memory=memory
+            case, console, seed=arguments.seed, alpha=arguments.alpha, effects=arguments.effects, kept=kept
         )
     except KeyboardInterrupt:
-        if memory.stages:
+        if len(kept):
             console.print("what was found is kept, and the same command goes on from there")
         raise
     write(folder, diagnosis, evidence)
@@ -98,11 +98,11 @@ def run_case(
     seed: int,
     alpha: float,
     effects: Sequence[str] | None = None,
-    memory: Memory | None = None,
+    kept: KeptRollouts | None = None,
 ) -> tuple[Diagnosis, Evidence]:
     """Diagnose with a progress bar."""
     with progress_bar(console) as tick:
-        return diagnose(case, seed=seed, alpha=alpha, effects=effects, tick=tick, memory=memory)
+        return diagnose(case, seed=seed, alpha=alpha, effects=effects, tick=tick, kept=kept)
 
 
 def recording_folder(text: str) -> Path:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.diagnose.noise import ForceNoise, TrackerNoise
+from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.problem import PushProblem
-from physid_drake.identify.rollouts import Prediction
 from physid_drake.recording import Push, rest_segments
 
 Array = NDArray[np.float64]

@@ -22,7 +22,8 @@ from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.steps import Step, effect_steps, own_steps, theta_steps, with_theta
 from physid_drake.effects import Effect
 from physid_drake.identify.misfit import FAILED, diverged
-from physid_drake.identify.rollouts import Prediction, Task
+from physid_drake.identify.prediction import Prediction
+from physid_drake.identify.rollouts import Task
 
 Array = NDArray[np.float64]
 

@@ -83,7 +83,7 @@ def brisk_pool(case: Case) -> RolloutPool:
     spec = case.pool.spec
     share = min(1.0, LONGEST_TICK / spec.config.solver.time_step_s)
     config = dc.replace(spec.config, solver=spec.config.solver.scaled(share))
-    return RolloutPool(dc.replace(spec, config=config), case.thetas, jobs=case.pool.jobs)
+    return case.pool.of(dc.replace(spec, config=config))
 
 
 def _choices() -> list[tuple[float, float, float]]:

@@ -16,7 +16,6 @@ from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.identify.misfit import DIVERGED, difference, diverged
 from physid_drake.identify.problem import spec_of
-from physid_drake.identify.rollouts import RolloutPool
 from physid_drake.progress import Progress
 from physid_drake.search import GreedyEntropySearch, search_minimum
 
@@ -104,7 +103,7 @@ def numerics(case: Case, state: State) -> tuple[Array, ...]:
     columns: list[list[Array]] = [[] for _ in case.problems]
     half_step = dc.replace(case.config, solver=case.config.solver.scaled(0.5))
     for config in (half_step, _other_contact(case.config)):
-        pool = RolloutPool(spec_of(case.recording, config), case.thetas, jobs=case.pool.jobs)
+        pool = case.pool.of(spec_of(case.recording, config))
         other = Fitter(dc.replace(case, pool=pool))
         vectors = other.vectors([other.task(state, i) for i in range(len(case.problems))])
         case.pool.count += pool.count
@@ -140,7 +139,7 @@ def _other_contact(config: CellConfig) -> CellConfig:
 def coarse(case: Case) -> Case:
     """The case on ticks twice as long: good enough for what a small change does, and twice as fast."""
     config = dc.replace(case.config, solver=case.config.solver.scaled(2.0))
-    return dc.replace(case, pool=RolloutPool(spec_of(case.recording, config), case.thetas, jobs=case.pool.jobs))
+    return dc.replace(case, pool=case.pool.of(spec_of(case.recording, config)))
 
 
 def least_squares(case: Case, at: Fitted) -> Fitted:

@@ -19,19 +19,18 @@ from physid_drake.diagnose.foils import Foil, better_foil
 from physid_drake.diagnose.grow import HOPELESS, Grown, Growth, Looked
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
 from physid_drake.diagnose.loudness import as_loud_as_left, quieter
-from physid_drake.diagnose.memory import Memory
 from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.next_push import next_push
 from physid_drake.diagnose.plain import coarse, fit_plain, lost_pushes, nearest, numerics, path_errors
 from physid_drake.diagnose.screen import (
     Screening,
     Signature,
-    empty_signatures,
     signatures,
     tolerances,
 )
 from physid_drake.diagnose.values import Diagnosis
 from physid_drake.effects import Effect, applicable, tolerated
+from physid_drake.identify.kept_rollouts import KeptRollouts
 from physid_drake.progress import Progress
 
 Array = NDArray[np.float64]
@@ -44,21 +43,9 @@ def diagnose(
     alpha: float = 0.01,
     effects: Sequence[str] | None = None,
     tick: Progress | None = None,
-    memory: Memory | None = None,
+    kept: KeptRollouts | None = None,
 ) -> tuple[Diagnosis, Evidence]:
-    """Diagnose a recording; arguments as in ``gather``."""
-    say = tick or (lambda stage, done, total: None)
-    evidence = gather(case, seed=seed, alpha=alpha, effects=effects, tick=say, memory=memory or Memory())
-    evidence = _located(evidence, say)
-    return conclude(evidence, seed=seed, alpha=alpha), evidence
-
-
-def gather(
-    case: Case, *, seed: int, alpha: float, effects: Sequence[str] | None, tick: Progress, memory: Memory
-) -> Evidence:
-    """Fit, screen, confirm: all that needs rollouts.
-
-    All but the last look is done on ticks twice as long, whose error is one of the guard's directions.
+    """Diagnose a recording.
 
     Args:
         case: the recording, ready.
@@ -66,7 +53,19 @@ def gather(
         alpha: false-alarm rate of the detection.
         effects: names of the catalogue to look at; None for all.
         tick: told the stage, steps done, steps in all.
-        memory: of the stages that are done.
+        kept: rollouts of a run that was interrupted, which goes on from there to the same answer.
+    """
+    say = tick or (lambda stage, done, total: None)
+    case.pool.kept = KeptRollouts() if kept is None else kept
+    evidence = gather(case, seed=seed, alpha=alpha, effects=effects, tick=say)
+    evidence = _located(evidence, say)
+    return conclude(evidence, seed=seed, alpha=alpha), evidence
+
+
+def gather(case: Case, *, seed: int, alpha: float, effects: Sequence[str] | None, tick: Progress) -> Evidence:
+    """Fit, screen, confirm: all that needs rollouts. Arguments as of ``diagnose``.
+
+    All but the last look is done on ticks twice as long, whose error is one of the guard's directions.
     """
     search_rng, screen_rng = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2))
     look = _Search(kinds=applicable(case.around, effects), alpha=alpha, rng=screen_rng, tick=tick)
@@ -74,8 +73,8 @@ def gather(
     lost = lost_pushes(rough)
     if lost:
         case, rough = case.without(lost), rough.without(lost)
-    first = _first(rough, search_rng, tick, memory)
-    answer = (look.answer if case.noise.known else look.answer_by_ratios)(case, rough, first, memory)
+    first = _first(rough, search_rng, tick)
+    answer = (look.answer if case.noise.known else look.answer_by_ratios)(case, rough, first)
     return _on_short_ticks(answer, tick)
 
 
@@ -152,11 +151,11 @@ class _Search:
     rng: np.random.Generator
     tick: Progress
 
-    def answer(self, case: Case, rough: Case, first: Fitted, memory: Memory) -> _Answer:
+    def answer(self, case: Case, rough: Case, first: Fitted) -> _Answer:
         """Look at the whole catalogue, add effects, and take out what became superfluous."""
         # What pushes may share without its being physics does not depend on what is looked for.
         unasked = [kind for kind in tolerated(rough.around) if kind not in self.kinds]
-        guard, found = _looks(rough, first, [*self.kinds, *unasked], self.tick, memory)
+        guard, found = _looks(rough, first, [*self.kinds, *unasked], self.tick)
         fitter = Fitter(rough, guard, tolerances(rough, found))
         asked = [s for s in found if s.kind in self.kinds]
         looked = Looked.at(fitter.guard(first), asked, self.rng)
@@ -164,9 +163,9 @@ class _Search:
         grown = growth.grow(looked)
         return _Answer(case=case, fitter=fitter, grown=grown, foil=_better_foil(growth, grown))
 
-    def answer_by_ratios(self, case: Case, rough: Case, first: Fitted, memory: Memory) -> _Answer:
+    def answer_by_ratios(self, case: Case, rough: Case, first: Fitted) -> _Answer:
         """The same where the noise is not known: as loud as the plain cell leaves, then as what was found leaves."""
-        loud = self.answer(*as_loud_as_left(case, rough, first), memory)
+        loud = self.answer(*as_loud_as_left(case, rough, first))
         if not loud.grown.steps:
             return loud
 
@@ -182,42 +181,25 @@ class _Search:
         # What was noise so far was missing physics: with less noise the pushes tell more.
         self.tick("plain fit with less noise", 0, 0)
         first = Fitter(quiet_rough).fit(loud.grown.base.fitted.state, renew=True)
-        again = dc.replace(self, kinds=_in_question(loud.grown)).answer(quiet, quiet_rough, first, Memory())
+        again = dc.replace(self, kinds=_in_question(loud.grown)).answer(quiet, quiet_rough, first)
         if again.grown.steps and _names(again.grown) != _names(loud.grown):
             share = left_by(again.grown.last.fitted)[2]
         return dc.replace(again, noise_share=share, loud=base)
 
 
-def _first(case: Case, rng: np.random.Generator, tick: Progress, memory: Memory) -> Fitted:
-    """The plain fit, or that of an interrupted run."""
-    kept = memory.recall("plain")
-    if kept is not None:
-        u, scatter, *own = kept
-        return Fitter(case).linearise(State(u=u, effects=(), own=tuple(own), scatter=float(scatter)))
-    found = fit_plain(case, rng, tick).state
-    memory.keep("plain", [found.u, np.array(found.scatter), *found.own])
-    # All derivatives here, so that a run that goes on from what was kept has the same bits.
-    return Fitter(case).linearise(found)
+def _first(case: Case, rng: np.random.Generator, tick: Progress) -> Fitted:
+    """The plain fit, with all derivatives where it ended."""
+    return Fitter(case).linearise(fit_plain(case, rng, tick).state)
 
 
 def _looks(
-    case: Case, first: Fitted, kinds: Sequence[type[Effect]], tick: Progress, memory: Memory
+    case: Case, first: Fitted, kinds: Sequence[type[Effect]], tick: Progress
 ) -> tuple[tuple[Array, ...], list[Signature]]:
-    """The guard's directions and the catalogue's signatures, or those of an interrupted run."""
-    guard_kept, kept = memory.recall("guard"), memory.recall("signatures")
-    if guard_kept is None:
-        tick("numerics guard", 0, 0)
-        own, of_path = numerics(case, first.state), path_errors(case, first.state, tick)
-        guard_kept = [np.column_stack(pair) for pair in zip(own, of_path, strict=True)]
-        memory.keep("guard", guard_kept)
-    fitter = Fitter(case)
-    blank = empty_signatures(fitter, kinds)
-    if kept is not None and len(kept) == len(blank) * len(case.problems):  # of a run of this version
-        edges = iter(kept)
-        return tuple(guard_kept), [dc.replace(s, columns=tuple(next(edges) for _ in case.problems)) for s in blank]
-    found = signatures(fitter, first, kinds, lambda done, total: tick("score tests", done, total))
-    memory.keep("signatures", [c for s in found for c in s.columns])
-    return tuple(guard_kept), found
+    """The guard's directions and the catalogue's signatures."""
+    tick("numerics guard", 0, 0)
+    own, of_path = numerics(case, first.state), path_errors(case, first.state, tick)
+    guard = tuple(np.column_stack(pair) for pair in zip(own, of_path, strict=True))
+    return guard, signatures(Fitter(case), first, kinds, lambda done, total: tick("score tests", done, total))
 
 
 def _located(evidence: Evidence, tick: Progress) -> Evidence:

@@ -21,8 +21,9 @@ from physid_drake.identify.misfit import DIVERGED, whitened_residual
 from physid_drake.identify.noise import Noise, noise_of
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
 from physid_drake.identify.polish import Polished, Polisher
+from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.problem import PushProblem, problems_of, spec_of
-from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
+from physid_drake.identify.rollouts import RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, cell_error, range_of, theta_map
 from physid_drake.progress import Progress
 from physid_drake.recording import Recording, thinned

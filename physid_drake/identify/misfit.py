@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from physid_drake.identify.noise import Noise
 from physid_drake.identify.nuisance import MODEL_ERROR
+from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.problem import PushProblem
-from physid_drake.identify.rollouts import Prediction
 
 Array = NDArray[np.float64]
 

@@ -27,8 +27,9 @@ from physid_drake.identify.polish import (
     prior_rows,
     scatter_of,
 )
+from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.problem import PushProblem, problems_of, spec_of
-from physid_drake.identify.rollouts import Prediction, RolloutPool, Task
+from physid_drake.identify.rollouts import RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.progress import Progress
 from physid_drake.recording import Push, Recording, thinned

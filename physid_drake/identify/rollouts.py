@@ -20,7 +20,9 @@ from physid_drake.effects import Effect
 from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
 from physid_drake.errors import TippedError
 from physid_drake.identify.force_windows import WINDOW
+from physid_drake.identify.kept_rollouts import KeptRollouts, key_of
 from physid_drake.identify.nuisance import Nuisance, apply_nuisance
+from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.problem import CellSpec, PushProblem
 from physid_drake.identify.theta import ThetaMap
 
@@ -60,15 +62,6 @@ class Task:
     nuisance: Nuisance
     values: Array
     effects: tuple[Effect, ...] = ()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Prediction:
-    """What a rollout says about what was recorded: poses (n, 3) and mean forces (k, 2), and whether it ``fell``."""
-
-    poses: Array
-    forces: Array
-    fell: bool = False
 
 
 def simulate(spec: CellSpec, thetas: ThetaMap, task: Task) -> Motion:
@@ -137,23 +130,51 @@ def _predict_many(spec: CellSpec, thetas: ThetaMap, tasks: Sequence[Task]) -> li
 class RolloutPool:
     """Runs many tasks on all cores, in order, with the same bits as one core would give."""
 
-    def __init__(self, spec: CellSpec, thetas: ThetaMap, jobs: int = 0) -> None:
-        """Prepare; ``jobs`` 0 takes the machine's cores."""
-        self.spec, self.thetas = spec, thetas
+    def __init__(self, spec: CellSpec, thetas: ThetaMap, jobs: int = 0, *, kept: KeptRollouts | None = None) -> None:
+        """Prepare.
+
+        Args:
+            spec: the cell's.
+            thetas: what theta means in it.
+            jobs: processes; 0 takes the machine's cores.
+            kept: rollouts that need not be made again, and where those that are made are kept; None keeps none.
+        """
+        self.spec, self.thetas, self.kept = spec, thetas, kept
         self.jobs = jobs or os.cpu_count() or 1
         self.count = 0
         self.diverged = 0
 
+    def of(self, spec: CellSpec) -> RolloutPool:
+        """A pool for another cell, which keeps its rollouts in the same place."""
+        return RolloutPool(spec, self.thetas, self.jobs, kept=self.kept)
+
     def run(self, tasks: Sequence[Task], tick: Callable[[int], None] | None = None) -> list[Prediction | None]:
         """Predictions in the order of the tasks; ``tick`` is told how many more are done."""
-        results: list[Prediction | None] = []
-        for chunk in self._chunks(tasks):
-            results += chunk
-            if tick is not None:
-                tick(len(chunk))
+        results = list(self._made(tasks, tick) if self.kept is None else self._recalled(tasks, self.kept, tick))
         self.count += len(results)
         self.diverged += sum(result is None for result in results)
         return results
+
+    def _made(self, tasks: Sequence[Task], tick: Callable[[int], None] | None) -> Iterable[Prediction | None]:
+        for chunk in self._chunks(tasks):
+            yield from chunk
+            if tick is not None:
+                tick(len(chunk))
+
+    def _recalled(
+        self, tasks: Sequence[Task], kept: KeptRollouts, tick: Callable[[int], None] | None
+    ) -> Iterable[Prediction | None]:
+        """Of the tasks, those that are not kept are made, each of them once."""
+        keys = [key_of((self.spec, self.thetas, task)) for task in tasks]
+        fresh = {key: task for key, task in zip(keys, tasks, strict=True) if key not in kept}
+        missing = iter(fresh)
+        for chunk in self._chunks(list(fresh.values())):
+            kept.keep({next(missing): said for said in chunk})
+            if tick is not None:
+                tick(len(chunk))
+        if tick is not None and len(tasks) > len(fresh):
+            tick(len(tasks) - len(fresh))
+        return (kept[key] for key in keys)
 
     def _chunks(self, tasks: Sequence[Task]) -> Iterable[list[Prediction | None]]:
         if self.jobs == 1 or len(tasks) == 1:

@@ -14,9 +14,9 @@ from worlds import endpoints, pushes_of, recorded, slides
 from physid_drake import load_model
 from physid_drake.diagnose import case_of, cell_config, diagnose, model_of
 from physid_drake.diagnose.evidence import mismatch
-from physid_drake.diagnose.memory import Memory
 from physid_drake.errors import RecordingError
 from physid_drake.identify.config import ThetaConfig
+from physid_drake.identify.kept_rollouts import KeptRollouts
 from physid_drake.plan import Situation
 from physid_drake.plan.draws import draws_of
 from physid_drake.recording import Sensors
@@ -94,15 +94,15 @@ def test_an_interrupted_diagnosis_goes_on_to_the_same_bytes(tmp_path):
     made = case(world(count=3, pull=(ERASER.mass * 9.81 * 0.02, 0.0)), time_step=4e-3)
     effects = ("table_tilt",)
 
-    live, cut_off = tmp_path / "live.npz", tmp_path / "cut_off.npz"
+    live, cut_off = tmp_path / "live.bin", tmp_path / "cut_off.bin"
 
     def copy(stage, done, total):
         if stage.startswith("fit with"):  # what an interrupted run would leave here
             shutil.copy(live, cut_off)
 
-    whole, _ = diagnose(made, effects=effects, tick=copy, memory=Memory(live))
+    whole, _ = diagnose(made, effects=effects, tick=copy, kept=KeptRollouts(live))
     assert cut_off.exists()
-    again, _ = diagnose(made, effects=effects, memory=Memory(cut_off))
+    again, _ = diagnose(made, effects=effects, kept=KeptRollouts(cut_off))
     assert diagnosis_json(again) == diagnosis_json(whole)
 
 

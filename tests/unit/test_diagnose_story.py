@@ -30,7 +30,7 @@ def test_pushes_may_share_the_same_whatever_is_looked_for(names, monkeypatch):
     monkeypatch.setattr(story, "Growth", lambda **_: SimpleNamespace(grow=lambda looked: looked))
     monkeypatch.setattr(story, "_better_foil", lambda growth, grown: None)
     search = story._Search(kinds=asked, alpha=0.01, rng=np.random.default_rng(0), tick=lambda *_: None)
-    answer = search.answer(None, SimpleNamespace(around=AROUND), None, None)
+    answer = search.answer(None, SimpleNamespace(around=AROUND), None)
     assert answer.grown == list(asked)
     assert set(tolerated(AROUND)) <= set(answer.fitter.shared)
 
@@ -55,7 +55,7 @@ def test_an_unknown_noise_is_what_the_model_at_the_end_leaves(monkeypatch, quiet
         return SimpleNamespace(steps=steps, last=last, base=base)
 
     class Search(story._Search):
-        def answer(self, case, rough, first, memory):
+        def answer(self, case, rough, first):
             found = {"tether", "magnet"} if case == left[frozenset()] else quiet_finds
             return story._Answer(case=case, fitter=None, grown=grown(found))
 
@@ -65,7 +65,7 @@ def test_an_unknown_noise_is_what_the_model_at_the_end_leaves(monkeypatch, quiet
     monkeypatch.setattr(story, "quieter", lambda before, after: after / before)
     monkeypatch.setattr(story, "_in_question", lambda grown: [])
     search = Search(kinds=[], alpha=0.01, rng=np.random.default_rng(0), tick=lambda *_: None)
-    answer = search.answer_by_ratios("case", "rough", frozenset(), None)
+    answer = search.answer_by_ratios("case", "rough", frozenset())
     assert answer.noise_share == share
     assert {step[0].name for step in answer.grown.steps} == quiet_finds
 

@@ -9,8 +9,8 @@ from runs import shipped_pushes
 from physid_drake.identify.misfit import Whitener, model_error_columns, whitened_residual
 from physid_drake.identify.noise import Noise, noise_of
 from physid_drake.identify.nuisance import MODEL_ERROR
+from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.problem import PushProblem, problems_of
-from physid_drake.identify.rollouts import Prediction
 
 
 @pytest.fixture(scope="module")

@@ -211,13 +211,13 @@ def test_another_configuration_does_not_go_on_from_there(recording, tmp_path, mo
     with monkeypatch.context() as patch:
         _CtrlC(patch)
         assert quick(out, recording=recording) == 130
-    (out / "stages.npz").touch()  # of a diagnosis
+    (out / "rollouts.bin").touch()  # of a diagnosis
     other = laid_over(SEARCH, {"seed": 4})
     with monkeypatch.context() as patch:
         count = _CtrlC(patch, trial=-1)
         assert quick(out, recording=recording, **other) == 0
     assert count.calls == 6
-    assert not (out / "stages.npz").exists()
+    assert not (out / "rollouts.bin").exists()
     assert np.isfinite(result_of(out)["reduced_chi2"])
 
 

@@ -15,11 +15,10 @@ from physid_drake.cell import Body, CellConfig, Start
 from physid_drake.cell.hand_path import straight_path
 from physid_drake.cli import main
 from physid_drake.diagnose.leaving import hand_frame
-from physid_drake.diagnose.memory import Memory
 from physid_drake.effects.body import UnevenSupport
 from physid_drake.effects.drag import ViscousDrag
 from physid_drake.effects.hand import HandOffset
-from physid_drake.errors import ConfigError, OutputError
+from physid_drake.errors import ConfigError
 from physid_drake.model import AS_W, Correlation, Model
 from physid_drake.recording import Prism
 from physid_drake.resources import shipped
@@ -54,8 +53,8 @@ def test_an_output_folder_that_cannot_be_written_is_refused(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_results_go_to_a_folder_named_after_the_recordings(tmp_path, monkeypatch, capsys):
-    def interrupted(*_, memory, **__):
-        memory.keep("plain", [np.zeros(1)])
+    def interrupted(*_, kept, **__):
+        kept.keep({bytes(16): None})
         raise KeyboardInterrupt
 
     monkeypatch.chdir(tmp_path)
@@ -66,7 +65,7 @@ def test_results_go_to_a_folder_named_after_the_recordings(tmp_path, monkeypatch
     (tmp_path / "diagnoses" / "mine" / "diagnosis.json").write_text("{}")
     assert main(["diagnose", "mine"]) == 130
     shown = capsys.readouterr().out
-    assert "going on with what was kept: plain" in shown and "it is gone" not in shown
+    assert "going on with 1 rollouts that were kept" in shown and "it is gone" not in shown
     assert main(["diagnose", "mine", "--seed", "1"]) == 130
     shown = capsys.readouterr().out
     assert "going on" not in shown and "it is gone" in shown
@@ -277,22 +276,3 @@ def test_a_model_that_was_cut_off_is_refused_wherever_it_was_cut(model, tmp_path
         (tmp_path / "model.yaml").write_text(text[:count], encoding="utf-8")
         with pytest.raises(ConfigError):
             load_model(tmp_path)
-
-
-def test_a_memory_that_cannot_be_written_is_one_line(tmp_path):
-    (tmp_path / "gone").mkdir()
-    memory = Memory(tmp_path / "gone" / "stages.npz")
-    (tmp_path / "gone").rmdir()
-    with pytest.raises(OutputError, match="cannot be written"):
-        memory.keep("plain", [np.arange(3.0)])
-
-
-def test_a_memory_that_was_cut_off_begins_again(tmp_path):
-    path = tmp_path / "stages.npz"
-    memory = Memory(path)
-    memory.keep("plain", [np.arange(3.0), np.array(2.0)])
-    kept = Memory(path).recall("plain")
-    assert kept is not None and kept[0].tolist() == [0.0, 1.0, 2.0] and float(kept[1]) == 2.0
-    assert Memory(path).recall("guard") is None
-    path.write_bytes(path.read_bytes()[:40])
-    assert Memory(path).recall("plain") is None

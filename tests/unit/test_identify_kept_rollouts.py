@@ -1,0 +1,121 @@
+"""Rollouts that are kept are not made again, and a file of them that was cut off holds those that are whole."""
+
+import dataclasses as dc
+
+import numpy as np
+import pytest
+
+from physid_drake.errors import OutputError
+from physid_drake.identify import rollouts
+from physid_drake.identify.kept_rollouts import KEY, MAGIC, KeptRollouts, key_of
+from physid_drake.identify.prediction import Prediction
+from physid_drake.identify.rollouts import RolloutPool
+
+
+def said(seed, poses=4, forces=2, fell=False):
+    rng = np.random.default_rng(seed)
+    return Prediction(poses=rng.standard_normal((poses, 3)), forces=rng.standard_normal((forces, 2)), fell=fell)
+
+
+def key(number):
+    return bytes([number]) * KEY
+
+
+ALL = {key(0): said(0), key(1): None, key(2): said(2, forces=0, fell=True), key(3): said(3, poses=1)}
+
+
+def same(one, other):
+    if one is None or other is None:
+        return one is other
+    return (
+        np.array_equal(one.poses, other.poses) and np.array_equal(one.forces, other.forces) and one.fell == other.fell
+    )
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "rollouts.bin"
+    kept = KeptRollouts(path)
+    kept.keep({k: ALL[k] for k in list(ALL)[:1]})
+    kept.keep({k: ALL[k] for k in list(ALL)[1:]})
+    return path
+
+
+def test_a_file_holds_every_bit(file):
+    kept = KeptRollouts(file)
+    assert len(kept) == len(ALL) and key(9) not in kept
+    assert all(same(kept[k], ALL[k]) for k in ALL)
+
+
+def test_a_file_that_was_cut_off_anywhere_holds_what_is_whole_and_goes_on(file):
+    content, seen = file.read_bytes(), set()
+    for length in range(len(content)):
+        file.write_bytes(content[:length])
+        kept = KeptRollouts(file)
+        seen.add(len(kept))
+        assert all(same(kept[k], ALL[k]) for k in list(ALL)[: len(kept)])
+        kept.keep({k: ALL[k] for k in ALL if k not in kept})
+        assert file.read_bytes() == content
+    assert seen == {0, 1, 2, 3}
+
+
+@pytest.mark.parametrize("content", [b"something else", MAGIC[:-2] + b"2\n" + bytes(60)])
+def test_a_file_of_another_kind_is_begun_again(file, content):
+    file.write_bytes(content)
+    kept = KeptRollouts(file)
+    assert len(kept) == 0
+    kept.keep(ALL)
+    assert len(KeptRollouts(file)) == len(ALL)
+
+
+def test_a_file_that_cannot_be_written_is_one_line(tmp_path):
+    (tmp_path / "gone").mkdir()
+    kept = KeptRollouts(tmp_path / "gone" / "rollouts.bin")
+    (tmp_path / "gone").rmdir()
+    with pytest.raises(OutputError, match="cannot be written"):
+        kept.keep(ALL)
+
+
+@dc.dataclass(frozen=True)
+class Asked:
+    theta: np.ndarray
+    name: str = "push"
+
+
+def test_what_is_the_same_has_one_key_and_what_differs_has_others():
+    theta = np.array([0.1, 0.2])
+    assert key_of(Asked(theta)) == key_of(Asked(theta.copy()))
+    others = [Asked(theta + 1e-16 * np.array([1.0, 0.0])), Asked(theta[::-1].copy()), Asked(theta, "other")]
+    assert len({key_of(one) for one in (Asked(theta), *others)}) == 4
+
+
+def test_a_pool_makes_each_rollout_once_and_tells_of_all(monkeypatch, tmp_path):
+    made, told = [], []
+
+    def predict(spec, thetas, task):
+        made.append(float(task.theta[0]))
+        return None if task.theta[0] < 0.0 else said(round(task.theta[0]))
+
+    monkeypatch.setattr(rollouts, "predict", predict)
+    tasks = [Asked(np.array([value])) for value in (1.0, 2.0, 1.0, -1.0)]
+    pool = RolloutPool("spec", "thetas", jobs=1, kept=KeptRollouts(tmp_path / "rollouts.bin"))
+    first = pool.run(tasks, told.append)
+    assert made == [1.0, 2.0, -1.0] and sum(told) == 4 and pool.count == 4 and pool.diverged == 1
+    again = RolloutPool("spec", "thetas", jobs=1, kept=KeptRollouts(tmp_path / "rollouts.bin"))
+    assert all(same(one, other) for one, other in zip(first, again.run(tasks), strict=True))
+    assert len(made) == 3 and again.count == 4
+    again.of("another cell").run(tasks[:1])
+    assert made[3:] == [1.0]
+
+
+def test_a_run_that_is_interrupted_keeps_what_was_made(monkeypatch, tmp_path):
+    def predict(spec, thetas, task):
+        if task.theta[0] == 3.0:
+            raise KeyboardInterrupt
+        return said(0)
+
+    monkeypatch.setattr(rollouts, "predict", predict)
+    pool = RolloutPool("spec", "thetas", jobs=1, kept=KeptRollouts(tmp_path / "rollouts.bin"))
+    with pytest.raises(KeyboardInterrupt):
+        pool.run([Asked(np.array([value])) for value in (1.0, 2.0, 3.0, 4.0)])
+    assert len(KeptRollouts(tmp_path / "rollouts.bin")) == 2
