@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
         console.print(f"Note: {out} held a diagnosis of another recording, or with other settings; it is gone.")
     kept = KeptRollouts(folder.path / STATE)
     if len(kept):
-        console.print(f"going on with {len(kept)} rollouts that were kept")
+        console.print(f"going on with what was kept, rollouts: {len(kept)}")
     try:
         diagnosis, evidence = run_case(
             case, console, seed=arguments.seed, alpha=arguments.alpha, effects=arguments.effects, kept=kept

@@ -1,10 +1,16 @@
-"""What rollouts said, by what they were made of: none is made twice, and what was interrupted repeats only sums."""
+"""What rollouts said, by what they were made of: what is kept is not made again.
+
+A diagnosis that was interrupted repeats only the sums, since it draws from one seed.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import os
 import pickle
 import struct
+import zlib
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,27 +18,51 @@ import numpy as np
 from physid_drake.errors import OutputError
 from physid_drake.identify.prediction import Prediction
 
-MAGIC = b"physid-rollouts/1\n"
 KEY = 16  # bytes
-_HEAD = struct.Struct(f"<{KEY}s??2I")  # key, whether it ended well, whether it fell, numbers of poses and of forces
+MOST_BYTES = 400_000_000  # in memory and in the file; what is beyond is made again
+# Key, whether it ended well, whether it fell, numbers of poses and of forces, checksum of the numbers.
+_HEAD = struct.Struct(f"<{KEY}s??3I")
 
 
-def key_of(made_of: object) -> bytes:
-    """A key of 16 bytes. Equal things that were built in other ways may differ in it, different ones do not agree."""
-    return hashlib.blake2b(pickle.dumps(made_of, protocol=5), digest_size=KEY).digest()
+def key_of(made_of: object, cell: str = "") -> bytes:
+    """A key of 16 bytes; different things do not agree in it.
+
+    Args:
+        made_of: what the rollout is made of, pickled.
+        cell: in which it was, in words.
+    """
+    content = cell.encode() + pickle.dumps(made_of, protocol=5)
+    return hashlib.blake2b(content, digest_size=KEY).digest()
+
+
+@cache
+def magic() -> bytes:
+    """How a file begins: rollouts of other sources of this package are others."""
+    sources = sorted(Path(__file__).resolve().parents[1].rglob("*.py"))
+    digest = hashlib.blake2b(b"".join(file.read_bytes() for file in sources), digest_size=KEY)
+    return b"physid-rollouts/1 " + digest.hexdigest().encode() + b"\n"
 
 
 class KeptRollouts:
-    """Predictions by key; in a file, too, where one is given."""
+    """Predictions by key, as many as ``most`` bytes hold; in a file, too, where one is given."""
 
-    def __init__(self, path: Path | None = None) -> None:
-        """Read what the file holds; of one that was cut off, what is whole."""
-        self._path = path
+    def __init__(self, path: Path | None = None, *, most: int = MOST_BYTES) -> None:
+        """Read what the file holds; of one that was cut off, what is whole.
+
+        Raises:
+            OutputError: if it cannot be read or cut.
+        """
+        self._path, self._most, self._size = path, most, 0
         self._kept: dict[bytes, Prediction | None] = {}
-        content = path.read_bytes() if path is not None and path.is_file() else b""
-        whole = self._read(content) if content.startswith(MAGIC) else 0
-        if path is not None and content:
-            self._write(content[:whole], "wb")
+        if path is None or not path.is_file():
+            return
+        try:
+            content = path.read_bytes()
+            whole = self._read(content) if content.startswith(magic()) else 0
+            if whole < len(content):
+                os.truncate(path, whole)
+        except OSError as error:
+            raise OutputError(f"'{path}': cannot be read or written: {error}.") from error
 
     def __len__(self) -> int:
         return len(self._kept)
@@ -45,43 +75,51 @@ class KeptRollouts:
         return self._kept[key]
 
     def keep(self, predictions: dict[bytes, Prediction | None]) -> None:
-        """Keep what rollouts said.
+        """Keep what rollouts said, as long as there is room.
 
         Raises:
             OutputError: if the file cannot be written.
         """
-        start = b"" if self._kept or self._path is None else MAGIC
+        records = {key: _record(key, said) for key, said in predictions.items()}
+        content = b"".join(records.values())
+        if self._size + len(content) > self._most:
+            return
+        self._size += len(content)
         self._kept |= predictions
-        self._write(start + b"".join(_record(k, p) for k, p in predictions.items()), "ab")
-
-    def _write(self, content: bytes, mode: str) -> None:
         if self._path is None:
             return
         try:
-            with self._path.open(mode) as file:
-                file.write(content)
+            with self._path.open("ab") as file:
+                file.write(content if file.tell() else magic() + content)
         except OSError as error:
             raise OutputError(f"'{self._path}': cannot be written: {error}.") from error
 
     def _read(self, content: bytes) -> int:
-        """Take up all whole records; where they end, 0 without any."""
-        at = len(MAGIC)
+        """Take up all records up to one that is not whole; where they end."""
+        at = len(magic())
         while len(content) >= at + _HEAD.size:
-            key, well, fell, poses, forces = _HEAD.unpack_from(content, at)
+            key, well, fell, poses, forces, check = _HEAD.unpack_from(content, at)
             end = at + _HEAD.size + 8 * (3 * poses + 2 * forces)
-            if len(content) < end:
+            body = content[at + _HEAD.size : end]
+            if len(content) < end or zlib.crc32(body) != check:
                 break
-            numbers = np.frombuffer(content[at + _HEAD.size : end]).copy()
-            said = Prediction(
-                poses=numbers[: 3 * poses].reshape(-1, 3), forces=numbers[3 * poses :].reshape(-1, 2), fell=fell
+            numbers = np.frombuffer(body, dtype="<f8").copy()
+            self._kept[key] = (
+                Prediction(
+                    poses=numbers[: 3 * poses].reshape(-1, 3),
+                    forces=numbers[3 * poses :].reshape(-1, 2),
+                    fell=fell,
+                )
+                if well
+                else None
             )
-            self._kept[key] = said if well else None
             at = end
-        return at if self._kept else 0
+        self._size = at
+        return at
 
 
 def _record(key: bytes, said: Prediction | None) -> bytes:
     if said is None:
-        return _HEAD.pack(key, False, False, 0, 0)
-    numbers = np.concatenate([said.poses.ravel(), said.forces.ravel()]).astype("<f8")
-    return _HEAD.pack(key, True, said.fell, len(said.poses), len(said.forces)) + numbers.tobytes()
+        return _HEAD.pack(key, False, False, 0, 0, zlib.crc32(b""))
+    body = np.concatenate([said.poses.ravel(), said.forces.ravel()]).astype("<f8").tobytes()
+    return _HEAD.pack(key, True, said.fell, len(said.poses), len(said.forces), zlib.crc32(body)) + body

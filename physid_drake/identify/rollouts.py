@@ -165,16 +165,19 @@ class RolloutPool:
         self, tasks: Sequence[Task], kept: KeptRollouts, tick: Callable[[int], None] | None
     ) -> Iterable[Prediction | None]:
         """Of the tasks, those that are not kept are made, each of them once."""
-        keys = [key_of((self.spec, self.thetas, task)) for task in tasks]
+        cell = repr((self.spec, self.thetas))
+        keys = [key_of(task, cell) for task in tasks]
         fresh = {key: task for key, task in zip(keys, tasks, strict=True) if key not in kept}
-        missing = iter(fresh)
+        missing, made = iter(fresh), dict[bytes, Prediction | None]()
         for chunk in self._chunks(list(fresh.values())):
-            kept.keep({next(missing): said for said in chunk})
+            of_chunk = {next(missing): said for said in chunk}
+            kept.keep(of_chunk)
+            made |= of_chunk
             if tick is not None:
                 tick(len(chunk))
         if tick is not None and len(tasks) > len(fresh):
             tick(len(tasks) - len(fresh))
-        return (kept[key] for key in keys)
+        return (made[key] if key in made else kept[key] for key in keys)
 
     def _chunks(self, tasks: Sequence[Task]) -> Iterable[list[Prediction | None]]:
         if self.jobs == 1 or len(tasks) == 1:

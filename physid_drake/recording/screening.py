@@ -46,17 +46,20 @@ LONGEST_LEAP: Final = 0.1
 SHORTEST_SCREENED: Final = 25
 """Streams shorter than this have too few steps to tell a leap from motion."""
 
-MOST_BRAKE: Final = 20.0
-"""Deceleration [m/s^2] that a table has for no object: twice that of a friction of 1."""
+MOST_BRAKE: Final = 40.0
+"""Deceleration [m/s^2] that a table has for no object: four times that of a friction of 1."""
 
 LEAST_SWAP: Final = 5e-3
 """A leap of the object that stays and is shorter [m] may be its tracker's noise."""
 
-MOVES: Final = 1e-3
-"""An object that comes less far than this [m] before such a leap, or after it, has not been pushed there."""
+FEW: Final = 11
+"""Poses at either end of what lies between such leaps, whose median tells where the object was."""
 
 NOTABLE_TURN: Final = 5.0
 """Degrees of a leap that are said."""
+
+PUSHED: Final = 0.2
+"""Of the furthest way of an object between such leaps: where it goes less far, it rests."""
 
 _ARM: Final = 0.05
 _SMALLEST_LEAP: Final = 1e-5
@@ -126,28 +129,33 @@ def screen_poses(
     tracked = tracked[~repeats]
     times, positions, quaternions = times[tracked], positions[tracked], quaternions[tracked]
     leaps, lone = _find_leaps(times, positions, quaternions)
-    keep = np.zeros(len(lost), dtype=np.bool_)
-    keep[tracked] = True
-    for first, last in leaps:
-        there = describe_rows([rows[k] for k in tracked[first : last + 1].tolist()])
-        far = _how_far(positions, quaternions, first - 1)
-        warnings.append(f"{what}: {there}: jumps {far} away and comes straight back, left out.")
-        keep[tracked[first : last + 1]] = False
     stalls = _find_stalls(positions, quaternions)
-    for first, last in stalls:
-        span = f"rows {rows[tracked[first]]}-{rows[tracked[last]]}"
-        warnings.append(f"{what}: {span}: stalls (same pose {last - first + 1} times, then catches up), kept.")
     ends = {last for _, last in stalls}
     lone = [k for k in lone if k not in ends]
     swaps = _find_swaps(times, positions, quaternions, lone) if what == "object" else []
     part = _part_that_moves(positions, quaternions, swaps)
-    keep[tracked[: part.start]] = keep[tracked[part.stop :]] = False
+    keep = np.zeros(len(lost), dtype=np.bool_)
+    keep[tracked[part]] = True
+    for first, last in leaps:
+        if not part.start <= first < part.stop:
+            continue
+        there = describe_rows([rows[k] for k in tracked[first : last + 1].tolist()])
+        far = _how_far(positions, quaternions, first - 1)
+        warnings.append(f"{what}: {there}: jumps {far} away and comes straight back, left out.")
+        keep[tracked[first : last + 1]] = False
+    for first, last in stalls:
+        if not part.start <= first < part.stop:
+            continue
+        span = f"rows {rows[tracked[first]]}-{rows[tracked[last]]}"
+        warnings.append(f"{what}: {span}: stalls (same pose {last - first + 1} times, then catches up), kept.")
     for k in lone:
+        if not part.start <= k + 1 <= part.stop:
+            continue
         far = _how_far(positions, quaternions, k)
         left = "what comes before is left out" if k < part.start else "what comes after is left out"
         fate = f"; {left}" if k in swaps else ", kept"
         warnings.append(f"{what}: row {rows[tracked[k + 1]]}: jumps {far} and stays there{fate}.")
-    warnings.extend(gap_warnings(times, [rows[k] for k in tracked.tolist()], what))
+    warnings.extend(gap_warnings(times[part], [rows[k] for k in tracked[part].tolist()], what))
     return Screened(keep=keep, warnings=tuple(warnings))
 
 
@@ -213,20 +221,31 @@ def _find_swaps(times: Array, positions: Array, quaternions: Array, lone: Sequen
     What leaps within one step of the stream, and hardly moves in the next, has been stopped within it.
     """
     far = _distances(positions, quaternions, slice(None, -1), slice(1, None))
-    return [k for k in lone if far[k] > max(LEAST_SWAP, MOST_BRAKE * float(times[k + 1] - times[k]) ** 2)]
+    moves = np.flatnonzero(far > 0.0)  # a slow camera's pose may be held in between
+
+    def stands_out(k: int) -> bool:
+        i = int(np.searchsorted(moves, k))
+        beside = [float(far[moves[j]]) for j in (i - 1, i + 1) if 0 <= j < len(moves)]
+        least = max(LEAST_SWAP, 0.5 * MOST_BRAKE * float(times[k + 1] - times[k]) ** 2)
+        return float(far[k]) > max(least, LEAP_FACTOR * max(beside, default=0.0))
+
+    return [k for k in lone if stands_out(k)]
 
 
 def _part_that_moves(positions: Array, quaternions: Array, swaps: Sequence[int]) -> slice:
-    """Of the parts between swaps, the first in which the object is pushed; the longest where it never is."""
+    """Of the parts between swaps, the first in which the object is pushed: from a rest, that is."""
     edges = [0, *(k + 1 for k in swaps), len(positions)]
     parts = [slice(first, last) for first, last in pairwise(edges)]
-    for part in parts if swaps else ():
-        ends = slice(part.start, part.start + 1), slice(part.stop - 1, part.stop)
-        steps = _distances(positions[part], quaternions[part], slice(None, -1), slice(1, None))
-        noise = 2.0 * float(np.median(steps)) if len(steps) else 0.0
-        if float(_distances(positions, quaternions, *ends)[0]) > max(MOVES, noise):
-            return part
-    return max(parts, key=lambda part: part.stop - part.start)
+    ways = [_way(positions[part], quaternions[part]) for part in parts]
+    return next(part for part, way in zip(parts, ways, strict=True) if way >= PUSHED * max(ways))
+
+
+def _way(positions: Array, quaternions: Array) -> float:
+    """From the first few poses to the last few; from their middle ones, of the rotation."""
+    few = max(1, min(FEW, len(positions) // 2))
+    travel = np.median(positions[-few:], axis=0) - np.median(positions[:few], axis=0)
+    first, last = quaternions[few // 2], quaternions[-1 - few // 2]
+    return float(np.linalg.norm(travel)) + 2.0 * _ARM * math.acos(min(1.0, abs(float(first @ last))))
 
 
 def _find_repeats(positions: Array, quaternions: Array) -> Flags:

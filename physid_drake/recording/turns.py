@@ -17,6 +17,9 @@ BRIDGED: Final = 0.5
 RATED: Final = 8
 """Steps that tell a rate."""
 
+FEWEST: Final = 5
+"""Samples, of which fewer tell noise."""
+
 
 def unwrapped(times: Array, angles: Array) -> Array:
     """Angles (n,) [rad] without steps of full turns, at times (n,) [s].
@@ -30,9 +33,11 @@ def unwrapped(times: Array, angles: Array) -> Array:
         gap = float(times[k + 1] - times[k])
         before = slice(max(edges[i], k - RATED), k + 1)
         after = slice(k + 1, min(edges[i + 2], k + 2 + RATED))
-        rates = [_rate(times[part], result[part]) for part in (before, after) if part.stop - part.start > 1]
-        if rates and gap <= BRIDGED:
-            missed = float(np.mean(rates)) * gap - (result[k + 1] - result[k])
+        rates = [_rate(times[part], result[part]) for part in (before, after) if part.stop - part.start >= FEWEST]
+        step = float(result[k + 1] - result[k])
+        # An object that is hit or stops meanwhile turns by something in between.
+        if rates and gap <= BRIDGED and not min(rates) * gap <= step <= max(rates) * gap:
+            missed = float(np.mean(rates)) * gap - step
             result[k + 1 :] += 2.0 * np.pi * np.round(missed / (2.0 * np.pi))
     return result
 

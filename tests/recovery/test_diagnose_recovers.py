@@ -91,7 +91,8 @@ def test_the_model_that_leaves_predicts_what_the_diagnosis_says(tilted, tmp_path
 
 
 def test_an_interrupted_diagnosis_goes_on_to_the_same_bytes(tmp_path):
-    made = case(world(count=3, pull=(ERASER.mass * 9.81 * 0.02, 0.0)), time_step=4e-3)
+    recording = world(count=3, pull=(ERASER.mass * 9.81 * 0.02, 0.0))
+    made, again = (case(recording, time_step=4e-3) for _ in range(2))
     effects = ("table_tilt",)
 
     live, cut_off = tmp_path / "live.bin", tmp_path / "cut_off.bin"
@@ -102,8 +103,11 @@ def test_an_interrupted_diagnosis_goes_on_to_the_same_bytes(tmp_path):
 
     whole, _ = diagnose(made, effects=effects, tick=copy, kept=KeptRollouts(live))
     assert cut_off.exists()
-    again, _ = diagnose(made, effects=effects, kept=KeptRollouts(cut_off))
-    assert diagnosis_json(again) == diagnosis_json(whole)
+    goes_on = KeptRollouts(cut_off)
+    half, all_of_them = len(goes_on), len(KeptRollouts(live))
+    resumed, _ = diagnose(again, effects=effects, kept=goes_on)
+    assert diagnosis_json(resumed) == diagnosis_json(whole)
+    assert 0 < half < len(goes_on) == all_of_them  # none was made twice
 
 
 def test_a_diagnosis_prints_and_is_json(tilted, capsys):

@@ -7,7 +7,7 @@ import pytest
 
 from physid_drake.errors import OutputError
 from physid_drake.identify import rollouts
-from physid_drake.identify.kept_rollouts import KEY, MAGIC, KeptRollouts, key_of
+from physid_drake.identify.kept_rollouts import KEY, KeptRollouts, key_of, magic
 from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.rollouts import RolloutPool
 
@@ -59,13 +59,31 @@ def test_a_file_that_was_cut_off_anywhere_holds_what_is_whole_and_goes_on(file):
     assert seen == {0, 1, 2, 3}
 
 
-@pytest.mark.parametrize("content", [b"something else", MAGIC[:-2] + b"2\n" + bytes(60)])
+@pytest.mark.parametrize("content", [b"something else", b"physid-rollouts/1 of other sources\n" + bytes(90)])
 def test_a_file_of_another_kind_is_begun_again(file, content):
     file.write_bytes(content)
     kept = KeptRollouts(file)
     assert len(kept) == 0
     kept.keep(ALL)
     assert len(KeptRollouts(file)) == len(ALL)
+
+
+def test_a_record_that_another_overlaps_is_not_believed(file):
+    """Two processes that share a folder, or a full disk: numbers of one rollout under the key of another."""
+    content = bytearray(file.read_bytes())
+    content[len(magic()) + 60] ^= 1
+    file.write_bytes(bytes(content))
+    assert len(KeptRollouts(file)) == 0 and file.stat().st_size == len(magic())
+
+
+def test_what_there_is_no_room_for_is_made_again(monkeypatch, tmp_path):
+    monkeypatch.setattr(rollouts, "predict", lambda spec, thetas, task: said(round(task.theta[0])))
+    kept = KeptRollouts(tmp_path / "rollouts.bin", most=400)
+    tasks = [Asked(np.array([value])) for value in (1.0, 2.0, 3.0, 4.0, 5.0)]
+    pool = RolloutPool("spec", "thetas", jobs=1, kept=kept)
+    first, again = pool.run(tasks), pool.run(tasks)
+    assert 0 < len(kept) < 5 and all(same(one, other) for one, other in zip(first, again, strict=True))
+    assert (tmp_path / "rollouts.bin").stat().st_size < 400 + len(magic())
 
 
 def test_a_file_that_cannot_be_written_is_one_line(tmp_path):

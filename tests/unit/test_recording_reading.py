@@ -324,6 +324,38 @@ def test_a_tracker_that_is_slower_than_the_log_shows_each_pose_once(written, rat
     assert any("by a tracker slower than the log; repeats left out" in w for w in push.warnings)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_camera_that_is_held_in_a_log_with_a_jittery_clock_loses_no_track(written, seed):
+    """30 Hz in 125 Hz: the object is pushed at 0.5 m/s, and each frame is a leap between poses that are held."""
+
+    def held(poses):
+        rng = np.random.default_rng(seed)
+        poses[:, 0] = 0.008 * np.arange(len(poses))
+        poses[:, 1] = 0.1 + 0.5 * np.clip(poses[:, 0] - 0.3, 0.0, 0.6)
+        frames = np.sort(np.arange(0.0, poses[-1, 0], 1 / 30) + 4e-3 * rng.standard_normal(len(poses) * 30 // 125))
+        shown = np.maximum(np.searchsorted(frames, poses[:, 0]) - 1, 0)
+        poses[:, 1] = (
+            np.interp(frames[shown], poses[:, 0], poses[:, 1]) + 1e-5 * rng.standard_normal(len(frames))[shown]
+        )
+        return poses
+
+    push = read_recording(written(rows=long_table(held, count=200))).pushes[0]
+    assert np.ptp(push.object.positions[:, 0]) == pytest.approx(0.3, abs=1e-3)
+    assert not any("left out" in w and "jumps" in w for w in push.warnings)
+
+
+@pytest.mark.parametrize("noise", [0.0, 5e-4])
+def test_a_rest_before_a_swap_is_not_taken_for_the_push(written, noise):
+    def swapped_at_rest(poses):
+        poses[60:, 2] += 0.05
+        poses[:, 1] = 0.1 + 0.001 * np.clip(np.arange(len(poses)) - 80, 0, 60)
+        poses[:, 1] += noise * np.random.default_rng(1).standard_normal(len(poses))
+        return poses
+
+    push = read_recording(written(rows=long_table(swapped_at_rest, count=200))).pushes[0]
+    assert len(push.object) == 140
+
+
 @pytest.mark.parametrize("step", [2e-5, 1e-4, 1e-3])
 def test_rounded_poses_are_not_taken_for_those_of_a_slow_tracker(written, step):
     def rounded(poses):

@@ -25,6 +25,16 @@ def test_a_spin_keeps_its_turns_over_a_gap(spin, gap):
     )
 
 
+@pytest.mark.parametrize("spin", [-20.0, 20.0, 25.0])
+@pytest.mark.parametrize("hit", [False, True])
+def test_a_spin_that_begins_or_ends_in_a_gap_gets_no_turns_that_nobody_saw(spin, hit):
+    """It rests, or spins, but for 20 ms of a gap of 0.4 s."""
+    times = 0.005 * np.arange(200)
+    angles = spin * (np.maximum(times - 0.58, 0.0) if hit else np.minimum(times, 0.22))
+    seen = (times < 0.2) | (times > 0.6)
+    assert unwrapped(times[seen], wrapped(angles[seen])) == pytest.approx(angles[seen])
+
+
 def test_a_rest_that_was_not_seen_for_long_makes_no_turns():
     """Its rate is noise, and the nearest angle is the best guess."""
     times = np.concatenate([0.01 * np.arange(20), 60.0 + 0.01 * np.arange(20)])

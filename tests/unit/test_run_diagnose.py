@@ -65,7 +65,7 @@ def test_results_go_to_a_folder_named_after_the_recordings(tmp_path, monkeypatch
     (tmp_path / "diagnoses" / "mine" / "diagnosis.json").write_text("{}")
     assert main(["diagnose", "mine"]) == 130
     shown = capsys.readouterr().out
-    assert "going on with 1 rollouts that were kept" in shown and "it is gone" not in shown
+    assert "going on with what was kept, rollouts: 1" in shown and "it is gone" not in shown
     assert main(["diagnose", "mine", "--seed", "1"]) == 130
     shown = capsys.readouterr().out
     assert "going on" not in shown and "it is gone" in shown
