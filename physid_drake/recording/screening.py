@@ -130,33 +130,38 @@ def screen_poses(
     times, positions, quaternions = times[tracked], positions[tracked], quaternions[tracked]
     leaps, lone = _find_leaps(times, positions, quaternions)
     stalls = _find_stalls(positions, quaternions)
-    ends = {last for _, last in stalls}
-    lone = [k for k in lone if k not in ends]
+    lone = [k for k in lone if k not in {last for _, last in stalls}]
     swaps = _find_swaps(times, positions, quaternions, lone) if what == "object" else []
     part = _part_that_moves(positions, quaternions, swaps)
     keep = np.zeros(len(lost), dtype=np.bool_)
     keep[tracked[part]] = True
     for first, last in leaps:
-        if not part.start <= first < part.stop:
-            continue
-        there = describe_rows([rows[k] for k in tracked[first : last + 1].tolist()])
-        far = _how_far(positions, quaternions, first - 1)
-        warnings.append(f"{what}: {there}: jumps {far} away and comes straight back, left out.")
         keep[tracked[first : last + 1]] = False
-    for first, last in stalls:
-        if not part.start <= first < part.stop:
-            continue
-        span = f"rows {rows[tracked[first]]}-{rows[tracked[last]]}"
-        warnings.append(f"{what}: {span}: stalls (same pose {last - first + 1} times, then catches up), kept.")
-    for k in lone:
-        if not part.start <= k + 1 <= part.stop:
-            continue
-        far = _how_far(positions, quaternions, k)
-        left = "what comes before is left out" if k < part.start else "what comes after is left out"
-        fate = f"; {left}" if k in swaps else ", kept"
-        warnings.append(f"{what}: row {rows[tracked[k + 1]]}: jumps {far} and stays there{fate}.")
-    warnings.extend(gap_warnings(times[part], [rows[k] for k in tracked[part].tolist()], what))
+    numbers = [rows[k] for k in tracked.tolist()]
+    found = [(first, _leap_words(positions, quaternions, numbers, first, last)) for first, last in leaps]
+    found += [(first, _stall_words(numbers, first, last)) for first, last in stalls]
+    found += [(k, _lone_words(positions, quaternions, numbers, k, part, swaps)) for k in lone]
+    # Of what lies beyond the part that is kept, only its edges are said.
+    warnings += [f"{what}: {words}" for k, words in found if part.start - 1 <= k < part.stop]
+    warnings += gap_warnings(times[part], numbers[part], what)
     return Screened(keep=keep, warnings=tuple(warnings))
+
+
+def _leap_words(positions: Array, quaternions: Array, rows: Sequence[int], first: int, last: int) -> str:
+    far = _how_far(positions, quaternions, first - 1)
+    return f"{describe_rows(rows[first : last + 1])}: jumps {far} away and comes straight back, left out."
+
+
+def _stall_words(rows: Sequence[int], first: int, last: int) -> str:
+    return f"rows {rows[first]}-{rows[last]}: stalls (same pose {last - first + 1} times, then catches up), kept."
+
+
+def _lone_words(
+    positions: Array, quaternions: Array, rows: Sequence[int], k: int, part: slice, swaps: Sequence[int]
+) -> str:
+    beyond = "before" if k < part.start else "after"
+    fate = f"; what comes {beyond} is left out" if k in swaps else ", kept"
+    return f"row {rows[k + 1]}: jumps {_how_far(positions, quaternions, k)} and stays there{fate}."
 
 
 def gap_warnings(times: Array, rows: Sequence[int], what: str) -> list[str]:
@@ -234,6 +239,8 @@ def _find_swaps(times: Array, positions: Array, quaternions: Array, lone: Sequen
 
 def _part_that_moves(positions: Array, quaternions: Array, swaps: Sequence[int]) -> slice:
     """Of the parts between swaps, the first in which the object is pushed: from a rest, that is."""
+    if not swaps:
+        return slice(0, len(positions))
     edges = [0, *(k + 1 for k in swaps), len(positions)]
     parts = [slice(first, last) for first, last in pairwise(edges)]
     ways = [_way(positions[part], quaternions[part]) for part in parts]

@@ -324,6 +324,15 @@ def test_a_tracker_that_is_slower_than_the_log_shows_each_pose_once(written, rat
     assert any("by a tracker slower than the log; repeats left out" in w for w in push.warnings)
 
 
+def test_an_object_that_was_never_tracked_is_one_line(written):
+    def never(poses):
+        poses[:, 1:4], poses[:, 4:] = 0.0, 0.0
+        return poses
+
+    with pytest.raises(RecordingError, match="at least two object poses are needed"):
+        read_recording(written(rows=long_table(never)))
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_camera_that_is_held_in_a_log_with_a_jittery_clock_loses_no_track(written, seed):
     """30 Hz in 125 Hz: the object is pushed at 0.5 m/s, and each frame is a leap between poses that are held."""
