@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import Body
 from physid_drake.cell.checks import HEAVIEST, LIGHTEST
 from physid_drake.cell.solid import Solid
+from physid_drake.cell.support import FrictionGrid, support_of
 from physid_drake.errors import ConfigError
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.ranges import ANY, COEFFICIENT, POSITIVE, Range
@@ -99,11 +100,20 @@ def theta_map(
         if name not in known and name != "support_friction":
             raise ConfigError(f"theta: there is no parameter '{name}'; known are {', '.join(known)}.")
     wanted = [
-        n for name in config.parameters for n in (friction_names(cells) if name == "support_friction" else [name])
+        n
+        for name in config.parameters
+        for n in (_bearing_cells(cells, solid) if name == "support_friction" else [name])
     ]
     chosen = tuple(_adjusted(known[name], config) for name in dict.fromkeys(wanted))
     nominal = {name: _adjusted(parameter, config).prior_mean for name, parameter in known.items()}
     return ThetaMap(space=ParameterSpace(parameters=chosen), nominal=nominal, cells=cells)
+
+
+def _bearing_cells(cells: tuple[int, int], solid: Solid) -> list[str]:
+    """Names of the cells in which there is something of the object: no push tells of others, and none needs to."""
+    names = friction_names(cells)
+    support = support_of(solid.outline, FrictionGrid(nx=cells[0], ny=cells[1]), points=len(names))
+    return [names[k] for k in np.unique(support.cells).tolist()]
 
 
 def _adjusted(parameter: Parameter, config: ThetaConfig) -> Parameter:

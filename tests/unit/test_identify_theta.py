@@ -7,7 +7,7 @@ from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError, ParameterError
 from physid_drake.identify import ThetaConfig
 from physid_drake.identify.theta import cell_error, friction_names, theta_map
-from physid_drake.recording import Box, ObjectModel
+from physid_drake.recording import Box, Cylinder, ObjectModel, Prism
 
 SHAPE = Box(size=(0.12, 0.05, 0.03))
 WEIGHED = ObjectModel(shape=SHAPE, mass=0.054, mass_std=0.001)
@@ -70,6 +70,26 @@ def test_a_grid_of_frictions_is_named_by_its_cells():
     np.testing.assert_array_equal(grid.body(np.array([0.2, 0.4, 0.3])).support_friction, [0.2, 0.4])
     assert grid.space.lower[1] == 0.1
     assert grid.space.lower[0] == 0.02
+
+
+@pytest.mark.parametrize(
+    ("shape", "cells", "empty"),
+    [
+        (
+            Prism(polygon=((-0.1, -0.02), (0.1, -0.02), (0.0, 0.04)), height=0.03),
+            (4, 4),
+            {(0, 2), (0, 3), (3, 2), (3, 3)},
+        ),
+        (Cylinder(radius=0.04, length=0.03, axis="z"), (8, 8), {(0, 0), (0, 7), (7, 0), (7, 7)}),
+        (Cylinder(radius=0.04, length=0.03, axis="z"), (1, 1), set()),
+        (SHAPE, (3, 2), set()),
+    ],
+)
+def test_a_cell_in_which_there_is_nothing_of_the_object_is_no_unknown(shape, cells, empty):
+    made = theta_map(ObjectModel(shape=shape), solid_of(shape), cells, ThetaConfig(), 500.0)
+    without = {f"support_friction_{i}_{j}" for i, j in empty}
+    assert set(friction_names(cells)) - set(made.space.names) == without
+    assert len(made.body(made.space.nominal).support_friction) == cells[0] * cells[1]
 
 
 def test_a_single_cell_can_be_the_unknown():
