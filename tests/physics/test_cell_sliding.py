@@ -138,6 +138,7 @@ def half_slippery(model, body, cells, mu=(0.5, 0.1), speed=0.5):
     return final(motion), want
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cells", [(1, 2), (2, 2), (4, 4)])
 @both_models
 def test_a_half_slippery_box_turns_to_its_rough_side(model, cells):

@@ -207,6 +207,7 @@ def test_a_robot_with_straight_ramps_keeps_them(seed):
     assert all(fit.pieces == 1 for fit in fit_hand_paths([stream for _, stream in robot(STRAIGHT, seed, 1)], STD))
 
 
+@pytest.mark.slow
 def test_a_path_of_few_knots_is_explained_to_its_noise():
     ratios = []
     for seed in range(20, 40):
@@ -259,6 +260,7 @@ def late_or_early(jitter):
     return paths, streams
 
 
+@pytest.mark.slow
 def test_stamps_that_are_late_or_early_are_no_change_of_speed(monkeypatch):
     paths, streams = late_or_early(1e-3)
     fits = fit_hand_paths(streams, STD)

@@ -77,6 +77,7 @@ def test_fits_are_off_by_as_much_as_their_errors_say(ramp, memory):
     assert np.abs(off(truth, fits) - 1.0).max() < 0.3
 
 
+@pytest.mark.slow
 def test_a_slow_noise_that_is_taken_for_white_passes_for_motion():
     truth = path_of(STRAIGHT)
     told, untold = (fitted(truth, range(3), memory=0.05, told=told) for told in (True, False))
