@@ -45,7 +45,7 @@ def confirm(
         most: effects that are fitted in any case, if they are worth it; as long as none leads near an explanation,
             twice as many. Far from the plain cell a score test says little of what a fit will find.
     """
-    step = Step(fitter=fitter, before=before, tick=tick)
+    step = Confirmation(fitter=fitter, before=before, tick=tick)
     step.fit_the_best(scores, most)
     step.try_elsewhere()
     step.go_on()
@@ -56,7 +56,7 @@ def confirm(
     return tuple(step.found)
 
 
-class Step:
+class Confirmation:
     """The candidates of one step; each method fits some of them again from where more may be found.
 
     Attributes:

@@ -263,7 +263,7 @@ class Fitter:
             say: told of each round.
 
         Returns:
-            The best state seen, linearised.
+            The best state seen, linearised there, or where its last small step began.
         """
         best = self.linearise(state, learn_scatter=careful == 0, like=like)
         like = best if renew else like

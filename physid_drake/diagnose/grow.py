@@ -228,7 +228,7 @@ class Growth:
         if best == step[0].name:
             return grown
         self.tick(f"model with {best}", 0, 0)
-        swapped = self._model_with(models[best].state, bare)
+        swapped = self._model_with(models[best].state, bare, k)
         missed = [s for s in grown.base.signatures if s.kind.name == step[0].name]
         left = [s for s in grown.last.signatures if s.kind.name != best]
         return dc.replace(grown, last=Looked.at(swapped, (*left, *missed), self.rng), without={})
@@ -246,12 +246,13 @@ class Growth:
         again = self.fitter.fit(near.state, rounds=2, like=near, renew=True)
         return again if again.score - plain.score > ANOTHER_BASIN else None
 
-    def _model_with(self, state: State, before: Fitted) -> Fitted:
+    def _model_with(self, state: State, before: Fitted, which: int = -1) -> Fitted:
         """A fitted model with all coordinates of its effects free, all derivatives taken where it is.
 
         Args:
             state: where to start.
-            before: the model without its last effect, or without any.
+            before: the model without one of its effects, or without any.
+            which: of the effects, that one.
         """
         fitter = self.fitter
         effects = tuple(e.freed(fitter.case) for e in state.effects)
@@ -260,11 +261,11 @@ class Growth:
             return best
         if best.reduced_chi2 <= HOPELESS:
             # The pushes' unknowns may have been imitating what is missing: once more, without them at first.
-            far = fitter.fit(of_other_strength(fitter, best), rounds=4, careful=1, renew=True)
+            far = fitter.fit(of_other_strength(fitter, best, which), rounds=4, careful=1, renew=True)
             best = max((best, far), key=lambda model: model.score)
         if best.reduced_chi2 > FAR_OFF:
             best = self._from_another_theta(best)
-        return self._of_other_shape(best, before)
+        return self._of_other_shape(best, before, which)
 
     def _from_another_theta(self, model: Fitted) -> Fitted:
         """A model far from an explanation, fitted again from where theta is best beside its effects.
@@ -279,8 +280,8 @@ class Growth:
         self.tick(f"model with {' and '.join(e.kind.name for e in effects)} from another theta", 0, 0)
         return max((model, fit_afresh(fitter, u, effects)), key=lambda one: one.score)
 
-    def _of_other_shape(self, model: Fitted, before: Fitted) -> Fitted:
-        """A model fitted again from other shapes of its last effect, as long as none explains the pushes.
+    def _of_other_shape(self, model: Fitted, before: Fitted, which: int = -1) -> Fitted:
+        """A model fitted again from other shapes of one of its effects, as long as none explains the pushes.
 
         A patch that is found half as large and beside where it is takes most of a mismatch away, and no step leads on
         from there. One that takes less away is not near.
@@ -289,12 +290,12 @@ class Growth:
             return model
         pool, best = self.fitter.case.pool, model
         enough = pool.count + ENOUGH * len(self.fitter.case.problems)
-        ways = corners(self.fitter, model)
+        ways = corners(self.fitter, model, which)
         for k, corner in enumerate(ways):
             if best.reduced_chi2 <= EXPLAINED or pool.count > enough:
                 break
-            self.tick(f"{best.state.effects[-1].kind.name} elsewhere", k, len(ways))
-            start = of_other_shape(self.fitter, best, corner)
+            self.tick(f"{best.state.effects[which].kind.name} elsewhere", k, len(ways))
+            start = of_other_shape(self.fitter, best, corner, which)
             tried = self.fitter.fit(start, rounds=HOP, careful=HOP, like=best)
             best = tried if tried.score > best.score + ANOTHER_BASIN else best
         return best if best is model else self.fitter.fit(best.state, rounds=3, like=best, renew=True)

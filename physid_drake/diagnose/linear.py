@@ -142,6 +142,11 @@ SCATTERS = tuple(np.geomspace(0.15, 8.0, 16).tolist())  # times the unit scatter
 SCATTER_PRIOR = (1.0, 0.6)  # median, in units of it, and standard deviation of the logarithm
 
 
+def log_prior_of_scatter(scatter: float) -> float:
+    """Of the friction's scatter from push to push, but for a constant."""
+    return -0.5 * float(np.log(scatter / SCATTER_PRIOR[0]) / SCATTER_PRIOR[1]) ** 2
+
+
 def best_scatter(
     pushes: Sequence[LinearPush],
     prior_mean: Array,
@@ -153,7 +158,7 @@ def best_scatter(
     best = (1.0, -np.inf)
     for scatter in among or SCATTERS:
         value = solve(Whitened.of(pushes, float(scatter)), prior_mean, prior_std, bounds).log_likelihood
-        value -= 0.5 * (np.log(scatter / SCATTER_PRIOR[0]) / SCATTER_PRIOR[1]) ** 2
+        value += log_prior_of_scatter(scatter)
         if value > best[1]:
             best = (float(scatter), float(value))
     return best

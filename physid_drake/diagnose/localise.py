@@ -198,8 +198,8 @@ def with_phases(case: Case, wrenches: Sequence[MissingWrench]) -> tuple[MissingW
 
 def _released(case: Case, i: int) -> float:
     """When the tip was last within a millimetre, and the tracker's noise, of the object's outline [s]."""
-    problem, radius = case.problems[i], 0.0 if case.recording.hand is None else case.recording.hand.radius
-    if problem.path is None or len(problem.times) < 2:
+    problem, radius = case.problems[i], case.pool.spec.hand_radius
+    if problem.path is None or radius is None or len(problem.times) < 2:
         return -np.inf
     outline = solid_of(case.recording.object.shape).outline
     near = 1e-3 + 4.0 * case.noise.position

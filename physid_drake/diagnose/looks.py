@@ -207,12 +207,12 @@ def _sense(coefficients: Array) -> str:
 
 def _degrees(coefficients: Array) -> str:
     """Of a direction, 0 to 360."""
-    return f"{math.degrees(math.atan2(coefficients[1], coefficients[0])) % 360.0:.0f}"
+    return f"{round(math.degrees(math.atan2(coefficients[1], coefficients[0]))) % 360}"
 
 
 def _axis(coefficients: Array) -> str:
     """Of an axis, 0 to 180, from the coefficients of twice its angle."""
-    return f"{0.5 * math.degrees(math.atan2(coefficients[1], coefficients[0])) % 180.0:.0f}"
+    return f"{round(0.5 * math.degrees(math.atan2(coefficients[1], coefficients[0]))) % 180}"
 
 
 def _explained(

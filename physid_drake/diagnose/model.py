@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.linear import Bounds, LinearPush, Solution, Whitened
+from physid_drake.diagnose.linear import Bounds, LinearPush, Solution, Whitened, log_prior_of_scatter
 from physid_drake.effects import Coordinate, Effect
 
 Array = NDArray[np.float64]
@@ -135,7 +135,9 @@ class Fitted:
     def cost_here(self) -> float:
         """Twice the negative log posterior at the state itself, nothing left to move: what iterations compare."""
         white = Whitened.of(self.pushes, self.state.scatter)
-        prior = float(np.sum((self.prior_mean / self.prior_std) ** 2))
+        prior = float(np.sum((self.prior_mean / self.prior_std) ** 2)) - 2.0 * log_prior_of_scatter(
+            self.state.scatter
+        )
         return float(white.y @ white.y) + white.log_determinant + prior
 
     @property

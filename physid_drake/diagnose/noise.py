@@ -113,6 +113,8 @@ def tracker_noise(recording: Recording) -> tuple[TrackerNoise, Noise]:
     tau_xy, tau_yaw = position.correlation_time, rotation.correlation_time
     if seen_yaw is None:  # too little rest for one stream, enough for two: it is the same tracker's filter
         tau_yaw = tau_xy
+    elif seen_xy is None:  # or nothing moves but the yaw
+        tau_xy = tau_yaw
     believed = not warnings
     warnings += _quieter("position", plain, seen_xy, "mm", 1e3)
     warnings += _quieter("rotation", plain, seen_yaw, "deg", math.degrees(1.0))
@@ -217,7 +219,9 @@ def _jitter(pushes: Sequence[Push]) -> float:
         squares.append((in_motion - at_rest) / float(stats.chi2.median(1)) / float(np.median(speed[fast])) ** 2)
         rougher.append(math.log(max(in_motion, SMALLEST) / max(at_rest, SMALLEST)))
     # A median of few samples is unsure; jitter is what the pushes agree on.
-    seen = len(squares) >= 5 and float(stats.wilcoxon(rougher, alternative="greater").pvalue) < CHANCE
+    seen = (
+        len(squares) >= 5 and any(rougher) and float(stats.wilcoxon(rougher, alternative="greater").pvalue) < CHANCE
+    )
     return math.sqrt(max(0.0, float(np.median(squares)))) if seen else 0.0
 
 

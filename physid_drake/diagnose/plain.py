@@ -92,9 +92,9 @@ def lost_pushes(case: Case) -> tuple[int, ...]:
 
 
 def numerics(case: Case, state: State) -> tuple[Array, ...]:
-    """Per push (m, 2): how the case's rollout changes with half its own ticks and with the other contact model.
+    """Per push (m, 2): how the rollout changes with half the case's own ticks, and with these and the other contact.
 
-    The case is on ticks twice as long (``coarse``), so that ticks differ by a factor of four.
+    Rollouts of the case are on ticks twice as long (``coarse``), so that ticks differ by a factor of four, and two.
 
     The cell's own error has about the shape and the size of these; each push has an unknown multiple of them.
     """

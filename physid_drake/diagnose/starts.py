@@ -118,50 +118,58 @@ def _sign(one: Score) -> float:
     return float(np.sign(one.coefficients[0]))
 
 
-def of_other_strength(fitter: Fitter, model: Fitted) -> State:
-    """Where to fit once more: the model's last effect at the strength that fits best, the pushes' unknowns at zero.
+def of_other_strength(fitter: Fitter, model: Fitted, which: int = -1) -> State:
+    """Where to fit once more: one of the model's effects as strong as fits best, the pushes' unknowns at zero.
 
     Objects that bounce off the hand twice, or miss it, leave a cost with many minima; unknowns that were fitted in
     one of them belong to it.
     """
-    *others, last = model.state.effects
-    shape = _shape(last, fitter)
-    strong = [j for j in last.kind.leading(fitter.case.around) if j not in shape]
-    chart = last.chart(fitter.case)
+    one = model.state.effects[which]
+    shape = _shape(one, fitter)
+    strong = [j for j in one.kind.leading(fitter.case.around) if j not in shape]
+    chart = one.chart(fitter.case)
     states = []
     for strength in STRENGTHS:
-        point = last.point.copy()
+        point = one.point.copy()
         for j in strong:
-            stronger = last.origin[j] + strength * (last.point[j] - last.origin[j])
+            stronger = one.origin[j] + strength * (one.point[j] - one.origin[j])
             point[j] = np.clip(stronger, chart[j].lower, chart[j].upper)
-        states.append(fitter.start(model.state.u, (*others, dc.replace(last, point=point))))
+        states.append(fitter.start(model.state.u, _with(model, which, dc.replace(one, point=point))))
     return min(states, key=lambda state: fitter.seen_from(model, state).cost_here)
 
 
-def of_other_shape(fitter: Fitter, model: Fitted, corner: tuple[int, ...]) -> State:
-    """A model whose last effect has another shape, the pushes' unknowns at zero.
+def of_other_shape(fitter: Fitter, model: Fitted, corner: tuple[int, ...], which: int = -1) -> State:
+    """A model of whose effects one has another shape, the pushes' unknowns at zero.
 
     Args:
         fitter: that of the model.
         model: where a fit ended.
         corner: of the cube around the effect's shape, -1 or 1 in each coordinate of it.
+        which: of the effects.
     """
-    *others, last = model.state.effects
-    chart = last.chart(fitter.case)
-    point, origin = last.point.copy(), last.origin.copy()
-    for j, side in zip(_shape(last, fitter), corner, strict=True):
+    one = model.state.effects[which]
+    chart = one.chart(fitter.case)
+    point, origin = one.point.copy(), one.origin.copy()
+    for j, side in zip(_shape(one, fitter), corner, strict=True):
         origin[j] = point[j] = np.clip(point[j] + side * ASIDE * chart[j].std, chart[j].lower, chart[j].upper)
-    return fitter.start(model.state.u, (*others, dc.replace(last, point=point, origin=origin)))
+    return fitter.start(model.state.u, _with(model, which, dc.replace(one, point=point, origin=origin)))
 
 
-def corners(fitter: Fitter, model: Fitted) -> list[tuple[int, ...]]:
-    """Of the cube around the shape of a model's last effect, those where it costs least first.
+def _with(model: Fitted, which: int, point: EffectPoint) -> tuple[EffectPoint, ...]:
+    """The effects of a model, one of them elsewhere."""
+    effects = list(model.state.effects)
+    effects[which] = point
+    return tuple(effects)
+
+
+def corners(fitter: Fitter, model: Fitted, which: int = -1) -> list[tuple[int, ...]]:
+    """Of the cube around the shape of one of a model's effects, those where it costs least first.
 
     None for an effect that has strengths only.
     """
-    count = len(_shape(model.state.effects[-1], fitter))
+    count = len(_shape(model.state.effects[which], fitter))
     ways = list(product((-1, 1), repeat=count)) if count else []
-    return sorted(ways, key=lambda way: fitter.seen_from(model, of_other_shape(fitter, model, way)).cost_here)
+    return sorted(ways, key=lambda way: fitter.seen_from(model, of_other_shape(fitter, model, way, which)).cost_here)
 
 
 def _shape(one: EffectPoint, fitter: Fitter) -> list[int]:

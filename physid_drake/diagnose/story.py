@@ -224,7 +224,9 @@ def _rival_states(evidence: Evidence) -> list[State]:
         return []
     k = next((j for j in range(len(steps)) if class_beside(evidence, j)), len(steps) - 1)
     alike = class_beside(evidence, k)
-    others = [c for c in steps[k][1:] if c.name in alike] or [c for c in steps[k][1:] if not c.degenerate][:1]
+    present = {step[0].name for step in steps}
+    rest = [c for c in steps[k][1:] if c.name not in present]
+    others = [c for c in rest if c.name in alike] or [c for c in rest if not c.degenerate][:1]
 
     def in_place(c: Candidate) -> State:
         point = next(e for e in c.fitted.state.effects if e.kind.name == c.name)

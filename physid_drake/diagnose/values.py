@@ -242,7 +242,7 @@ class Diagnosis:
             ``hand_m`` and ``force_n`` (of a component) where hand and force were, ``hand_correlation_time_s`` where
             the hand's noise is slow.
         warnings: what was found odd, one line each.
-        rollouts: how many were made.
+        rollouts: how many were asked for, those of an interrupted run that were kept included.
         pushes: of the whole recording, looked at or not.
     """
 

@@ -47,7 +47,9 @@ def applicable(around: Surroundings, names: Sequence[str] | None = None) -> tupl
     Raises:
         ConfigError: if a name is unknown, or none of those named can be in it.
     """
-    kinds: Iterable[type[Effect]] = CATALOGUE if names is None else [effect_named(name) for name in names]
+    kinds: Iterable[type[Effect]] = (
+        CATALOGUE if names is None else [effect_named(name) for name in dict.fromkeys(names)]
+    )
     found = tuple(kind for kind in kinds if kind.applies(around))
     if names and not found:
         raise ConfigError(f"effects {', '.join(names)}: none of them can be in this recording.")

@@ -80,7 +80,7 @@ class Tether(Effect):
         The wrench is linear in the first three where the rest length is 0, and a fit that begins there finds a cable
         that is slack over a part of the table, or at its middle.
         """
-        reach = float(np.max(around.region[1] - around.region[0]))
+        reach = max(float(np.max(around.region[1] - around.region[0])), 1e-3)  # of an object that only turns in place
         force, most = around.slight, PULL * around.friction * around.weight
         return (
             Coordinate(name="stiffness", step=2.0 * force / reach, lower=0.0),

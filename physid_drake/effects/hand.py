@@ -157,12 +157,6 @@ class HandOffset(_HandEffect):
         most = 0.5 * around.radius
         return tuple(Coordinate(name=name, step=4e-4, lower=-most, upper=most, tolerance=5e-5) for name in ("x", "y"))
 
-    @classmethod
-    def families(cls, around: Surroundings) -> tuple[Family, ...]:
-        """Both together."""
-        del around
-        return (Family(point=(0.0, 0.0), free=(0, 1)),)
-
     def hand(self, path: HandPath, facts: PushFacts) -> HandPath:
         """The path, shifted."""
         return dc.replace(path, start=path.start + facts.hand_axes @ np.array([self.x, self.y]))

@@ -91,7 +91,7 @@ class Identification:
         noise: the recording's.
         search: the search's result; its belief holds P_min.
         polished: the least-squares fit.
-        reduced_chi2: cost per residual; 1 means that the plain cell explains the pushes to their noise.
+        reduced_chi2: cost per degree of freedom; 1 means that the plain cell explains the pushes to their noise.
         training, held_out: names of the pushes.
         before, after: accuracy on held-out pushes with the prior's theta and with the estimate.
         fitted: accuracy on the training pushes.
@@ -299,7 +299,8 @@ def estimates_of(thetas: ThetaMap, polished: Polished) -> tuple[Estimate, ...]:
     prior_spread = np.sqrt(np.diag(np.linalg.inv(prior_rows.T @ prior_rows)))
     curvature = np.sqrt(np.diag(covariance))
     z, spread = float(stats.norm.ppf(0.95)), curvature
-    pushes, free = len(polished.residuals), len(polished.residuals) - space.dimension
+    pushes = sum(bool(np.any(own)) for own in polished.residuals)  # one whose rollout fails says nothing
+    free = pushes - space.dimension
     if free >= 2:
         pulls = _pulls(polished)
         meat = pulls.T @ pulls * (pushes / free)

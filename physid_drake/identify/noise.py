@@ -104,7 +104,7 @@ def noise_of(recording: Recording) -> Noise:
             source[name] = "seen"
             return max(estimate, finest)
         source[name] = "assumed"
-        return assumed
+        return max(assumed, finest)
 
     place = stated.object_position_std, seen.object_position_std
     turn = stated.object_rotation_std, seen.object_rotation_std

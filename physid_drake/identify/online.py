@@ -157,7 +157,7 @@ class OnlineIdentifier:
         A small search over candidates drawn from P_t finds where the new push is explained. Gauss-Newton steps on the
         new push and the earlier pushes' information go on from the trial of least posterior cost.
 
-        A push whose rollouts diverge changes nothing but is counted in ``foreseen``.
+        A push whose rollouts diverge leaves the belief as it was, and is counted in ``foreseen``.
 
         Raises:
             KeyboardInterrupt: when interrupted; the belief is as it was.

@@ -217,7 +217,9 @@ UNKNOWN_HAND = HandUse()
 def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[Start, Array, int]:
     """Start pose from the rest before the motion, or pose and velocity of a free motion from its first samples.
 
-    Its standard deviations, and the first sample to be compared: what gave the start would count twice.
+    Its standard deviations, and the first sample to be compared: what gave the start would count twice. Of a free
+    motion all but the first are compared all the same, since few are left after those that gave its velocity: a
+    deceleration's deviation comes out 10 % too small of 25 samples at 148 Hz, 2.5 % of 80 (by linear algebra).
     """
     if free:
         return *_moving_start(push, planar, noise), 1

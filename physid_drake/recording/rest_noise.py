@@ -18,7 +18,7 @@ LOGIT_PRIOR = -0.5 * ((LOGITS + 1.5) / 2.0) ** 2
 LONGEST = 60  # samples of a rest that are looked at together
 CLOSEST = 0.5  # intervals: samples that are stamped closer together come from bursts, or from two clocks
 UNCORRELATED = 0.02  # from sample to sample
-FEWEST = 10  # samples at rest, in all, that tell a noise, if with much doubt
+FEWEST = 10  # samples of a rest that tells a noise, if with much doubt
 SILENT = 0.1  # of the finest: a rest that is quieter than that tells no noise
 
 
@@ -51,8 +51,8 @@ def seen_noise(pieces: Sequence[tuple[Array, Array]], finest: float) -> SeenNois
     Returns:
         None where the rests are too few, or silent: a coarse or filtered stream that stands still tells no noise.
     """
-    rests = [(t[:LONGEST], v[:LONGEST]) for t, v in pieces if len(t) >= 10]
-    if sum(len(t) for t, _ in rests) < FEWEST:
+    rests = [(t[:LONGEST], v[:LONGEST]) for t, v in pieces if len(t) >= FEWEST]
+    if not rests:
         return None
     interval = float(np.median([usual_interval(t) for t, _ in rests]))
     spread = math.sqrt(float(np.mean([np.var(v) for _, v in rests])))

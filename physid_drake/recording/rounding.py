@@ -22,21 +22,26 @@ def rounding_std(streams: Sequence[Array]) -> float:
 
     Values that were rounded to a step are whole numbers of it apart, and off by a uniform error of step / sqrt(12).
     """
-    steps = [_steps(np.concatenate([stream[:, k] for stream in streams])) for k in range(streams[0].shape[1])]
-    return max((_rounded_to(every) for every in steps), default=0.0) / math.sqrt(12.0)
+    columns = [[stream[:, k] for stream in streams] for k in range(streams[0].shape[1])]
+    return max((_rounded_to(every) for every in columns), default=0.0) / math.sqrt(12.0)
 
 
-def _steps(values: Array) -> Array:
-    """What neighbouring values are apart."""
-    apart: Array = np.diff(np.sort(values))
-    return apart[apart > ALIKE]
-
-
-def _rounded_to(steps: Array) -> float:
-    """The step that all are multiples of; 0 where there is none."""
+def _rounded_to(pieces: Sequence[Array]) -> float:
+    """The step that the values of one coordinate are whole multiples of; 0 where there is none."""
+    apart = np.diff(np.sort(np.concatenate(pieces)))
+    steps = apart[apart > ALIKE]
     if len(steps) < FEWEST:
         return 0.0
     finest = float(steps.min())
     multiples = steps[steps < SHORT * finest] / finest
     on_grid = np.abs(multiples - np.round(multiples)) < ON_GRID
-    return finest if on_grid.mean() > NEARLY_ALL else 0.0
+    return finest if on_grid.mean() > NEARLY_ALL and not _is_even(pieces, finest) else 0.0
+
+
+def _is_even(pieces: Sequence[Array], step: float) -> bool:
+    """Whether values go on as they came: a steady speed puts even samples on a grid, too."""
+    moved, turned = (
+        sum(int((np.abs(np.diff(piece, order)) > 0.5 * step).sum()) for piece in pieces if len(piece) > 2)
+        for order in (1, 2)
+    )
+    return turned < (1.0 - NEARLY_ALL) * moved

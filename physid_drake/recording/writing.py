@@ -33,7 +33,7 @@ from physid_drake.recording.values import (
 
 
 def write_recording(recording: Recording, folder: Path) -> None:
-    """Writes a recording; reading the folder again gives an equal recording.
+    """Writes a recording; reading the folder again gives an equal one, unless screening leaves samples out.
 
     A push whose name is not a ``.csv`` path goes to ``pushes/<name>.csv``. A mesh is copied into the folder
     as the one file it is; materials and textures it refers to are not.

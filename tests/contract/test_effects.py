@@ -330,6 +330,10 @@ def test_effects_apply_where_they_can():
     gone = {kind.name for kind in flat} - {kind.name for kind in applicable(free)}
     assert gone == {"restitution", "hand_compliance", "actuator_lag", "hand_offset", "tracker_latency"}
     assert [kind.name for kind in applicable(free, ["table_tilt"])] == ["table_tilt"]
+    assert [kind.name for kind in applicable(free, ["table_tilt", "magnet", "table_tilt"])] == [
+        "table_tilt",
+        "magnet",
+    ]
     with pytest.raises(ConfigError, match="'ghost' is unknown"):
         effect_named("ghost")
 

@@ -218,7 +218,7 @@ def test_what_else_may_act_in_the_place_of_the_best_is_fitted_there(monkeypatch,
     monkeypatch.setattr(confirm, "in_place", in_place)
     scores = [SimpleNamespace(kind=kind, gain=gain, in_order=False) for kind, gain in ((patch, 100.0), (magnet, 9.0))]
     best = candidate_at(None, scores[0], SimpleNamespace(reduced_chi2=1.1, score=80.0, state=acting_at(place)), 0, 0)
-    step = confirm.Step(fitter=FITTER, before=None, tick=lambda *said: None, found=[best])
+    step = confirm.Confirmation(fitter=FITTER, before=None, tick=lambda *said: None, found=[best])
     step.try_in_the_same_place(scores)
     assert step.found[0].name == first
     assert len(fitted) == fits

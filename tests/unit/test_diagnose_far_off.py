@@ -18,7 +18,7 @@ def step_of(monkeypatch):
     monkeypatch.setattr(confirm, "push_scores", lambda fitted: np.zeros(8))
 
     def of(fitter, before, found):
-        return confirm.Step(fitter=fitter, before=before, tick=lambda *said: None, found=found)
+        return confirm.Confirmation(fitter=fitter, before=before, tick=lambda *said: None, found=found)
 
     return of
 

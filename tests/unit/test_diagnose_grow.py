@@ -144,7 +144,7 @@ def test_an_effect_that_makes_no_simulated_push_better_is_taken_out(grown):
 def rivalled(grown, monkeypatch):
     """A magnet that a tilted table is like, and a drag beside it; (without the first effect, -60 a push)."""
     monkeypatch.setattr(grow, "class_of", lambda plain, step: ("table_tilt",))
-    monkeypatch.setattr(grow.Growth, "_model_with", lambda self, state, plain: self.fitter.fit(state))
+    monkeypatch.setattr(grow.Growth, "_model_with", lambda self, state, plain, which: self.fitter.fit(state))
     magnet = dc.replace(step("magnet")[0], coordinates=4)
     rival = dc.replace(step("table_tilt")[0], fitted=fitted(("table_tilt",), -60.0), coordinates=1)
     last = dc.replace(grown.last, fitted=fitted(("magnet", "viscous_drag"), -5.0))
@@ -248,8 +248,8 @@ FAR_OFF = SimpleNamespace(reduced_chi2=8.0)
 
 @pytest.fixture
 def four_corners(monkeypatch):
-    monkeypatch.setattr(grow, "corners", lambda fitter, model: [0, 1, 2, 3])
-    monkeypatch.setattr(grow, "of_other_shape", lambda fitter, model, corner: corner)
+    monkeypatch.setattr(grow, "corners", lambda fitter, model, which: [0, 1, 2, 3])
+    monkeypatch.setattr(grow, "of_other_shape", lambda fitter, model, corner, which: corner)
 
 
 @pytest.mark.parametrize(

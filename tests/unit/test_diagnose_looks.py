@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from physid_drake.diagnose import looks
 from physid_drake.diagnose.linear import LinearPush
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.looks import locate, looks_at
@@ -123,6 +124,11 @@ def test_the_direction_is_the_planted_one(size):
     plain, wrenches = world(lambda m: force(size, 2.0, m))
     words = locate(case(), plain, wrenches, np.random.default_rng(0)).statement
     assert degrees_in(words, "towards ") == pytest.approx(np.degrees(2.0), abs=5.0)
+
+
+def test_directions_end_before_they_begin_again():
+    assert [looks._degrees(np.array([1.0, y])) for y in (-0.004, 0.004, -0.03)] == ["0", "0", "358"]
+    assert [looks._axis(np.array([1.0, y])) for y in (-0.004, 0.004, -0.07)] == ["0", "0", "178"]
 
 
 def test_the_axis_of_a_grain_is_the_one_that_holds_back_most():

@@ -301,6 +301,14 @@ def test_where_stamps_are_right_pushes_seldom_agree_on_a_jitter():
     assert np.mean(np.array(seen) > 0.0) <= 0.2  # 5 % by chance; rests are where it is quiet: 12 % of 200
 
 
+@pytest.mark.filterwarnings("error")
+def test_streams_without_noise_have_no_jitter():
+    times = np.arange(256) / 128.0  # steps that are even to the last bit
+    places = np.column_stack([0.25 * np.clip(times - 0.5, 0.0, 1.0), 0.0 * times, 0.0 * times])
+    stream = PoseStream(times=times, positions=places, quaternions=np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1)))
+    assert _jitter([Push(name=f"{k}", object=stream, hand=None, force=None) for k in range(6)]) == 0.0
+
+
 def test_white_noise_is_as_rough_as_it_is_noisy():
     rng = np.random.default_rng(5)
     times = np.cumsum(rng.uniform(0.005, 0.05, 20000))

@@ -50,6 +50,15 @@ def test_the_last_effect_is_tried_weaker_and_stronger(fitted, best, start):
     np.testing.assert_array_equal(state.u, [0.4])
 
 
+def test_any_effect_of_a_model_is_tried_weaker_and_stronger():
+    other, bounce = point_of(DRAG, 0.3), point_of(BOUNCE, 0.40)
+    fitter = Fitter(0.0)
+    fitter.seen_from = lambda model, state: SimpleNamespace(cost_here=abs(state.effects[0].point[0] - 0.49))
+    state = starts.of_other_strength(fitter, model_with(bounce, other), 0)
+    np.testing.assert_allclose(state.effects[0].point, [0.48])
+    assert state.effects[1] is other
+
+
 def test_a_weaker_patch_is_where_the_patch_is_and_as_large():
     kind = effect_named("friction_patch")
     names = [c.name for c in kind.chart(AROUND)]
@@ -83,6 +92,11 @@ def test_another_shape_is_a_corner_of_the_prior_around_it(name, shape):
         ways = (moved.point - middle) / np.array([c.std for c in chart])
         assert [chart[j].name for j in np.flatnonzero(ways)] == list(shape)
         np.testing.assert_allclose(ways[ways != 0.0], starts.ASIDE * np.array(corner))
+    swapped = model_with(point, point_of(DRAG, 0.3))
+    for corner in starts.corners(fitter, swapped, 0):
+        state, last = starts.of_other_shape(fitter, swapped, corner, 0), starts.of_other_shape(fitter, model, corner)
+        np.testing.assert_array_equal(state.effects[0].point, last.effects[-1].point)
+        assert state.effects[1] is swapped.state.effects[1]
         # What was unsure is unsure about the new place, and the amplitude about where it was.
         np.testing.assert_array_equal(moved.origin, np.where(ways != 0.0, moved.point, 0.0))
 

@@ -114,6 +114,21 @@ def test_the_next_push_is_to_tell_what_these_cannot(monkeypatch, alike, expected
     assert [e.kind.name for e in rival.effects] == expected and rival.u != final.u
 
 
+def test_what_the_model_has_beside_it_is_no_rival():
+    steps = (step("table_tilt", "magnet", "tether"), step("magnet"))
+    state = Model(0, (point("table_tilt"), point("magnet")))
+    evidence = SimpleNamespace(steps=steps, final=SimpleNamespace(reduced_chi2=1.0, state=state))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(story, "class_beside", lambda evidence, k: ("tether",) if k == 0 else ())
+        _, rival = story._rival_states(evidence)
+    assert [e.kind.name for e in rival.effects] == ["tether", "magnet"]
+    steps = (step("tether"), step("table_tilt", "tether"))
+    evidence = SimpleNamespace(steps=steps, final=SimpleNamespace(reduced_chi2=1.0, state=state))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(story, "class_beside", lambda evidence, k: ())
+        assert story._rival_states(evidence) == [state]
+
+
 def test_a_model_that_explains_nothing_has_no_next_push():
     far = SimpleNamespace(steps=(step("table_tilt", "tether"),), final=SimpleNamespace(reduced_chi2=50.0, state=None))
     assert story._rival_states(far) == []

@@ -64,6 +64,22 @@ def test_what_is_neither_stated_nor_seen_is_assumed(recording):
     assert not noise.correlations.any()
 
 
+def test_an_assumed_noise_is_no_finer_than_the_rounding(recording):
+    rng = np.random.default_rng(0)
+
+    def coarse_ends(push):
+        rows, s = [0, len(push.object) - 1], push.object
+        places = np.round(rng.uniform(-0.3, 0.3, (2, 3)), 2)
+        return replace(
+            push, object=PoseStream(times=s.times[rows], positions=places, quaternions=s.quaternions[rows])
+        )
+
+    several = tuple(replace(push, name=f"{k}") for k, push in enumerate(4 * recording.pushes))
+    noise = noise_of(with_pushes(replace(recording, pushes=several, sensors=Sensors()), coarse_ends))
+    assert noise.source["position"] == "assumed"
+    assert noise.position == pytest.approx(0.01 / 12.0**0.5, rel=1e-6)
+
+
 def test_a_recording_without_noise_is_not_believed_to_be_exact(recording):
     def exact(push):
         s = push.object

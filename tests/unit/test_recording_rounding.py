@@ -34,5 +34,15 @@ def test_one_rounded_coordinate_is_enough():
     assert rounding_std(every) == pytest.approx(1e-3 / math.sqrt(12.0))
 
 
+@pytest.mark.parametrize(("speed", "noise"), [(0.1, 0.0), (0.4, 5e-5)])
+def test_even_samples_of_a_steady_speed_are_not_rounded(speed, noise):
+    rng, times = np.random.default_rng(0), np.linspace(0.0, 1.0, 101)
+    for ways in ([[1.0, 0.0]], [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]):
+        hands = [speed * times[:, None] * np.array(way) + noise * rng.standard_normal((101, 2)) for way in ways]
+        assert rounding_std(hands) < 1e-5
+    steady = np.round(speed * times[:, None] * [0.83, 0.56] + 3e-4 * rng.standard_normal((101, 2)), 3)
+    assert rounding_std([steady]) == pytest.approx(1e-3 / math.sqrt(12.0))
+
+
 def test_poses_of_a_slow_tracker_that_are_held_are_not_rounded():
     assert rounding_std(np.repeat(streams(), 4, axis=1)) < 1e-6
