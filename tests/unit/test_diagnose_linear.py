@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, left_out_scores, own_unknowns, solve
+from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.screen import log_probability
 
 FRICTION = 1  # column of the pushes' own unknowns
@@ -134,3 +135,15 @@ def test_what_would_leave_its_bounds_is_held_there_and_the_others_make_up_for_it
     np.testing.assert_array_equal(wide.beta, free.beta)
     _, betas = left_out_scores(pushes, 1.0, np.zeros(3), std, bounds=bounds)
     assert betas[:, 0].max() <= 0.8 + 1e-12
+
+
+@pytest.mark.parametrize("scatter", [0.3, 1.0, 4.0])
+def test_what_steps_compare_is_the_posterior_from_which_the_scatter_is_learnt(scatter):
+    """Where nothing is left to move, so that both are of one place."""
+    pushes = [dc.replace(push, shared=0.0 * push.shared) for push in made(np.random.default_rng(4))]
+    mean, std = np.zeros(3), np.ones(3)
+    fitted = Fitted(
+        state=State(u=np.full(3, 0.5), effects=(), own=(), scatter=scatter), pushes=tuple(pushes), prior_mean=mean,
+        prior_std=std, solution=solve(Whitened.of(pushes, scatter), mean, std), predicted=(), score=0.0,
+    )  # fmt: skip
+    assert fitted.cost_here == pytest.approx(-2.0 * best_scatter(pushes, mean, std, among=[scatter])[1], rel=1e-9)
