@@ -64,7 +64,7 @@ def opened(folder):
     """The outcomes of the worlds that have been diagnosed, if the seal holds; those that an archive holds."""
     if folder.is_file():
         return archived(folder)
-    check_seal(folder, [file.stem for file in (folder / SEALED).glob("*.json")], read_seal(folder))
+    check_seal(folder, read_seal(folder))
     return read_outcomes(folder / SEALED, folder / "diagnoses")
 
 

@@ -102,6 +102,8 @@ def _register_convert(subparsers: Subparsers) -> None:
 def _run_convert(arguments: argparse.Namespace) -> int:
     from physid_drake.recording.adapters import convert_cmu, convert_cube, convert_mit  # noqa: PLC0415
 
+    if arguments.seed < 0:
+        raise ConfigError(f"--seed must be at least 0, but is {arguments.seed}.")
     convert = {"cmu": convert_cmu, "mit": convert_mit, "cube": convert_cube}[arguments.layout]
     recording = convert(arguments.source, arguments.folder, limit=arguments.limit, seed=arguments.seed)
     print(f"{recording.name}: {len(recording.pushes)} pushes written to {arguments.folder}")
@@ -156,7 +158,7 @@ def _register_prove(subparsers: Subparsers) -> None:
     parser.add_argument("--real", type=Path, metavar="FOLDER",
                         help="instead of worlds, recordings of robots that others published")  # fmt: skip
     parser.add_argument("--only", nargs="+", metavar="NAME", help="of --real: only cases whose names begin so")
-    parser.add_argument("--pushes", type=int, default=20, metavar="N",
+    parser.add_argument("--pushes", type=int, metavar="N",
                         help="of --real: pushes that are diagnosed (default 20)")  # fmt: skip
     parser.set_defaults(run=_run_prove)
 
@@ -171,8 +173,9 @@ def _run_prove(arguments: argparse.Namespace) -> int:
         from physid_drake.run_prove_real import run_real  # noqa: PLC0415
 
         return run_real(arguments)
-    if arguments.only is not None:
-        raise ConfigError("--only chooses among real recordings: give --real too.")
+    for flag, given in (("--only", arguments.only), ("--pushes", arguments.pushes)):
+        if given is not None:
+            raise ConfigError(f"{flag} chooses among real recordings: give --real too.")
     from physid_drake.run_prove import run  # noqa: PLC0415
 
     return run(arguments)

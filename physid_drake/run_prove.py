@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import functools
 import json
+import os
 import re
 import signal
 import subprocess
@@ -16,19 +17,28 @@ from types import FrameType
 
 from rich.console import Console
 
-from physid_drake.errors import ConfigError, OutputError, ProofError
-from physid_drake.prove.diagnosing import RESULT, Attempt, Task, attempt_of, diagnose_all, diagnose_command
+from physid_drake.errors import ConfigError, ProofError
+from physid_drake.prove.diagnosing import (
+    GRACE,
+    RESULT,
+    Attempt,
+    Task,
+    attempt_of,
+    diagnose_all,
+    diagnose_command,
+    is_open,
+)
 from physid_drake.prove.figures import figures_of
 from physid_drake.prove.make import world_id
 from physid_drake.prove.score import read_outcomes
-from physid_drake.prove.seal import SEALED, check_seal, read_seal, shut, unlock
+from physid_drake.prove.seal import SEALED, check_seal, read_seal, sealed_names, shut, unlock
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.proof import Proof, proof_json, proof_markdown, proof_tables
 from physid_drake.report.proof_page import proof_page
 from physid_drake.report.proof_pictures import confusion_picture
-from physid_drake.report.svg import drawn
+from physid_drake.report.svg import drawn, png_of
 from physid_drake.report.terminal import terminal
-from physid_drake.run_folder import SETTINGS, RunFolder, versions
+from physid_drake.run_folder import SETTINGS, RunFolder, settings_text, versions
 
 WORLDS, QUICK = 200, 10
 COMMAND = "prove"
@@ -47,8 +57,8 @@ def run(arguments: argparse.Namespace, command: Commander = diagnose_command) ->
         PhysidError: one line that says what is wrong.
         KeyboardInterrupt: when interrupted; all that is finished is kept.
     """
-    worlds = _checked(arguments)
     out: Path = arguments.out or Path("proofs") / "_".join(filter(None, (f"seed_{arguments.seed}", arguments.kind)))
+    worlds = _checked(arguments, out)
     opening = read_seal(out) if arguments.open else None  # before the folder is claimed: there may be none
     folder = claim(out, {"seed": arguments.seed, "kind": arguments.kind})
     console = terminal()
@@ -73,26 +83,17 @@ def run(arguments: argparse.Namespace, command: Commander = diagnose_command) ->
     return 0
 
 
-def _checked(arguments: argparse.Namespace) -> int:
-    """How many worlds."""
+def _checked(arguments: argparse.Namespace, out: Path) -> int:
+    """How many worlds: those that were asked for, or an opened proof's, all that were sealed."""
     if arguments.quick and arguments.worlds is not None:
         raise ConfigError("--quick means ten worlds: give it or --worlds, not both.")
-    sealed = arguments.open and arguments.out is not None and arguments.worlds is None
-    asked = WORLDS if arguments.worlds is None else int(arguments.worlds)
-    # An opened proof has as many worlds as were sealed.
-    worlds = QUICK if arguments.quick else _sealed_in(arguments.out) or asked if sealed else asked
+    asked = QUICK if arguments.quick else arguments.worlds
+    sealed = len(sealed_names(out)) if arguments.open else 0
+    worlds = int(asked) if asked is not None else sealed or WORLDS
     if worlds < 1:
         raise ConfigError(f"--worlds must be at least 1, but is {worlds}.")
     check_running(arguments)
     return worlds
-
-
-def _sealed_in(out: Path) -> int:
-    """How many worlds a proof's seal is of; 0 where there is none."""
-    try:
-        return sum(f"{SEALED}/" in line for line in (out / "seal.txt").read_text(encoding="utf-8").splitlines())
-    except OSError:
-        return 0
 
 
 def check_running(arguments: argparse.Namespace) -> None:
@@ -111,25 +112,30 @@ def check_running(arguments: argparse.Namespace) -> None:
 def claim(out: Path, settings: dict[str, object]) -> RunFolder:
     """The folder of a proof, refused where it holds another."""
     RunFolder.check(out, COMMAND)
-    return RunFolder.claim(out, json.dumps(settings, indent=2) + "\n", name=SETTINGS, what="proof")
+    return RunFolder.claim(out, settings_text(COMMAND, settings), name=SETTINGS, what="proof")
 
 
 @contextmanager
 def ended_softly() -> Iterator[None]:
-    """Take a request to end for an interruption, so that permissions come back and diagnoses keep their stages."""
+    """Take a request to end, or a terminal that is lost, for an interruption.
+
+    So that permissions come back and diagnoses keep their stages. What is ignored (``nohup``) stays so.
+    """
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
+    asked = [number for number in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(number) != signal.SIG_IGN]
     try:
-        earlier = signal.signal(signal.SIGTERM, interrupt)
+        earlier = {number: signal.signal(number, interrupt) for number in asked}
     except ValueError:  # not the main thread: then nobody can ask
         yield
         return
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, earlier)
+        for number, handler in earlier.items():
+            signal.signal(number, handler)
 
 
 def _make(arguments: argparse.Namespace, worlds: int, out: Path, console: Console) -> str:
@@ -141,7 +147,10 @@ def _make(arguments: argparse.Namespace, worlds: int, out: Path, console: Consol
     last = ""
     with (
         progress_bar(console) as tick,
-        subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child,
+        # In a session of its own: it is told of an interruption once, by the lines below.
+        subprocess.Popen(
+            words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        ) as child,
     ):
         assert child.stderr is not None and child.stdout is not None
         try:
@@ -153,6 +162,10 @@ def _make(arguments: argparse.Namespace, worlds: int, out: Path, console: Consol
             said = child.stdout.read()
         except BaseException:
             child.send_signal(signal.SIGINT)  # it ends its own workers
+            try:
+                child.wait(GRACE)
+            except subprocess.TimeoutExpired:
+                os.killpg(child.pid, signal.SIGKILL)
             raise
     seal = re.search(r"sha256 ([0-9a-f]{64})", said)
     if child.returncode != 0 or seal is None:
@@ -175,8 +188,7 @@ def diagnose_worlds(
 
 def run_tasks(tasks: Sequence[Task], arguments: argparse.Namespace, console: Console) -> None:
     """Diagnose with a bar, and a line for each that ends."""
-    earlier = [attempt_of(task.folder) for task in tasks]
-    left = sum(a is None or (arguments.retry and a.error is not None) for a in earlier)
+    left = sum(is_open(task, arguments.retry) for task in tasks)
     with progress_bar(console) as tick:
         tick("diagnosed", 0, left)
         done = iter(range(1, left + 1))
@@ -215,7 +227,7 @@ def opened(out: Path, names: Sequence[str], seal: str, *, seed: int, kind: str |
     Raises:
         ProofError: if the truth is not the one that was sealed, or nothing is diagnosed yet.
     """
-    check_seal(out, names, seal)
+    check_seal(out, seal)
     ended = [name for name in names if attempt_of(out / "diagnoses" / name) is not None]
     if not ended:
         raise ProofError(f"'{out}': none of the {len(names)} sealed worlds has been diagnosed yet.")
@@ -235,8 +247,5 @@ def write(folder: RunFolder, proof: Proof) -> None:
     folder.write("proof.json", proof_json(proof))
     folder.write("proof.md", proof_markdown(proof))
     folder.write("page.html", proof_page(proof))
-    try:
-        with drawn():
-            confusion_picture(proof.figures).savefig(folder.path / "confusion.png", dpi=150)
-    except OSError as error:
-        raise OutputError(f"'{folder.path / 'confusion.png'}': cannot be written: {error}.") from error
+    with drawn():
+        folder.write_bytes("confusion.png", png_of(confusion_picture(proof.figures)))

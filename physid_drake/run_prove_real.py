@@ -11,21 +11,23 @@ from pathlib import Path
 import numpy as np
 
 from physid_drake.cell import Outcome
-from physid_drake.errors import ConfigError, OutputError, ParameterError, PhysidError
+from physid_drake.errors import ConfigError, ParameterError, PhysidError
 from physid_drake.identify.noise import noise_of
 from physid_drake.identify.problem import PushProblem, problems_of
 from physid_drake.model import ModelCell
 from physid_drake.model_reading import load_model
-from physid_drake.prove.diagnosing import RESULT, Task, diagnose_command
+from physid_drake.prove.diagnosing import FRESH_ERRORS, Task, attempt_of, diagnose_command
 from physid_drake.prove.real import RealCase, chosen_cases, prepare
-from physid_drake.prove.real_score import FRESH_ERRORS, RealOutcome, real_outcome
+from physid_drake.prove.real_score import RealOutcome, real_outcome
 from physid_drake.prove.shapes import height_of
 from physid_drake.recording import MeshShape, read_recording
 from physid_drake.report.real import pressure_picture, real_json, real_markdown, real_table
-from physid_drake.report.svg import drawn
+from physid_drake.report.svg import drawn, png_of
 from physid_drake.report.terminal import terminal
 from physid_drake.run_folder import RunFolder
 from physid_drake.run_prove import Commander, check_running, claim, ended_softly, run_tasks
+
+PUSHES, LEAST_PUSHES = 20, 3
 
 
 def run_real(arguments: argparse.Namespace, command: Commander = diagnose_command) -> int:
@@ -38,25 +40,27 @@ def run_real(arguments: argparse.Namespace, command: Commander = diagnose_comman
     published: Path = arguments.real
     if not published.is_dir():
         raise ConfigError(f"--real '{published}': there is no such folder.")
-    if arguments.pushes < 3:
-        raise ConfigError(f"--pushes must be at least 3, but is {arguments.pushes}.")
+    pushes = PUSHES if arguments.pushes is None else int(arguments.pushes)
+    if pushes < LEAST_PUSHES:
+        raise ConfigError(f"--pushes must be at least {LEAST_PUSHES}, but is {pushes}.")
     check_running(arguments)
     cases = chosen_cases(arguments.only)
     out: Path = arguments.out or Path("proofs") / "real"
-    folder = claim(out, {"real": True, "seed": arguments.seed, "pushes": arguments.pushes})
+    folder = claim(out, {"real": True, "seed": arguments.seed, "pushes": pushes})
     console = terminal()
     with ended_softly():
-        reasons = {c.name: prepare(c, published, out, pushes=arguments.pushes, seed=arguments.seed) for c in cases}
+        reasons = {c.name: prepare(c, published, out, pushes=pushes, seed=arguments.seed) for c in cases}
         there = [case for case in cases if reasons[case.name] is None]
         hidden = (published, out / "held_out")
-        tasks = [_task(case, out, command, hidden, arguments.pushes) for case in there]
+        tasks = [_task(case, out, command, hidden, pushes) for case in there]
         run_tasks(tasks, arguments, console)
         _measure_fresh(there, out)
     outcomes = [
         real_outcome(case, published, out)
-        if reasons[case.name] is None
+        if reasons.get(case.name) is None
         else RealOutcome(case=case, skipped=f"left out: {reasons[case.name]}")
-        for case in cases
+        for case in chosen_cases(None)
+        if case in cases or attempt_of(out / "diagnoses" / case.id) is not None
     ]
     _write(folder, outcomes)
     console.print(real_table(outcomes))
@@ -75,7 +79,8 @@ def _measure_fresh(cases: Sequence[RealCase], out: Path) -> None:
     for case in cases:
         diagnosis, held = out / "diagnoses" / case.id, out / "held_out" / case.id
         file = diagnosis / FRESH_ERRORS
-        if file.exists() or not (diagnosis / RESULT).exists() or not any(held.iterdir()):
+        attempt = attempt_of(diagnosis)
+        if file.exists() or attempt is None or attempt.error is not None or not any(held.iterdir()):
             continue
         try:
             errors = fresh_errors(diagnosis, held)
@@ -90,14 +95,14 @@ def _measure_fresh(cases: Sequence[RealCase], out: Path) -> None:
 def fresh_errors(diagnosis: Path, held: Path) -> np.ndarray:
     """End-point errors (n, 2) [m, rad] of a model on a recording's pushes.
 
+    Nothing tells where these pushes were among the others: a friction that drifts is that of the first push.
+
     Args:
         diagnosis: folder with ``model.yaml``.
         held: folder of the recording.
 
     Raises:
         PhysidError: if the model or the recording cannot be read, or a rollout diverges.
-
-    Nothing tells where these pushes were among the others: a friction that drifts is that of the first push.
     """
     recording = read_recording(held)
     shape = recording.object.shape
@@ -125,9 +130,6 @@ def _write(folder: RunFolder, outcomes: Sequence[RealOutcome]) -> None:
     for outcome in outcomes:
         if outcome.pressure is None:
             continue
-        picture = folder.path / f"pressure_{outcome.case.name}.png"
-        try:
-            with drawn():
-                pressure_picture(outcome.pressure, outcome.case.name).savefig(picture, dpi=150)
-        except OSError as error:
-            raise OutputError(f"'{picture}': cannot be written: {error}.") from error
+        with drawn():
+            picture = png_of(pressure_picture(outcome.pressure, outcome.case.name))
+        folder.write_bytes(f"pressure_{outcome.case.name}.png", picture)

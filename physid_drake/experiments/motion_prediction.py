@@ -142,12 +142,12 @@ class MotionPrediction:
         for method in methods:
             for count in shown:
                 found = [r["methods"][method] for r in records]
-                rows.append((method, count, *_spread([f["mm"][count - 1] for f in found]),
-                             *_spread([f["deg"][count - 1] for f in found]),
-                             *_spread([f["sigmas"][count - 1] for f in found])))  # fmt: skip
+                rows.append((method, count, *mean_and_deviation([f["mm"][count - 1] for f in found]),
+                             *mean_and_deviation([f["deg"][count - 1] for f in found]),
+                             *mean_and_deviation([f["sigmas"][count - 1] for f in found])))  # fmt: skip
         for name, key in (("nominal theta", "nominal_theta"), ("true theta in the cell", "true_theta")):
-            rows.append((name, None, *_spread([r[key]["mm"] for r in records]),
-                         *_spread([r[key]["deg"] for r in records]), None, None))  # fmt: skip
+            rows.append((name, None, *mean_and_deviation([r[key]["mm"] for r in records]),
+                         *mean_and_deviation([r[key]["deg"] for r in records]), None, None))  # fmt: skip
         return Table(
             name="budget", title=f"{self.testing} test pushes, by trials (mean and deviation over worlds)",
             columns=("method", "trials", "mm", "+- mm", "deg", "+- deg", "training sigma", "+- sigma"),
@@ -160,15 +160,11 @@ class MotionPrediction:
             title=f"{self.pushes - self.training} other pushes, by training pushes ({self.budget} trials)",
             columns=("training pushes", "mm", "+- mm", "deg", "+- deg"),
             rows=tuple(
-                (count, *_spread([r["subsets"][str(count)]["mm"] for r in records]),
-                 *_spread([r["subsets"][str(count)]["deg"] for r in records]))
+                (count, *mean_and_deviation([r["subsets"][str(count)]["mm"] for r in records]),
+                 *mean_and_deviation([r["subsets"][str(count)]["deg"] for r in records]))
                 for count in self.subsets
             ),
         )  # fmt: skip
-
-
-def _spread(values: Sequence[float]) -> tuple[float, float]:
-    return mean_and_deviation(values)
 
 
 def _ends(errors: EndErrors) -> dict[str, float]:

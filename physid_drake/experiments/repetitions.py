@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import dataclasses as dc
+import functools
 import json
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 from physid_drake.errors import OutputError
 from physid_drake.experiments.values import Experiment, Record
+from physid_drake.processes import in_processes
 from physid_drake.progress import Progress
 from physid_drake.run_folder import SETTINGS, RunFolder, settings_text
 
@@ -86,14 +86,7 @@ def _made(experiment: Experiment, indices: Sequence[int], jobs: int, tick: Progr
             yield index, _through_json(experiment.repeat(index, _told(tick, index, experiment.repetitions)))
         return
     tick("first repetitions", 0, experiment.repetitions)
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        futures = {pool.submit(_repeat, experiment, index): index for index in indices}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    yield from in_processes(functools.partial(_repeat, experiment), indices, jobs)
 
 
 def _repeat(experiment: Experiment, index: int) -> Record:

@@ -1,5 +1,7 @@
 """Runs the command line blind to some folders: ``python -m physid_drake.prove.blindfold FOLDERS WORDS``.
 
+FOLDERS is a JSON list of paths.
+
 Permissions do not stop root, so Python itself refuses: every opening or listing of what lies in the folders, in this
 interpreter, raises an error that ends the command. Nothing is hidden from what runs outside of Python's own file
 functions (Drake's C++, other programs).
@@ -8,6 +10,7 @@ functions (Drake's C++, other programs).
 from __future__ import annotations
 
 import errno
+import json
 import os
 import runpy
 import sys
@@ -51,7 +54,7 @@ def _lies_in(path: str, folders: tuple[str, ...]) -> bool:
 def main() -> None:
     """Run ``physid_drake`` with the words after the first, blind to the folders that the first names."""
     folders, *words = sys.argv[1:]
-    blind_to(*folders.split(os.pathsep))
+    blind_to(*json.loads(folders))
     sys.argv = ["physid_drake", *words]
     runpy.run_module("physid_drake", run_name="__main__", alter_sys=True)
 

@@ -20,9 +20,11 @@ from physid_drake.run_folder import RunFolder
 RESULT: Final = "diagnosis.json"
 ATTEMPT: Final = "attempt.json"
 """Beside a diagnosis: how long it took [s], or why there is none."""
+FRESH_ERRORS: Final = "fresh.json"
+"""Beside it: end-point errors of its model on pushes that it did not get."""
 LOG: Final = "log.txt"
 _POLL: Final = 0.05  # s
-_GRACE: Final = 10.0  # s that an interrupted diagnosis has to keep its stages
+GRACE: Final = 10.0  # s that an interrupted diagnosis has to keep its stages
 _LONGEST_LINE: Final = 300
 
 
@@ -57,7 +59,7 @@ def diagnose_command(recording: Path, folder: Path, *sealed: Path) -> tuple[str,
         folder: where its results go.
         sealed: what it must not see.
     """
-    hidden = os.pathsep.join(str(path.resolve()) for path in sealed)
+    hidden = json.dumps([str(path.resolve()) for path in sealed])
     return (
         sys.executable, "-m", "physid_drake.prove.blindfold", hidden, "diagnose", str(recording.resolve()),
         "--out", str(folder.resolve()), "--jobs", "1", "--seed", "0",
@@ -96,7 +98,7 @@ def diagnose_all(
     Raises:
         KeyboardInterrupt: when interrupted; what runs is told so first, so that it can keep its stages.
     """
-    waiting = [task for task in tasks if _is_open(task, again)]
+    waiting = [task for task in tasks if is_open(task, again)]
     running: list[_Running] = []
     try:
         while waiting or running:
@@ -107,16 +109,17 @@ def diagnose_all(
                 attempt = one.look(timeout)
                 if attempt is not None:
                     running.remove(one)
-                    _note(one.task.folder, attempt)
+                    _note(one, attempt)
                     ended(one.task, attempt)
     finally:
         for one in running:
             one.interrupt()
         for one in running:
-            one.stop(_GRACE)
+            one.stop(GRACE)
 
 
-def _is_open(task: Task, again: bool) -> bool:
+def is_open(task: Task, again: bool) -> bool:
+    """Whether a task has not ended, or has failed and is to be run ``again``."""
     attempt = attempt_of(task.folder)
     return attempt is None or (again and attempt.error is not None)
 
@@ -130,9 +133,9 @@ def code_digest() -> str:
     return total.hexdigest()
 
 
-def _note(folder: Path, attempt: Attempt) -> None:
-    content = {"seconds": round(attempt.seconds, 3), "error": attempt.error, "code": code_digest()}
-    RunFolder(path=folder).write(ATTEMPT, json.dumps(content, indent=2) + "\n")
+def _note(run: _Running, attempt: Attempt) -> None:
+    content = {"seconds": round(attempt.seconds, 3), "error": attempt.error, "code": run.code}
+    RunFolder(path=run.task.folder).write(ATTEMPT, json.dumps(content, indent=2) + "\n")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,18 +146,20 @@ class _Running:
     child: subprocess.Popen[bytes]
     log: IO[bytes]
     since: float
+    code: str
 
     @classmethod
     def begin(cls, task: Task) -> _Running:
         task.folder.mkdir(parents=True, exist_ok=True)
-        (task.folder / ATTEMPT).unlink(missing_ok=True)
+        for name in (ATTEMPT, RESULT, FRESH_ERRORS):  # of an attempt that failed
+            (task.folder / name).unlink(missing_ok=True)
         log = (task.folder / LOG).open("wb")
         # One thread each: several diagnoses run side by side.
         threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
         child = subprocess.Popen(
             task.words, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, env={**os.environ, **threads}
         )
-        return cls(task=task, child=child, log=log, since=time.monotonic())
+        return cls(task=task, child=child, log=log, since=time.monotonic(), code=code_digest())
 
     def look(self, timeout: float) -> Attempt | None:
         """How it ended; None while it runs."""

@@ -50,7 +50,8 @@ def _residuals(push: Push, poses: Array, rate: float) -> Array:
         means: Array = errors.mean(axis=0, keepdims=True)
         return means
     first, last = int(moving[0]), int(going[-1]) + 1
-    parts = [*np.array_split(errors[first:last], WINDOWS), errors[last:]]
+    windows = max(1, min(WINDOWS, (last - first) // 2))
+    parts = [*np.array_split(errors[first:last], windows), errors[last:]]
     return np.array([part.mean(axis=0) for part in parts if len(part)])
 
 

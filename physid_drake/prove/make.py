@@ -8,6 +8,7 @@ worlds that exist are skipped.
 from __future__ import annotations
 
 import argparse
+import functools
 import hashlib
 import json
 import math
@@ -15,15 +16,14 @@ import shutil
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Final, Literal, TypeAlias, get_args
 
 import numpy as np
 
 from physid_drake.errors import ParameterError, PhysidError
+from physid_drake.processes import in_processes
 from physid_drake.prove.contact import RESIDUAL_RESTITUTION
 from physid_drake.prove.effects.catalogue import CATALOGUED, OTHERS
 from physid_drake.prove.effects.effect import Effect, parameters_of
@@ -304,9 +304,8 @@ def _made(
     if jobs <= 1 or len(indices) <= 1:
         yield from (_write_world(out, index, seed, kind, effect) for index in indices)
         return
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        futures = [pool.submit(_write_world, out, index, seed, kind, effect) for index in indices]
-        yield from (future.result() for future in as_completed(futures))
+    write = functools.partial(_write_world, out, seed=seed, kind=kind, effect=effect)
+    yield from (identity for _, identity in in_processes(write, indices, jobs))
 
 
 def _write_world(out: Path, index: int, seed: int, kind: Kind | None, effect: str | None) -> str:

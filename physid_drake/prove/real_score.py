@@ -13,13 +13,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.prove.diagnosing import RESULT, attempt_of
+from physid_drake.prove.diagnosing import FRESH_ERRORS, RESULT, attempt_of
 from physid_drake.prove.real import RealCase
 from physid_drake.prove.score import number
 from physid_drake.prove.shapes import Array
 from physid_drake.recording import read_recording
 
-FRESH_ERRORS: Final = "fresh.json"
 """Beside a diagnosis: end-point errors of its model on pushes that it did not get."""
 NEAR: Final = 0.015
 """m from a point of support."""

@@ -170,16 +170,16 @@ def outcome(truth: dict[str, Any], diagnosis: dict[str, Any], seconds: float = m
     )
 
 
-def failed_outcome(truth: dict[str, Any], attempt: Attempt | None) -> Outcome:
-    """A world of which there is no diagnosis: nothing was found in it, and the score says so."""
+def failed_outcome(truth: dict[str, Any], attempt: Attempt) -> Outcome:
+    """A world whose diagnosis failed: nothing was found in it, and the score says so."""
     return Outcome(
         id=truth["id"],
         kind=truth["kind"],
         true=tuple(e["name"] for e in truth["effects"]),
         size=truth["size_sigma"],
         verdict=FAILED,
-        seconds=math.nan if attempt is None else attempt.seconds,
-        error="there is no diagnosis." if attempt is None else attempt.error,
+        seconds=attempt.seconds,
+        error=attempt.error,
     )
 
 
@@ -189,16 +189,16 @@ def read_outcomes(sealed: Path, diagnoses: Path, identities: Sequence[str] | Non
     Args:
         sealed: folder of the truths.
         diagnoses: folder with one folder for each world.
-        identities: only these worlds, and those without a diagnosis count as failed; None: all that have one.
+        identities: only these worlds; None: all. Those that have not been diagnosed yet are left out.
     """
     outcomes = []
     names = [file.stem for file in sealed.glob("*.json")] if identities is None else list(identities)
     for name in sorted(names):
         attempt = attempt_of(diagnoses / name)
-        if identities is None and attempt is None:
+        if attempt is None:
             continue
         truth = json.loads((sealed / f"{name}.json").read_text(encoding="utf-8"))
-        if attempt is None or attempt.error is not None:
+        if attempt.error is not None:
             outcomes.append(failed_outcome(truth, attempt))
             continue
         found = json.loads((diagnoses / name / RESULT).read_text(encoding="utf-8"))

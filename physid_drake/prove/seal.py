@@ -50,7 +50,9 @@ def seal_of(folder: Path, identities: Sequence[str]) -> str:
 
 
 def write_seal(out: Path, identities: Sequence[str]) -> str:
-    """Write down the hashes of sealed files, and return the one over all; files of an earlier seal must be as then.
+    """Write down the hashes of sealed files, and return the one over all, those of an earlier seal included.
+
+    Files of an earlier seal must be as they were then.
 
     Args:
         out: folder that holds ``sealed``.
@@ -69,7 +71,7 @@ def write_seal(out: Path, identities: Sequence[str]) -> str:
         )
     lines = [f"{digest}  {SEALED}/{name}.json\n" for name, digest in sorted({**earlier, **digests}.items())]
     (out / LINES).write_text("".join(lines), encoding="utf-8")
-    total = seal_of(out / SEALED, identities)
+    total = seal_of(out / SEALED, sealed_names(out))
     (out / TOTAL).write_text(f"{total}\n", encoding="utf-8")
     return total
 
@@ -86,17 +88,22 @@ def read_seal(out: Path) -> str:
         raise ProofError(f"'{out}' holds no sealed worlds: run the command without --open first.") from error
 
 
-def check_seal(out: Path, identities: Sequence[str], written: str) -> None:
+def sealed_names(out: Path) -> list[str]:
+    """The worlds whose hashes were written down, sorted; none where there is no seal."""
+    return sorted(_read_lines(out / LINES))
+
+
+def check_seal(out: Path, written: str) -> None:
     """Refuse a truth, or a recording, that is not the one that was sealed.
 
     Args:
         out: folder that holds ``sealed`` and ``recordings``.
-        identities: of the worlds.
         written: the hash that was written down before.
 
     Raises:
         ProofError: if a hash is another now.
     """
+    identities = sealed_names(out)
     now = seal_of(out / SEALED, identities)
     if now != written:
         raise ProofError(
@@ -139,6 +146,11 @@ def _digests(folder: Path, identities: Sequence[str]) -> dict[str, str]:
         file = folder / f"{identity}.json"
         try:
             digests[identity] = hashlib.sha256(file.read_bytes()).hexdigest()
+        except PermissionError as error:
+            raise ProofError(
+                f"sealed truth '{file}': is shut, as while worlds are diagnosed; where nothing runs any more, the"
+                " command without --open gives it back."
+            ) from error
         except OSError as error:
             raise ProofError(f"sealed truth '{file}': cannot be read: {error.strerror or error}.") from error
     return digests

@@ -165,7 +165,7 @@ def arrow_figure(view: TableView) -> Markup | None:
                     at[:, 0], at[:, 1], forces[chosen, 0], forces[chosen, 1], angles="xy", scale_units="xy",
                     scale=scale, width=0.0055, color=colour, alpha=0.95 if sure else 0.28, zorder=3,
                 )  # fmt: skip
-    _draw_key(axes, box, _round_number(0.4 * largest), scale)
+    _draw_key(axes, _round_number(0.4 * largest), scale)
     return svg_of(figure, "arrows", "Missing force on the table from above")
 
 
@@ -187,7 +187,7 @@ def _round_number(value: float) -> float:
     return max(m for m in (1.0, 2.0, 5.0) if m <= value / power + 1e-9) * power
 
 
-def _draw_key(axes: Axes, box: Box, force: float, scale: float) -> None:
+def _draw_key(axes: Axes, force: float, scale: float) -> None:
     """How long an arrow of a round force is, on a plate in the upper left."""
     left, right = axes.get_xlim()
     reach = force / scale / (right - left)

@@ -39,6 +39,7 @@ _STYLE: dict[Any, Any] = {
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
     "savefig.transparent": True,
+    "svg.hashsalt": "physid_drake",  # so that ids repeat
 }
 
 
@@ -49,6 +50,13 @@ def drawn() -> Iterator[None]:
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
         yield
+
+
+def png_of(figure: Figure) -> bytes:
+    """A figure as a picture file."""
+    file = io.BytesIO()
+    figure.savefig(file, format="png", dpi=150)
+    return file.getvalue()
 
 
 def svg_of(figure: Figure, salt: str, label: str) -> Markup:

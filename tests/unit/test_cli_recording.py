@@ -88,6 +88,7 @@ def test_a_picture_without_a_suffix_is_refused_before_it_has_another_name(tmp_pa
 def test_convert_writes_a_recording_that_inspect_reads(tmp_path, capsys):
     table = tmp_path / "abs_tri2_v10.csv"
     table.write_text(COLUMNS + "\n" + "0.3,0,3.1,0.33,0,-3.1,0.2,0,0.25,0\n" * 5)
+    assert cli.main(["convert", "mit", str(table), str(tmp_path / "r"), "--seed", "-1"]) == 1
     assert cli.main(["convert", "mit", str(table), str(tmp_path / "r"), "--limit", "2"]) == 0
     assert "mit_tri2_abs: 2 pushes written" in capsys.readouterr().out
     assert cli.main(["inspect", str(tmp_path / "r")]) == 0

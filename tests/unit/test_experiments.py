@@ -18,6 +18,8 @@ from physid_drake.experiments.mit_pushes import counts, pressed
 from physid_drake.experiments.repetitions import claim, run_all
 from physid_drake.experiments.values import Panel, Result, Table, mean_and_deviation, series_of
 from physid_drake.report.experiment import result_figure, result_json, result_markdown, table_csv
+from physid_drake.run_experiment import write
+from physid_drake.run_folder import RunFolder
 from physid_drake.space import Parameter, ParameterSpace
 
 SPACE = ParameterSpace(
@@ -105,6 +107,15 @@ def test_a_result_is_written_without_what_is_not_known():
     text = result_markdown(result, "name", "the command")
     assert "| two | - |" in text and "    the command" in text and "Left out: three" in text
     assert len(result_figure(result).axes) == 1
+
+
+def test_a_result_is_written_to_the_same_bytes(tmp_path):
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        write(RunFolder(path=tmp_path / name), example(), "name", "command")
+    files = sorted(file.name for file in (tmp_path / "one").iterdir())
+    assert "figure.svg" in files
+    assert all((tmp_path / "one" / f).read_bytes() == (tmp_path / "two" / f).read_bytes() for f in files)
 
 
 def test_repetitions_that_are_done_are_not_made_again(counted, tmp_path):

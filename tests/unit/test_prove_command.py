@@ -1,6 +1,7 @@
 """The command ``prove`` with worlds and diagnoses that cost nothing."""
 
 import json
+import signal
 import stat
 import sys
 import time
@@ -130,6 +131,50 @@ def test_an_interrupted_run_keeps_what_is_finished_and_opens_the_seal_again(worl
     assert calls(worlds).count(finished[0]) == 1
 
 
+def test_a_failure_that_is_tried_again_and_interrupted_has_not_ended(tmp_path):
+    tasks = [Task(name="a", words=(sys.executable, "-c", "import time; time.sleep(60)"), folder=tmp_path / "a")]
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "attempt.json").write_text(json.dumps({"seconds": 1.0, "error": "error: no"}))
+    (tmp_path / "a" / "diagnosis.json").write_text("{}")  # written before it failed
+
+    def stop(seconds):
+        raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr("physid_drake.prove.diagnosing.time.sleep", stop)
+        diagnose_all(tasks, jobs=1, timeout=60.0, ended=lambda task, attempt: None, again=True)
+    assert attempt_of(tmp_path / "a") is None
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_request_to_end_is_an_interruption(number):
+    before = signal.getsignal(number)
+    with pytest.raises(KeyboardInterrupt), run_prove.ended_softly():
+        signal.raise_signal(number)
+    assert signal.getsignal(number) == before
+    signal.signal(number, signal.SIG_IGN)  # as nohup does
+    try:
+        with run_prove.ended_softly():
+            signal.raise_signal(number)
+    finally:
+        signal.signal(number, before)
+
+
+def test_fewer_worlds_can_be_scored_of_more_that_are_sealed(worlds):
+    prove(worlds)
+    prove(worlds, "--worlds", "2")
+    assert sum(json.loads((worlds / "proof.json").read_text())["figures"]["worlds"].values()) == 2
+    arguments = build_parser().parse_args(["prove", "--open", "--out", str(worlds)])
+    assert run_prove.run(arguments, command=fake) == 0
+    assert sum(json.loads((worlds / "proof.json").read_text())["figures"]["worlds"].values()) == 3
+
+
+def test_a_proof_where_it_is_by_default_is_opened_whole(worlds, monkeypatch):
+    monkeypatch.chdir(worlds.parent)
+    prove(Path("proofs") / "seed_0")
+    assert run_prove.run(build_parser().parse_args(["prove", "--open"]), command=fake) == 0
+
+
 def test_the_sealed_folder_is_shut_while_worlds_are_diagnosed(worlds, monkeypatch):
     modes = []
     run_tasks = run_prove.run_tasks
@@ -186,6 +231,7 @@ def test_another_proof_in_the_same_folder_is_refused(worlds):
         (["--seed", "-1"], "--seed must be at least 0"),
         (["--timeout", "0"], "--timeout must be positive"),
         (["--only", "cmu"], "give --real too"),
+        (["--pushes", "5"], "give --real too"),
         (["--real", "/nowhere"], "there is no such folder"),
         (["--real", "/", "--quick"], "--quick is of sealed worlds"),
         (["--real", "/", "--worlds", "3"], "--worlds is of sealed worlds"),
@@ -239,6 +285,6 @@ def test_a_crash_and_a_silence_have_a_line_too(tmp_path):
 def test_the_command_is_given_the_recording_and_no_truth(tmp_path):
     words = diagnose_command(tmp_path / "recordings" / "ab", tmp_path / "diagnoses" / "ab", tmp_path / "sealed")
     at = words.index("diagnose")
-    assert words[1:at] == ("-m", "physid_drake.prove.blindfold", str(tmp_path / "sealed"))
+    assert words[1:at] == ("-m", "physid_drake.prove.blindfold", json.dumps([str(tmp_path / "sealed")]))
     assert not any("sealed" in word for word in words[at:])
     assert words[words.index("--jobs") + 1] == "1"

@@ -51,6 +51,15 @@ def test_noise_is_averaged_within_windows():
     assert floor["rms"] ** 2 == pytest.approx(want, rel=0.03)
 
 
+def test_a_short_motion_has_fewer_windows_as_in_a_diagnosis():
+    rng = np.random.default_rng(0)
+    share = np.concatenate([np.zeros(STILL), np.linspace(0.0, 1.0, 19)[1:], np.ones(2 * STILL)])
+    rows = np.outer(share, [0.1, 0.0, 0.5])
+    pushes = [push(rows + DEVIATIONS * rng.standard_normal(rows.shape)) for _ in range(300)]
+    want = (9 / 2 + 1 / (2 * STILL)) / 10  # nine windows of two samples
+    assert floor_of(pushes, [rows] * 300, RATE, DEVIATIONS)["rms"] ** 2 == pytest.approx(want, rel=0.05)
+
+
 def test_a_world_that_rests_earlier_stays_there_and_whole_turns_are_none():
     short = poses()[: -2 * STILL + 1]
     floor = floor_of([push(poses())], [short + np.array([0.0, 0.0, 4.0 * math.pi])], RATE, DEVIATIONS)

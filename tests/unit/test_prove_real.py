@@ -212,3 +212,8 @@ def test_the_command_writes_a_table_and_goes_on(published, tmp_path, monkeypatch
     assert row.split("|")[head.split("|").index(" N ")] == column
     assert run_prove_real.run_real(arguments, command=fake) == 0
     assert (tmp_path / "out" / "real.md").read_bytes() == first
+    fewer = build_parser().parse_args([*words[:3], "--only", "square", "--out", str(tmp_path / "out")])
+    assert run_prove_real.run_real(fewer, command=fake) == 0  # what was diagnosed before stays in the table
+    assert {case["name"] for case in json.loads((tmp_path / "out" / "real.json").read_text())["cases"]} == {
+        "mit_rect1_v20", "square_drops",
+    }  # fmt: skip

@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from physid_drake.errors import ProofError
+from physid_drake.prove.diagnosing import diagnose_command
 from physid_drake.prove.seal import RECORDING, check_seal, files_digest, seal_of, shut, unlock, write_seal
 from physid_drake.resources import shipped
 
@@ -23,10 +24,10 @@ def folder(tmp_path):
 
 def test_a_truth_that_changed_after_it_was_sealed_is_refused(folder):
     written = write_seal(folder, ["aa", "bb"])
-    check_seal(folder, ["aa", "bb"], written)
+    check_seal(folder, written)
     (folder / "sealed" / "bb.json").write_text("{}")
     with pytest.raises(ProofError, match=r"^the seal is broken: .* nothing is scored\.$"):
-        check_seal(folder, ["aa", "bb"], written)
+        check_seal(folder, written)
     # The hash that is written down cannot be made to fit either.
     with pytest.raises(ProofError, match=r"bb\.json' has changed since it was sealed"):
         write_seal(folder, ["aa", "bb"])
@@ -40,13 +41,13 @@ def test_a_recording_that_changed_after_it_was_sealed_is_refused(folder):
     truth = {"id": "aa", RECORDING: files_digest(folder / "recordings" / "aa")}
     (folder / "sealed" / "aa.json").write_text(json.dumps(truth))
     written = write_seal(folder, ["aa", "bb"])
-    check_seal(folder, ["aa", "bb"], written)
+    check_seal(folder, written)
     push.write_text("time_s\n1\n")
     with pytest.raises(ProofError, match=r"recordings/aa' is not the recording that was sealed"):
-        check_seal(folder, ["aa", "bb"], written)
+        check_seal(folder, written)
     push.rename(push.with_name("002.csv"))
     with pytest.raises(ProofError, match="not the recording that was sealed"):
-        check_seal(folder, ["aa"], seal_of(folder / "sealed", ["aa"]))
+        check_seal(folder, written)
 
 
 def test_a_truth_that_is_missing_is_named(folder):
@@ -62,6 +63,21 @@ def test_a_seal_grows_with_its_worlds(folder):
     assert (
         subprocess.run(["sha256sum", "-c", "seal.txt"], cwd=folder, capture_output=True, check=False).returncode == 0
     )
+
+
+def test_a_seal_of_more_worlds_holds_for_fewer(folder):
+    both = write_seal(folder, ["aa", "bb"])
+    assert write_seal(folder, ["aa"]) == both == (folder / "seal.sha256").read_text().strip()
+    check_seal(folder, both)
+
+
+def test_a_folder_with_a_colon_is_hidden_too(tmp_path):
+    (tmp_path / "a:b").mkdir()
+    (tmp_path / "a:b" / "truth.json").write_text("{}")
+    words = diagnose_command(tmp_path / "a:b" / "truth.json", tmp_path / "out", tmp_path / "a:b", tmp_path / "other")
+    words = (*words[:4], "inspect", str(tmp_path / "a:b"))
+    said = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert said.returncode == 1 and "is sealed" in said.stderr
 
 
 def test_a_shut_folder_opens_again_whatever_ends_the_block(folder):
@@ -112,7 +128,7 @@ def test_a_command_under_the_blindfold_works_and_cannot_read_what_is_sealed(fold
             sys.executable,
             "-m",
             "physid_drake.prove.blindfold",
-            str(folder / "sealed"),
+            json.dumps([str(folder / "sealed")]),
             "inspect",
             str(recording),
         ]

@@ -228,6 +228,7 @@ def test_an_unknown_scenario_is_answered_with_the_known_ones():
         ("search.batch", 0),
         ("search.patience", 0),
         pytest.param("seed", -1),
+        pytest.param("held_out_share", 10**400),
         pytest.param("search.jobs", -1),
         pytest.param("search.entropy_tolerance_nats", -1.0),
         pytest.param("cell.contact.dissipation_s_per_m", -1.0),
