@@ -16,6 +16,7 @@ from physid_drake.cell.config import ContactConfig, SolverConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.effects import Effect, effect_named
 from physid_drake.errors import ConfigError
+from physid_drake.identify.theta import RANGES
 from physid_drake.model import AS_W, COMPLETE, FORMAT, SHAPES, Correlation, Model
 from physid_drake.ranges import ANY, NOT_NEGATIVE, POSITIVE, Range
 from physid_drake.recording import Shape
@@ -111,9 +112,9 @@ def _number(key: str, value: Any, allowed: Range = ANY) -> float:
 
 def _body(theta: Mapping[str, Any], *, cells: int) -> Body:
     numbers = {f.name for f in dc.fields(Body)} - {"p_BBcm", "support_friction"}
-    positive = ("mass", "inertia_ratio", "static_ratio")
+    allowed = RANGES | {"hand_friction": NOT_NEGATIVE}  # the cell can be without, though no push tells so
     given = {
-        name: _number(f"theta.{name}", value, POSITIVE if name in positive else NOT_NEGATIVE)
+        name: _number(f"theta.{name}", value, allowed[name])
         for name, value in theta.items() if name in numbers
     }  # fmt: skip
     place = _numbers("theta.p_BBcm", theta["p_BBcm"], 2)

@@ -22,7 +22,7 @@ class Range:
         return self.above < value < self.below and self.least <= value <= self.most
 
     def nearest(self, value: float) -> float:
-        """The value, or the nearest one in it."""
+        """The value, or the nearest one in it, ``SHORT_OF`` from an end that does not belong to it."""
         low, high = max(self.least, self.above + SHORT_OF), min(self.most, self.below - SHORT_OF)
         return value if self.holds(value) else min(max(value, low), high)
 

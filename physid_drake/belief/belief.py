@@ -292,6 +292,14 @@ class Belief:
         """
         arrays = _read(path)
         header = _read_header(arrays, path)
+        try:
+            return cls._restored(arrays, header)
+        except (KeyError, ValueError, TypeError) as error:
+            raise ParameterError(f"belief '{path}': cannot be read ({error}); delete it to begin anew.") from error
+
+    @classmethod
+    def _restored(cls, arrays: dict[str, Array], header: dict[str, Any]) -> "Belief":
+        """From the arrays and the header of a file."""
         saved: dict[str, Any] = {name: arrays[name] for name in _SAVED}
         amplitude, noise = (float(v) for v in arrays["variances"])
         hyper = Hyperparameters(amplitude=amplitude, lengths=arrays["lengths"], noise=noise)
@@ -388,7 +396,10 @@ def _read(path: str | Path) -> dict[str, Array]:
 
 
 def _read_header(arrays: Any, path: str | Path) -> dict[str, Any]:
-    header = json.loads(str(arrays["header"])) if "header" in arrays else {}
+    try:
+        header = json.loads(str(arrays["header"])) if "header" in arrays else {}
+    except ValueError as error:
+        raise ParameterError(f"belief '{path}': cannot be read ({error}); delete it to begin anew.") from error
     if header.get("format") != _FORMAT:
         raise ParameterError(
             f"belief '{path}': the file must say format '{_FORMAT}', but says '{header.get('format')}';"

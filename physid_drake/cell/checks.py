@@ -12,6 +12,10 @@ MOST_CELLS = 10  # along a side
 LIGHTEST, HEAVIEST = 20.0, 8000.0  # kg/m^3 of the box around the object: foam, steel
 
 
+def _is_whole(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
 def check_config(config: CellConfig) -> None:
     """Refuse values that no cell can use.
 
@@ -21,7 +25,8 @@ def check_config(config: CellConfig) -> None:
     contact, solver, cells = config.contact, config.solver, config.friction_cells
     rules: list[tuple[str, object, bool, str]] = [
         ("contact.model", contact.model, contact.model in MODELS, " or ".join(repr(m) for m in MODELS)),
-        ("contact.support_points", contact.support_points, 4 <= contact.support_points <= 1000, "from 4 to 1000"),
+        ("contact.support_points", contact.support_points,
+         _is_whole(contact.support_points) and 4 <= contact.support_points <= 1000, "a whole number from 4 to 1000"),
         ("contact.rest_depth_m", contact.rest_depth_m, 1e-8 <= contact.rest_depth_m <= 1e-2, "from 1e-8 to 1e-2 m"),
         ("contact.dissipation_s_per_m", contact.dissipation_s_per_m, contact.dissipation_s_per_m >= 0.0,
          "at least 0 s/m"),
@@ -35,8 +40,8 @@ def check_config(config: CellConfig) -> None:
         ("solver.slide_time_step_s", solver.slide_time_step_s,
          solver.time_step_s <= solver.slide_time_step_s <= LONGEST_TICK,
          f"between time_step_s and {LONGEST_TICK:g} s"),
-        ("friction_cells", cells, len(cells) == 2 and all(1 <= n <= MOST_CELLS for n in cells),
-         f"[nx, ny] from 1 to {MOST_CELLS}"),
+        ("friction_cells", cells, len(cells) == 2 and all(_is_whole(n) and 1 <= n <= MOST_CELLS for n in cells),
+         f"whole [nx, ny] from 1 to {MOST_CELLS}"),
         ("default_density_kgpm3", config.default_density_kgpm3, LIGHTEST <= config.default_density_kgpm3 <= HEAVIEST,
          f"from {LIGHTEST:g} to {HEAVIEST:g} kg/m^3"),
     ]  # fmt: skip

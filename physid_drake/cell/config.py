@@ -39,7 +39,8 @@ class SolverConfig:
         scheme: ``cenic``, or a discrete contact approximation of Drake (``lagged``, ``similar``, ``sap``,
             and ``tamsi`` where Drake still has it) for comparison.
         time_step_s: tick while the hand is near the object.
-        slide_time_step_s: tick of a free slide; discrete schemes use ``time_step_s`` throughout.
+        slide_time_step_s: tick of a free slide, cut to a multiple of ``time_step_s``, which discrete schemes use
+            throughout.
         impact_law: Routh's impact at every fast touch, instead of the solver's own.
         drift_feedforward: correct the contact for the turning of the face in a step, and for creep where it sticks.
         trapezoid_slide: replace the symplectic position update of a free slide by the trapezoidal one.

@@ -32,7 +32,7 @@ from pydrake.systems.framework import DiagramBuilder
 from physid_drake.cell.config import CellConfig
 from physid_drake.cell.outline import Disc, Outline
 from physid_drake.cell.solid import Solid
-from physid_drake.cell.support import FrictionGrid, PressureGrid, Support, support_of
+from physid_drake.cell.support import FrictionGrid, PressureGrid, Support, axis_support, support_of
 
 Array = NDArray[np.float64]
 
@@ -142,7 +142,7 @@ def add_scene(
     grid = FrictionGrid(nx=config.friction_cells[0], ny=config.friction_cells[1])
     support = support_of(solid.underside, grid, config.contact.support_points, pressure=pressure)
     if solid.rolling_radius is not None:
-        support = _axis_support(support)
+        support = axis_support(support, grid, solid.underside)
 
     table = _add_table(plant, edge, hydroelastic)
     body, feet, foot_cells = _add_object(plant, solid, support, hydroelastic)
@@ -171,16 +171,6 @@ def _stiffer(solid: Solid) -> float:
     x0, y0, x1, y1 = solid.underside.extent()
     radius = 0.5 * min(x1 - x0, y1 - y0)
     return float(np.clip((SLENDER * radius / solid.height) ** 2, 1.0 / 3.0, 1.0))
-
-
-def _axis_support(support: Support) -> Support:
-    """A lying cylinder stands on its lowest line: keep the quadrature along y only."""
-    ys = np.unique(np.round(support.points[:, 1], 12))
-    shares = np.array([support.weights[np.isclose(support.points[:, 1], y)].sum() for y in ys])
-    cells = np.array([support.cells[np.isclose(support.points[:, 1], y)][0] for y in ys])
-    points = np.column_stack([np.zeros_like(ys), ys])
-    polar = float(shares @ ys**2)
-    return Support(points=points, weights=shares, cells=cells, radii=np.zeros_like(ys), polar=polar)
 
 
 def _add_table(plant: MultibodyPlant, edge: Array | None, hydroelastic: bool) -> GeometryId:

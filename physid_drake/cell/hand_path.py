@@ -53,7 +53,7 @@ class HandPath:
         return result
 
     def top_speed(self, begin: float = -math.inf, end: float = math.inf) -> float:
-        """The largest speed between two times [m/s]; 0 where it stands all the while."""
+        """The largest speed between two times [m/s]; before and after the path, that of its ends."""
         inner = self.times[(self.times > begin) & (self.times < end)]
         times = np.clip(np.array([begin, *inner, end]), self.times[0], self.times[-1])
         return float(np.hypot(*(np.interp(times, self.times, v) for v in self.velocities.T)).max())

@@ -239,6 +239,7 @@ class _Meeting:
             new_un, new_ut = flow.velocity(en, un, cn), flow.velocity(et, ut, ct)
             new_vn, new_vt = vn + h * self.pull[0], vt + h * self.pull[1]
             room = self.gap + h * (0.5 * (vn + new_vn) - flow.way(un, new_un))
+            # Newton's ratio, of velocities; where a slip ends within the blow, Poisson's of Routh's law gives less.
             need = (1.0 + self.restitution) * (new_un - new_vn)
             self.held = room < 0.0 < need
             if self.held:

@@ -87,6 +87,17 @@ class Support:
     polar: float
 
 
+def axis_support(support: Support, grid: FrictionGrid, outline: Outline) -> Support:
+    """A lying cylinder stands on its lowest line: the quadrature along y only."""
+    ys = np.unique(np.round(support.points[:, 1], 12))
+    shares = np.array([support.weights[np.isclose(support.points[:, 1], y)].sum() for y in ys])
+    points = np.column_stack([np.zeros_like(ys), ys])
+    return Support(
+        points=points, weights=shares, cells=grid.cell_of(points, outline), radii=np.zeros_like(ys),
+        polar=float(shares @ ys**2),
+    )  # fmt: skip
+
+
 def support_of(
     outline: Outline,
     grid: FrictionGrid,

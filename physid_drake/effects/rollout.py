@@ -111,10 +111,10 @@ def _as_rough(these: Sequence[FrictionLaw], others: Sequence[FrictionLaw]) -> bo
 
 
 def _contact_height(cell: Cell, plain: Geometry, height: float | None) -> float | None:
-    """That of an object whose size effects change: a lying cylinder is touched at its axis."""
+    """That of an object whose size effects change: a lying cylinder at its axis, others no higher than they are."""
     radius = cell.solid.rolling_radius
     if height is None or radius is None or not isinstance(plain.shape, Cylinder):
-        return height
+        return None if height is None else min(height, cell.solid.height)
     return height * radius / plain.shape.radius
 
 

@@ -49,7 +49,7 @@ class HiddenRobot:
 
     Attributes:
         world: the hidden parameters, for the score alone.
-        lost: whether the object left the table or fell over in the last push.
+        lost: whether the object left the table in the last push, or did not come to rest.
     """
 
     def __init__(

@@ -168,10 +168,10 @@ def _problem(
         force_std=forces.stds[felt],
         tip_height=None if hand is None else float(np.median(hand.positions[:, 2])),
     )
-    return replace(problem, moving=(_first_motion(problem, noise.position), motion_span(push)[1]))
+    return replace(problem, moving=(first_motion(problem, noise.position), motion_span(push)[1]))
 
 
-def _first_motion(problem: PushProblem, sigma: float) -> float:
+def first_motion(problem: PushProblem, sigma: float) -> float:
     """Roughly when the object starts to move [s]; noise, whose standard deviation is sigma [m], is no motion."""
     if len(problem.times) < 3:
         return problem.begin

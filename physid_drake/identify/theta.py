@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import Body
 from physid_drake.cell.checks import HEAVIEST, LIGHTEST
 from physid_drake.cell.solid import Solid
-from physid_drake.cell.support import FrictionGrid, support_of
+from physid_drake.cell.support import FrictionGrid, axis_support, support_of
 from physid_drake.errors import ConfigError
 from physid_drake.identify.config import ThetaConfig
 from physid_drake.ranges import ANY, COEFFICIENT, POSITIVE, Range
@@ -112,7 +112,10 @@ def theta_map(
 def _bearing_cells(cells: tuple[int, int], solid: Solid) -> list[str]:
     """Names of the cells in which there is something of the object: no push tells of others, and none needs to."""
     names = friction_names(cells)
-    support = support_of(solid.outline, FrictionGrid(nx=cells[0], ny=cells[1]), points=len(names))
+    grid = FrictionGrid(nx=cells[0], ny=cells[1])
+    support = support_of(solid.underside, grid, points=len(names))
+    if solid.rolling_radius is not None:
+        support = axis_support(support, grid, solid.underside)
     return [names[k] for k in np.unique(support.cells).tolist()]
 
 

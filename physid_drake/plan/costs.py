@@ -64,9 +64,13 @@ class InsideRegion:
 
 
 def loss_of(cost: Cost, table: Corners) -> float:
-    """The cost of an object that fell, toppled or does not stop [m]: more than that of any place on the table."""
+    """The cost of an object that fell, toppled or does not stop [m]: more than that of any place on the table.
+
+    At least half the table's diagonal, which a goal's farthest corner always is: a region may hold the whole table.
+    """
     (x0, y0), (x1, y1) = table
-    return LOSS * max(cost.at(np.array(corner)) for corner in itertools.product((x0, x1), (y0, y1)))
+    corners = [cost.at(np.array(corner)) for corner in itertools.product((x0, x1), (y0, y1))]
+    return LOSS * max(*corners, 0.5 * math.hypot(x1 - x0, y1 - y0))
 
 
 def cost_of(cost: Cost, trajectory: Trajectory, table: Corners) -> float:
@@ -75,7 +79,7 @@ def cost_of(cost: Cost, trajectory: Trajectory, table: Corners) -> float:
     Args:
         cost: of a resting object.
         trajectory: the prediction.
-        table: lower and upper corner of its top [m]; an object that is beyond it counts as lost.
+        table: lower and upper corner of its top [m], which says what a lost object costs.
     """
     if trajectory.ending is Ending.DIVERGED:
         return math.inf

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from physid_drake.errors import RobotError
 from physid_drake.model import Model
-from physid_drake.plan.trajectory import Ending, Situation, contact_height_of, path_of, tip_height_of, trajectory_of
+from physid_drake.plan.trajectory import Ending, Situation, path_of, tip_height_of, trajectory_of, true_solid
 from physid_drake.policies import PlannedPush, hand_samples
 from physid_drake.recording import PoseStream, Push, Sensors, planar_poses
 
@@ -65,7 +65,7 @@ class SimulatedRobot:
         """Push, record at 100 Hz until the object has rested for 0.2 s, and leave the object there.
 
         Raises:
-            RobotError: if the object is lost, or the rollout diverges.
+            RobotError: if the push before lost the object, or the rollout diverges.
         """
         if self.ending not in (Ending.AT_REST, Ending.MOVING):
             raise RobotError(f"robot: the object {self.ending.value} in the last push; put it back first.")
@@ -93,4 +93,4 @@ class SimulatedRobot:
 
     def _object(self, times: Array, poses: Array) -> PoseStream:
         seen = poses + self._rng.standard_normal(poses.shape) * self._sensors.object_std
-        return planar_poses(times, seen, contact_height_of(self._hidden, Situation(start=self._pose)))
+        return planar_poses(times, seen, 0.5 * true_solid(self._hidden).height)

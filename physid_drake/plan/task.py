@@ -8,10 +8,10 @@ import math
 import numpy as np
 
 from physid_drake.cell.diagram import GRAVITY
-from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
 from physid_drake.model import Model
 from physid_drake.plan.costs import Corners
+from physid_drake.plan.trajectory import true_solid
 from physid_drake.policies import POLICIES, Policy, policy_named
 from physid_drake.policies.policy import CARRYING_SPEED, SPEEDS, Reach
 
@@ -64,7 +64,7 @@ def policy_for(name: str, model: Model, start: Pose, goal: Point, choices: Choic
     speed = CARRYING_SPEED if choices.speed is None else choices.speed
     heading = math.atan2(way[1], way[0]) if choices.direction is None else choices.direction
     travel = _travel(name, model, distance, speed) if choices.travel is None else choices.travel
-    inner = max(LEAST_RADIUS, -solid_of(model.shape).outline.nearest(0.0, 0.0)[0])
+    inner = max(LEAST_RADIUS, -true_solid(model).outline.nearest(0.0, 0.0)[0])
     reach = Reach(heading=heading, travel=travel, inner_radius=inner, speed=speed)
     return policy_named(name, reach)
 

@@ -15,7 +15,7 @@ from physid_drake.errors import ConfigError
 from physid_drake.identify.linearise import linearised, prior_slope
 from physid_drake.identify.noise import Noise
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
-from physid_drake.identify.problem import PushProblem
+from physid_drake.identify.problem import PushProblem, first_motion
 from physid_drake.identify.rollouts import RolloutPool, Task
 from physid_drake.policies import PlannedPush
 from physid_drake.policies.planned_push import LEAD
@@ -118,7 +118,7 @@ def _informations(
     # An object that is lost is not pushed again, and what follows its fall would be no measurement.
     kept = {k: p for k, p in enumerate(foreseen) if p is not None and not p.fell}
     # What is predicted stands for what will be recorded: only the slopes count.
-    recorded = [dc.replace(problems[k], poses=p.poses) for k, p in kept.items()]
+    recorded = [_foreseen(problems[k], p.poses, noise) for k, p in kept.items()]
     space = pool.thetas.space
     told = np.zeros((len(problems), space.dimension, space.dimension))
     for k, term in zip(
@@ -126,6 +126,12 @@ def _informations(
     ):
         told[k] = term.information(scatter)
     return told
+
+
+def _foreseen(problem: PushProblem, poses: Array, noise: Noise) -> PushProblem:
+    """The push as if it had been recorded; the rest before the touch tells nothing of the cell's own error."""
+    problem = dc.replace(problem, poses=poses)
+    return dc.replace(problem, moving=(first_motion(problem, noise.position), math.inf))
 
 
 def _problem(

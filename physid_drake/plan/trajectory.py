@@ -91,7 +91,7 @@ def _solid(shape: Shape) -> Solid:
     return solid_of(shape)
 
 
-def _true_solid(model: Model) -> Solid:
+def true_solid(model: Model) -> Solid:
     """Of the object as it is: a model may know that it is larger than was said."""
     return _solid(geometry_with(model.effects, Geometry(shape=model.shape)).shape)
 
@@ -99,7 +99,7 @@ def _true_solid(model: Model) -> Solid:
 def contact_height_of(model: Model, situation: Situation) -> float:
     """Height of the tip's contact above the table [m]."""
     known = model.contact_height if situation.hand_height is None else situation.hand_height
-    return 0.5 * _true_solid(model).height if known is None else known
+    return 0.5 * true_solid(model).height if known is None else known
 
 
 def tip_height_of(model: Model, situation: Situation) -> float:
@@ -130,7 +130,7 @@ def path_of(model: Model, push: PlannedPush, pose: Pose) -> HandPath:
     Raises:
         ConfigError: if the model has no hand, or the hand would pass the object.
     """
-    path = push.path(true_pose(model.effects, pose), _true_solid(model).outline, hand_radius_of(model))
+    path = push.path(true_pose(model.effects, pose), true_solid(model).outline, hand_radius_of(model))
     facts = PushFacts(order=0, mass=model.body.mass, polar=0.0, hand_axes=model.axes_on(path))
     return aimed(model.effects, path, facts)
 
@@ -215,7 +215,7 @@ def _ending(model: Model, motion: Motion) -> Ending:
         place = motion.poses[-1, 4:6]
         return Ending.TOPPLED if ((place >= low) & (place <= high)).all() else Ending.FELL
     w, x, y, z = motion.poses[-1, :4]
-    solid = _solid(model.shape)
+    solid = true_solid(model)
     rolls = solid.rolling_radius is not None
     # What stays upright, or level where the object rolls: B's z axis, or its y axis.
     upright = 1.0 - 2.0 * (x * x + y * y) if not rolls else math.sqrt(max(0.0, 1.0 - 4.0 * (y * z + w * x) ** 2))

@@ -28,7 +28,7 @@ class EntropySearch:
 
     Attributes:
         shortlist: Untried candidates that are looked at: half of them those that greedy entropy search would try
-            first, the others drawn from all that may be the minimiser.
+            first, the others drawn from the ``representers``.
         representers: Candidates over which P_min counts.
         n_samples: Functions drawn.
         n_outcomes: Nodes of the Gauss-Hermite sum.

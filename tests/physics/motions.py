@@ -50,7 +50,16 @@ def slide(*effects, velocity=(0.5, 0.0, 0.0), pose=(0.0, 0.0, 0.0), seconds=1.0,
 
 
 def push_along_x(
-    *effects, speed=0.3, side=0.0, gap=0.005, until=0.3, brake=0.04, rise=0.05, seconds=0.3, friction=MU
+    *effects,
+    speed=0.3,
+    side=0.0,
+    gap=0.005,
+    until=0.3,
+    brake=0.04,
+    rise=0.05,
+    seconds=0.3,
+    friction=MU,
+    height=None,
 ):
     """The motion of the box that is pushed along x, ``side`` off its middle."""
     first = -0.5 * SIZE[0] - TIP - gap
@@ -59,7 +68,7 @@ def push_along_x(
         velocities=np.outer([0.0 if rise > 1e-3 else speed, speed, speed, 0.0], [1.0, 0.0]),
         start=np.array([first, side]),
     )
-    push = Rollout(start=Start(pose=(0, 0, 0)), path=path, begin=0.0, end=until + brake + seconds, hand_height=None)
+    push = Rollout(start=Start(pose=(0, 0, 0)), path=path, begin=0.0, end=until + brake + seconds, hand_height=height)
     motion = roll(lambda g: built(g, True), BOX, body_of(MASS, friction, hand_friction=0.3), push, effects)
     assert motion.outcome is Outcome.COMPLETED
     return motion, path

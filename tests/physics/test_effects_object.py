@@ -150,6 +150,11 @@ def test_a_larger_object_is_touched_earlier_by_half_its_growth():
     assert earlier[0, 0] == pytest.approx(0.5 * 0.04 * SIZE[0], abs=1e-6)  # measured 3e-7 m
 
 
+def test_an_object_that_is_lower_than_the_contact_is_touched_at_its_top():
+    ends = [end(push_along_x(make("size_error", ratio=0.9), height=share * SIZE[2])[0]) for share in (0.9, 1.0)]
+    np.testing.assert_array_equal(ends[0], ends[1])
+
+
 @pytest.mark.parametrize(
     ("shape", "wanted"),
     [

@@ -12,7 +12,7 @@ from physid_drake.errors import ConfigError
 from physid_drake.identify import OnlineIdentifier, SearchConfig, ThetaConfig
 from physid_drake.identify.linearise import prior_slope
 from physid_drake.identify.noise import noise_of
-from physid_drake.plan import most_informative_push
+from physid_drake.plan import most_informative_push, teaching
 from physid_drake.policies import PlannedPush
 
 pytestmark = pytest.mark.slow
@@ -105,6 +105,16 @@ def test_the_chosen_push_leaves_less_open_than_random_ones_when_they_are_made(ta
     np.testing.assert_allclose([gained[k] for k in some], lesson.gains[some], atol=1.0)
     variance = [np.trace(np.linalg.inv(12.0 * np.eye(2) + told)) for told in lesson.informations]
     assert variance[lesson.best] < 0.5 * np.mean(variance)
+
+
+def test_the_rest_before_a_push_is_no_motion(taught):
+    """Else the cell's own error would be known from it, as if it were the same at rest and in motion."""
+    one, pushes, _ = taught
+    noise = noise_of(made(pushes[0]))
+    problem = teaching._problem(pushes[1], one.pool, noise, START, 0, None)
+    poses = np.column_stack([0.05 * np.clip(problem.times - 0.3, 0.0, None), *np.zeros((2, len(problem.times)))])
+    begin, end = teaching._foreseen(problem, poses, noise).moving
+    assert 0.28 <= begin <= 0.4 and end == np.inf
 
 
 def test_there_must_be_a_push_and_a_hand(taught):

@@ -263,3 +263,8 @@ def test_a_file_that_is_not_a_belief_is_refused(tmp_path):
         Belief.from_npz(tmp_path / "array.npz.npy")
     with pytest.raises(ParameterError, match="physid-belief/1"):
         Belief.from_npz(tmp_path / "other.npz")
+    np.savez(tmp_path / "half.npz", header=np.array('{"format": "physid-belief/1"}'))
+    np.savez(tmp_path / "torn.npz", header=np.array('{"format": "physid-be'))
+    for name in ("half", "torn"):
+        with pytest.raises(ParameterError, match=r"cannot be read .* delete it"):
+            Belief.from_npz(tmp_path / f"{name}.npz")

@@ -83,6 +83,7 @@ def test_a_grid_of_frictions_is_named_by_its_cells():
         (Cylinder(radius=0.04, length=0.03, axis="z"), (8, 8), {(0, 0), (0, 7), (7, 0), (7, 7)}),
         (Cylinder(radius=0.04, length=0.03, axis="z"), (1, 1), set()),
         (SHAPE, (3, 2), set()),
+        (Cylinder(radius=0.04, length=0.1, axis="y"), (3, 2), {(0, 0), (0, 1), (2, 0), (2, 1)}),  # lies on a line
     ],
 )
 def test_a_cell_in_which_there_is_nothing_of_the_object_is_no_unknown(shape, cells, empty):

@@ -217,6 +217,20 @@ def test_a_robot_pushes_learns_plans_and_pushes_again():
     assert recorded.name == "pushes/003.csv" and len(recorded.hand) == len(recorded.object)
 
 
+def test_contacts_stay_on_a_face_that_is_smaller_than_was_said():
+    model = replace(MODEL, effects=(SizeError(ratio=0.6),))
+    policy = policy_for("push", model, START, GOAL)
+    for edge in (policy.space.lower, policy.space.upper):
+        path_of(model, policy.pushes(edge)[0], START)  # which refuses a hand that passes the object
+
+
+def test_a_robot_sees_the_object_standing_on_the_table():
+    model = replace(MODEL, contact_height=0.02)
+    robot = SimulatedRobot(model, start=START, sensors=Sensors(), rng=np.random.default_rng(0))
+    heights = robot.execute(PlannedPush(direction=0.0, speed=0.3, travel=0.05)).object.positions[:, 2]
+    np.testing.assert_allclose(heights, 0.5 * MODEL.shape.size[2])
+
+
 def test_a_robot_records_the_motion_and_not_a_polygon_through_it():
     push = PlannedPush(direction=0.0, speed=0.6, travel=0.05)
     robot = SimulatedRobot(MODEL, start=START, sensors=Sensors(), rng=np.random.default_rng(0))

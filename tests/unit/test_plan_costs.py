@@ -34,6 +34,13 @@ def test_a_region_is_free_inside_and_has_no_kink_at_its_edge():
         InsideRegion(lower=(0.1, 0.0), upper=(0.0, 0.1))
 
 
+def test_a_lost_object_costs_something_where_the_whole_table_is_in_reach():
+    cost = InsideRegion(lower=(-1.0, -1.0), upper=(1.0, 1.0))
+    assert loss_of(cost, MODEL.table) > 0.5 * math.hypot(1.0, 0.8)
+    goal = DistanceToGoal(goal=(0.0, 0.0))  # whose farthest corners are as far
+    assert loss_of(goal, MODEL.table) == pytest.approx(loss_of(cost, MODEL.table))
+
+
 def fall(speed=1.0):
     push = PlannedPush(direction=0.0, speed=speed, travel=0.45)
     return trajectory_of(MODEL, (push,), Situation(start=START))

@@ -176,6 +176,12 @@ def test_the_rod_of_a_file_for_a_robot_is_as_high_as_the_recorded_one(folder, tm
         ({"model.yaml": MODEL.dump(), "result.json": "{"}, "result.json"),
         ({"model.yaml": MODEL.dump(), "result.json": '{"friction_scatter": 7}'}, "result.json"),
         ({"model.yaml": replace(MODEL, intervals={"theta.mass": "x"}).dump()}, "theta.mass"),
+        ({"model.yaml": MODEL.dump().replace("static_ratio: 1.0", "static_ratio: 0.5")}, "theta.static_ratio"),
+        ({"model.yaml": MODEL.dump().replace("restitution: 0.0", "restitution: 1.5")}, "theta.restitution"),
+        (
+            {"model.yaml": replace(MODEL, config=replace(MODEL.config, friction_cells=[1.0, 1.0])).dump()},
+            "friction_cells",
+        ),
     ],
 )
 def test_a_run_that_cannot_be_planned_from_ends_in_one_line(tmp_path, capsys, write, named):

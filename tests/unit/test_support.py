@@ -10,7 +10,7 @@ from physid_drake.cell import CellConfig
 from physid_drake.cell.forces import friction_wrench, total_wrenches
 from physid_drake.cell.object_state import ObjectState, Underside, as_complex
 from physid_drake.cell.outline import Disc, Polygon, rectangle
-from physid_drake.cell.support import FrictionGrid, Support, rest_depths, support_of
+from physid_drake.cell.support import FrictionGrid, Support, axis_support, rest_depths, support_of
 from physid_drake.effects.friction import share_inside
 
 ELLIPSE = Polygon([(0.06 * math.cos(2 * math.pi * k / 64), 0.04 * math.sin(2 * math.pi * k / 64)) for k in range(64)])
@@ -306,6 +306,14 @@ def test_a_patch_acts_on_its_own_area_however_small(radius):
     shares = share_inside(away, radius, np.full(len(away), disc))
     assert np.trapezoid(shares * 2.0 * math.pi * away, away) == pytest.approx(math.pi * radius**2, rel=1e-4)
     assert shares[0] == pytest.approx(min(1.0, (radius / disc) ** 2)) and shares[-1] == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("nx", [1, 3, 5])
+def test_a_line_feels_the_cells_in_the_middle(nx):
+    outline, grid = rectangle(0.06, 0.1), FrictionGrid(nx=nx, ny=2)
+    line = axis_support(support_of(outline, grid, 36), grid, outline)
+    assert set(line.cells.tolist()) == {nx // 2 * 2, nx // 2 * 2 + 1}
+    assert line.weights.sum() == pytest.approx(1.0) and not line.points[:, 0].any()
 
 
 @pytest.mark.parametrize("radius", [0.05, 0.1, 0.13])
