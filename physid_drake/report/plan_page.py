@@ -13,18 +13,15 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 from numpy.typing import NDArray
 
-from physid_drake.cell.outline import Disc, Outline
-from physid_drake.cell.outline import Polygon as OutlinePolygon
-from physid_drake.cell.solid import solid_of
 from physid_drake.effects.rollout import Geometry, geometry_with
 from physid_drake.plan import DistanceToGoal, Ending, Hindsight, InsideRegion, Outcome, Plan, SweepRow
 from physid_drake.report.plan import plan_rows, push_files, title_of
 from physid_drake.report.svg import MUTED, drawn, svg_of
+from physid_drake.report.table_view import MM, outline_of, placed
 
 Array = NDArray[np.float64]
 
 OBJECT, HAND, GOAL, LOST = "#2563c9", "#b4540a", "#1d7a46", "#b42318"
-MM = 1e3
 FLATTEST = 0.6  # of the longer side of a view from above
 
 
@@ -121,8 +118,7 @@ def _curve(plan: Plan) -> list[SweepRow]:
 
 def _draw_table(axes: Axes, plan: Plan, other: Outcome | None = None) -> None:
     # As large as effects make it.
-    shape = geometry_with(plan.model.effects, Geometry(shape=plan.model.shape)).shape
-    outline = _corners(solid_of(shape).outline)
+    outline = outline_of(geometry_with(plan.model.effects, Geometry(shape=plan.model.shape)).shape)
     start, poses = np.array(plan.situation.start), plan.predicted.poses
     (x0, y0), (x1, y1) = plan.model.table
     axes.add_patch(
@@ -136,14 +132,14 @@ def _draw_table(axes: Axes, plan: Plan, other: Outcome | None = None) -> None:
         )
     ends = [] if plan.spread is None else list(plan.spread.ends)
     for end in ends:
-        axes.add_patch(Polygon(_placed(outline, end), closed=True, facecolor="none", edgecolor=OBJECT, alpha=0.2))
+        axes.add_patch(Polygon(placed(outline, end), closed=True, facecolor="none", edgecolor=OBJECT, alpha=0.2))
         axes.plot(*(MM * end[:2]), ".", color=OBJECT, alpha=0.4, markersize=3)
     axes.plot(MM * poses[:, 0], MM * poses[:, 1], color=OBJECT, linewidth=1.2)
     for pose, alpha in ((start, 0.45), (plan.predicted.end, 1.0)):
-        axes.add_patch(Polygon(_placed(outline, pose), closed=True, facecolor="none", edgecolor=OBJECT, alpha=alpha))
+        axes.add_patch(Polygon(placed(outline, pose), closed=True, facecolor="none", edgecolor=OBJECT, alpha=alpha))
     if other is not None:
         end = other[0].end
-        axes.add_patch(Polygon(_placed(outline, end), closed=True, facecolor="none", edgecolor=LOST, linestyle="--"))
+        axes.add_patch(Polygon(placed(outline, end), closed=True, facecolor="none", edgecolor=LOST, linestyle="--"))
     _draw_goal(axes, plan)
     _frame(axes, plan, outline, [start, *poses[:: max(1, len(poses) // 20)], *ends])
     axes.set(xlabel="x [mm]", ylabel="y [mm]")
@@ -163,9 +159,9 @@ def _draw_goal(axes: Axes, plan: Plan) -> None:
         )
 
 
-def _frame(axes: Axes, plan: Plan, outline: Array, poses: list[Array]) -> None:
+def _frame(axes: Axes, plan: Plan, outline: Array | None, poses: list[Array]) -> None:
     """Show what moves, the goal and a margin, with a mm as long along x as along y."""
-    points = [_placed(outline, pose) for pose in poses]
+    points = [placed(outline, pose) for pose in poses]
     points += [MM * path.knot_positions() for path in plan.predicted.paths]
     if isinstance(plan.cost_function, DistanceToGoal):
         points.append(MM * np.array([plan.cost_function.goal]))
@@ -175,21 +171,6 @@ def _frame(axes: Axes, plan: Plan, outline: Array, poses: list[Array]) -> None:
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
     axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
-
-
-def _corners(outline: Outline) -> Array:
-    """Corners (n, 2) of an outline in B [m]."""
-    if isinstance(outline, OutlinePolygon):
-        return np.array(outline.vertices)
-    assert isinstance(outline, Disc)
-    angles = np.linspace(0.0, 2.0 * math.pi, 48, endpoint=False)
-    return np.asarray(outline.radius * np.column_stack([np.cos(angles), np.sin(angles)]))
-
-
-def _placed(outline: Array, pose: Array) -> Array:
-    """The outline at a pose (n, 2) [mm]."""
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    return np.asarray(MM * (outline @ np.array([[c, s], [-s, c]]) + pose[:2]))
 
 
 _PAGE = """<!doctype html>
