@@ -27,6 +27,7 @@ from physid_drake.processes import in_processes
 from physid_drake.prove.contact import RESIDUAL_RESTITUTION
 from physid_drake.prove.effects.catalogue import CATALOGUED, OTHERS
 from physid_drake.prove.effects.effect import Effect, parameters_of
+from physid_drake.prove.feet import stays_loaded
 from physid_drake.prove.floor import floor_of
 from physid_drake.prove.knobs import Knob, draw_knob
 from physid_drake.prove.mujoco_world import PushWorld
@@ -121,7 +122,7 @@ def make_world(
         rng = np.random.default_rng([seed, index, 4, attempt])
         scene = draw_scene(rng)
         effects, sizes = _draw_effects(rng, scene, chosen.effects)
-        if all(size >= SMALLEST_SIZE for size in sizes) and stands(scene, effects):
+        if all(size >= SMALLEST_SIZE for size in sizes) and _loaded(scene, effects) and stands(scene, effects):
             break
     motions = simulate(scene, effects)
     size = _difference(scene, motions, simulate(scene, ())) if effects else 0.0
@@ -163,6 +164,13 @@ def simulate(scene: Scene, effects: Sequence[Effect], which: Sequence[int] | Non
         )
         for k in chosen
     ]
+
+
+def _loaded(scene: Scene, effects: Sequence[Effect]) -> bool:
+    """Whether every foot carries weight with both of two effects, each of which leaves it some."""
+    if len(effects) < 2:
+        return True
+    return stays_loaded(functools.reduce(lambda plan, effect: effect.build(plan), effects, scene.plan))
 
 
 def stands(scene: Scene, effects: Sequence[Effect], seconds: float = 0.2) -> bool:

@@ -110,6 +110,20 @@ def test_parameters_are_plain_numbers():
         assert set(written) == {field.name for field in fields(effect)}
 
 
+def test_two_effects_may_not_lift_an_edge_together():
+    """Each is drawn so that it does not; both may."""
+    rng, lifted = np.random.default_rng(0), []
+    for _ in range(20):
+        scene = draw_scene(rng)
+        knobs = [draw_knob(name, rng, scene) for name in ("uneven_support", "com_offset")]
+        effects = [knob.at(knob.limit) for knob in knobs]
+        assert all(
+            make._loaded(scene, [effect, other.at(0.0)]) for effect, other in zip(effects, knobs[::-1], strict=True)
+        )
+        lifted.append(not make._loaded(scene, effects))
+    assert any(lifted) and not all(lifted)
+
+
 def test_a_world_has_one_grain():
     drawn = {frozenset(make.assign(index, 7, "pair", "anisotropic_table").effects) for index in range(300)}
     assert frozenset(make.GRAINS) not in drawn and len(drawn) == len(fx.CATALOGUED) - 2
