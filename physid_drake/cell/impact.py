@@ -50,12 +50,33 @@ def routh_impulse(
     Source: E. J. Routh, Dynamics of a System of Rigid Bodies, 1860 (the impulse-plane method), in the form of
     Y. Wang and M. T. Mason, Two-dimensional rigid-body collisions with friction, J. Appl. Mech. 59, 1992.
     """
+    yields = (
+        1.0 / mass + lever_t * lever_t / inertia,
+        1.0 / mass + lever_n * lever_n / inertia,
+        lever_n * lever_t / inertia,
+    )
+    return impulse_between(
+        yields=yields, approach=approach, slip=slip, friction=friction, restitution=restitution
+    )  # fmt: skip
+
+
+def impulse_between(
+    *, yields: tuple[float, float, float], approach: float, slip: float, friction: float, restitution: float
+) -> Impulse:
+    """The same of two bodies that meet at one point.
+
+    Args:
+        yields: what the relative velocity gains by impulses, normal by normal, tangent by tangent, and less crosswise
+            [1/kg].
+        approach: of the second along n, relative to the first [m/s]; negative closes.
+        slip: along t, likewise [m/s].
+        friction: Coulomb coefficient [-].
+        restitution: Poisson's ratio of impulses [-].
+    """
     if approach >= 0.0:
         return Impulse(normal=0.0, tangent=0.0)
     # Relative velocity changes by [b1 -b3; -b3 b2] (tangent, normal) per unit impulse.
-    b1 = 1.0 / mass + lever_n * lever_n / inertia
-    b2 = 1.0 / mass + lever_t * lever_t / inertia
-    b3 = lever_n * lever_t / inertia
+    b2, b1, b3 = yields
     sign = math.copysign(1.0, slip) if slip != 0.0 else 0.0
 
     # Walk along the impulse path: first the line of sliding, then that of sticking or of reverse slip.

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from physid_drake.cell.impact import impulse_between
 from physid_drake.cell.setters import Body
 from physid_drake.cell.touch import Planar, Tip, Touch
 
@@ -239,13 +240,10 @@ class _Meeting:
             new_un, new_ut = flow.velocity(en, un, cn), flow.velocity(et, ut, ct)
             new_vn, new_vt = vn + h * self.pull[0], vt + h * self.pull[1]
             room = self.gap + h * (0.5 * (vn + new_vn) - flow.way(un, new_un))
-            # Newton's ratio, of velocities; where a slip ends within the blow, Poisson's of Routh's law gives less.
-            need = (1.0 + self.restitution) * (new_un - new_vn)
+            need = new_un - new_vn
             self.held = room < 0.0 < need
             if self.held:
-                jn, jt = _coulomb(
-                    need, new_vt - new_ut, (normal + tip_yields, tangent + tip_yields, cross), self.friction
-                )  # fmt: skip
+                jn, jt = self._impulse(need, new_vt - new_ut, (normal + tip_yields, tangent + tip_yields, cross))
                 sum_n, sum_t = sum_n + jn, sum_t + jt
                 new_un, new_ut = new_un - tip_yields * jn, new_ut - tip_yields * jt
                 new_vn, new_vt = new_vn + normal * jn - cross * jt, new_vt + tangent * jt - cross * jn
@@ -258,6 +256,15 @@ class _Meeting:
             un, ut, vn, vt, self.gap = new_un, new_ut, new_vn, new_vt, room
         self.stretch, self.tip, self.face = (en, et), (un, ut), (vn, vt)
         return sum_n, sum_t
+
+    def _impulse(self, need: float, slip: float, yields: tuple[float, float, float]) -> Plane:
+        """Normal and tangent impulse [N s] that part the points, or throw them apart; as of ``_coulomb``."""
+        if self.restitution == 0.0:
+            return _coulomb(need, slip, yields, self.friction)
+        impulse = impulse_between(
+            yields=yields, approach=-need, slip=slip, friction=self.friction, restitution=self.restitution
+        )  # fmt: skip
+        return impulse.normal, impulse.tangent
 
 
 def _coulomb(need: float, slip: float, yields: tuple[float, float, float], friction: float) -> Plane:

@@ -12,6 +12,7 @@ from physid_drake.cell import Body, Cell, HandPath, Outcome, Start
 from physid_drake.cell.outline import rectangle
 from physid_drake.cell.soft_tip import Mount, SoftTip
 from physid_drake.cell.touch import Tip as ContactTip
+from physid_drake.cell.touch import blow
 from physid_drake.effects import PushFacts, Surroundings, effect_named
 from physid_drake.effects.rollout import Rollout, roll
 
@@ -137,6 +138,26 @@ def test_a_soft_tip_sticks_to_a_face_until_its_friction_slides():
     assert np.abs(places[sticks]).max() < 1e-9
     assert forces[times > 0.35, 1] == pytest.approx(np.full(250, 0.3), rel=1e-6)
     assert places[-1] == pytest.approx(0.003, rel=0.02)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize(("side", "slide"), [(0.0, 0.0), (0.04, 0.0), (0.04, -0.3), (0.04, 0.05), (-0.04, 0.3)])
+def test_a_heavy_loose_tip_gives_the_blow_of_a_rigid_hand(side, slide, restitution):
+    """Beside the middle and with slip that ends, or turns, within the blow."""
+    light = Body(
+        mass=0.2, p_BBcm=np.zeros(2), inertia_ratio=1.0, hand_friction=0.3, support_friction=np.array([0.3]),
+        restitution=restitution,
+    )  # fmt: skip
+    inertia, speed, tick = 1.6e-4, 0.5, 1e-6
+    tip = ContactTip(rectangle(0.1, 0.1), TIP)
+    soft = SoftTip(Mount(stiffness=1e-9, damping=0.0, mass=1e6), tip, light, inertia)
+    soft.begin((0.0, 0.0, 0.0), [-0.05 - TIP - 1e-7, side], (speed, slide))
+    touch = tip.touch((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), soft.place, soft.velocity)
+    rigid = blow(touch, (speed, slide), light, inertia)
+    got = soft.step(touch, [soft.place[0] + speed * tick, side + slide * tick], (speed, slide), tick)
+    # Without a bounce friction is that of a step: it stops what slides at its end, and no sooner.
+    if restitution > 0.0 or slide == 0.0:
+        np.testing.assert_allclose([got.jx, got.jy, got.spin], rigid, rtol=1e-4, atol=1e-9)
 
 
 def test_a_lagging_hand_is_behind_by_speed_times_its_time_constant():
