@@ -337,6 +337,13 @@ def test_a_free_slide_starts_with_the_velocity_of_its_first_samples():
     assert spec_of(slide(), None).hand_radius is None
 
 
+@pytest.mark.parametrize(("poses", "first_compared"), [(40, 8), (20, 1)])  # eight are in 0.08 s
+def test_of_a_long_free_slide_what_gave_the_start_is_not_compared_again(poses, first_compared):
+    problem = first(slide(poses))
+    np.testing.assert_allclose(problem.times[0] - 7.0, 0.01 * first_compared, atol=1e-9)
+    assert len(problem.poses) == poses - first_compared and problem.begin == 7.0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("rate", "correlation"), [(500, 0.0), (500, 0.9), (120, 0.8)])
 def test_a_free_slides_start_is_as_sure_as_its_noise_allows(rate, correlation):
