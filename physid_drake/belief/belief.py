@@ -1,18 +1,17 @@
 """The belief about an error function over candidates: Gaussian process, P_min and its entropy."""
 
 import json
-import zlib
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, final
-from zipfile import BadZipFile
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from physid_drake.belief.gaussian_process import GaussianProcess, Hyperparameters, fit
+from physid_drake.belief.npz import read_npz
 from physid_drake.belief.p_min import entropy, estimate_p_min, weigh_p_min
 from physid_drake.errors import OutputError, ParameterError
 from physid_drake.space import Array, Parameter, ParameterSpace, read_only
@@ -290,8 +289,7 @@ class Belief:
             ParameterError: When the file is not a belief of this format.
             FileNotFoundError: When there is no file.
         """
-        arrays = _read(path)
-        header = _read_header(arrays, path)
+        arrays, header = read_npz(path, _FORMAT)
         try:
             return cls._restored(arrays, header)
         except (KeyError, ValueError, TypeError) as error:
@@ -382,27 +380,3 @@ def _matches(u: Array, trials: Array) -> npt.NDArray[np.bool_]:
 def _nearest(points: Array, u: Array) -> npt.NDArray[np.intp]:
     """Index (n',) of the nearest of points (n, d) to each of u (n', d)."""
     return np.asarray(cKDTree(points).query(u)[1], dtype=np.intp)
-
-
-def _read(path: str | Path) -> dict[str, Array]:
-    """All arrays of the file: one that is damaged may open, and fail where it is read."""
-    try:
-        with np.load(path, allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in arrays.files}
-    except FileNotFoundError:
-        raise
-    except (OSError, ValueError, TypeError, AttributeError, EOFError, BadZipFile, zlib.error) as error:
-        raise ParameterError(f"belief '{path}': cannot be read ({error}); delete it to begin anew.") from error
-
-
-def _read_header(arrays: Any, path: str | Path) -> dict[str, Any]:
-    try:
-        header = json.loads(str(arrays["header"])) if "header" in arrays else {}
-    except ValueError as error:
-        raise ParameterError(f"belief '{path}': cannot be read ({error}); delete it to begin anew.") from error
-    if header.get("format") != _FORMAT:
-        raise ParameterError(
-            f"belief '{path}': the file must say format '{_FORMAT}', but says '{header.get('format')}';"
-            " was it written by Belief.to_npz of this version?"
-        )
-    return dict(header)
