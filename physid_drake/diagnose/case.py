@@ -23,7 +23,7 @@ from physid_drake.identify.noise import Noise
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
 from physid_drake.identify.problem import PushProblem, problems_of, spec_of
 from physid_drake.identify.rollouts import RolloutPool
-from physid_drake.identify.theta import ThetaMap, theta_map
+from physid_drake.identify.theta import ThetaMap, friction_names, theta_map
 from physid_drake.recording import Recording, thinned
 
 Array = NDArray[np.float64]
@@ -250,7 +250,7 @@ def _surroundings(recording: Recording, problems: Sequence[PushProblem], thetas:
     x0, y0, x1, y1 = solid.underside.extent()
     return Surroundings(
         mass=thetas.nominal["mass"],
-        friction=0.3,
+        friction=float(np.median([thetas.nominal[name] for name in friction_names(thetas.cells)])),
         size=np.array([x1 - x0, y1 - y0]),
         height=solid.height,
         region=np.array([places.min(axis=0), places.max(axis=0)]),

@@ -119,3 +119,10 @@ def test_three_models_are_harder_to_tell_than_two(recording):
     assert two == pytest.approx(stats.norm.cdf(1.0), rel=0.01)
     # Of the one in the middle; the others' noise grows with their way.
     assert three == pytest.approx(1.0 - 2.0 * stats.norm.sf(1.0), rel=0.02)
+
+
+def test_steps_of_effects_are_in_proportion_to_the_friction_that_theta_starts_from(recording):
+    config = cell_config(recording)
+    slippery = case_of(recording, config, ThetaConfig(nominal={"support_friction": 0.1}), jobs=1)
+    assert slippery.around.friction == 0.1
+    assert slippery.around.slight == pytest.approx(case(recording).around.slight / 3.0)
