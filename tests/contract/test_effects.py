@@ -64,6 +64,13 @@ CURVED = ("hand_compliance",)
 every_name = pytest.mark.parametrize("kind", CATALOGUE, ids=lambda kind: kind.name)
 every_effect = pytest.mark.parametrize("kind", (*CATALOGUE, *FOILS), ids=lambda kind: kind.name)
 
+# Of the patch, each place is a direction of its own.
+every_effect_by_direction = pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=[pytest.mark.slow] * (kind.name == "friction_patch")) for kind in (*CATALOGUE, *FOILS)],
+    ids=lambda kind: kind.name,
+)
+
 
 def push(start, heading, speed, pose, order):
     """A push that lets the object go."""
@@ -278,7 +285,7 @@ def test_parameters_of_any_chart_point_mean_something(kind):
             assert kind.ranges()[name].holds(value), name
 
 
-@every_effect
+@every_effect_by_direction
 def test_each_direction_leaves_a_signature_that_grows_with_the_step(kind):
     rolls = rolls_for(kind)
     scene, reference = around(rolls), plain(rolls)

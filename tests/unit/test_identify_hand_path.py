@@ -283,6 +283,7 @@ def test_the_jitter_of_stamps_is_seen(jitter):
     assert seen == pytest.approx(jitter / np.sqrt(3.0), rel=0.3, abs=2e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jitter", [1.5e-3, 2e-3])
 def test_the_jitter_of_six_pushes_at_several_speeds_makes_no_hand_fly(jitter):
     """The fastest fit took it for speeds of 3 to 12 m/s, beside which no other sample was fast enough to tell.
@@ -338,6 +339,7 @@ def test_a_hand_that_halts_before_it_withdraws_does(seed):
     assert off < 5.0 * STD
 
 
+@pytest.mark.slow
 def test_a_hand_that_is_no_polygon_of_speed_keeps_no_more_knots_than_others():
     times = np.arange(0.0, 2.0, 0.01)
     angles = 2.0 * np.pi * times
