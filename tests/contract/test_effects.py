@@ -247,9 +247,10 @@ def test_a_family_that_is_a_sum_of_others_moves_an_object_about_as_they_do_toget
     assert sizes[1] == pytest.approx(sizes[0], rel=0.35)
 
 
+@pytest.mark.parametrize("top_speed", [0.02, 0.4, 2.0])
 @every_effect
-def test_a_chart_holds_the_points_of_its_families_and_has_positive_steps(kind):
-    scene = around(rolls_for(kind))
+def test_a_chart_holds_the_points_of_its_families_and_has_positive_steps(kind, top_speed):
+    scene = dc.replace(around(rolls_for(kind)), top_speed=top_speed)
     chart, families = kind.chart(scene), kind.families(scene)
     assert all(c.step > 0.0 and c.lower < c.upper and c.std > 0.0 for c in chart)
     assert len({c.name for c in chart}) == len(chart)

@@ -4,12 +4,27 @@ import numpy as np
 import pytest
 from motions import MASS, MU, G, distance, end, make, slide, velocities
 
+from physid_drake.effects import Surroundings
+from physid_drake.effects.drag import QuadraticDrag
+
 
 @pytest.mark.parametrize(("c", "most"), [(0.3, 1e-3), (3.0, 8e-3), (30.0, 0.05)])
 def test_quadratic_drag_stops_the_object_where_the_equation_says(c, most):
     want = distance(lambda v: MU * G + c * v * v / MASS)
     # Measured: 5e-4, 4.7e-3 and 2.9e-2 (of 12 mm), for the same reason.
     assert end(slide(make("quadratic_drag", coefficient=c)))[0] == pytest.approx(want, rel=most)
+
+
+@pytest.mark.parametrize("top_speed", [0.02, 0.6])
+def test_however_slow_the_pushes_a_quadratic_drag_is_one_that_a_fluid_may_have(top_speed):
+    around = Surroundings(
+        mass=1.0, friction=0.3, size=np.array([0.09, 0.11]), height=0.05, region=np.zeros((2, 2)),
+        top_speed=top_speed, pushes=20, has_hand=True, rolls=False,
+    )  # fmt: skip
+    (most,) = (coordinate.upper for coordinate in QuadraticDrag.chart(around))
+    under_water = 0.5 * 1000.0 * 2.0 * 0.11 * 0.05  # a plate across the stream
+    assert 10.0 * under_water < most
+    assert most * 0.01**2 < 0.2 * around.friction * around.weight
 
 
 @pytest.mark.parametrize("rest_length", [0.0, 0.06])
