@@ -11,7 +11,6 @@ from physid_drake.diagnose.values import EffectFinding, Partly, Ranked
 from physid_drake.diagnose.verdict import by_several, is_own_error, predicts
 
 CHANCE = 0.05  # of all looks: what explains no more is not worth a word
-PART = "takes a part away, and leaves more than noise"
 
 
 def ranking_of(evidence: Evidence, findings: Sequence[EffectFinding], partly: Partly | None) -> tuple[Ranked, ...]:
@@ -31,7 +30,9 @@ def ranking_of(evidence: Evidence, findings: Sequence[EffectFinding], partly: Pa
                 p_value=float(min(1.0, evidence.screening.looks * math.exp(one.log_p))),
                 held_out_gain=None if candidate is None else candidate.gain,
                 held_out_se=None if candidate is None else candidate.standard_error,
-                why=PART if one.kind.name in some else _why(one.kind.name, candidate, named, classes, evidence),
+                why=_why_partly(evidence)
+                if one.kind.name in some
+                else _why(one.kind.name, candidate, named, classes, evidence),
             )
         )
     return tuple(rows)
@@ -66,7 +67,17 @@ def _why_not_named(evidence: Evidence) -> str:
         return "pushes that were left out are simulated hardly better with it"
     if not by_several(evidence):
         return "one push that was left out is simulated better with it, the others hardly"
-    return "pushes that were left out confirm it, but it leaves more than noise"
+    return f"pushes that were left out confirm it, but it {_too_much(evidence)}"
+
+
+def _why_partly(evidence: Evidence) -> str:
+    return f"takes a part away, and {_too_much(evidence)}"
+
+
+def _too_much(evidence: Evidence) -> str:
+    if evidence.case.noise.known:
+        return "leaves more than noise"
+    return "leaves more than half of the noise that the plain cell needs and nobody states"
 
 
 def _why_not_fitted(name: str, evidence: Evidence) -> str:

@@ -125,6 +125,14 @@ def test_why_an_effect_that_was_fitted_is_not_what_is_missing(named, gain, why):
     assert ranking._why("viscous_drag", tried("viscous_drag", gain, None), named, set(), evidence(after=4.0)) == why
 
 
+def test_of_a_noise_that_nobody_states_half_must_go():
+    told = evidence(after=4.0)
+    assert ranking._why_partly(told) == "takes a part away, and leaves more than noise"
+    told.case.noise.known = False
+    for why in (ranking._why_partly(told), ranking._why_not_named(told)):
+        assert why.endswith("leaves more than half of the noise that the plain cell needs and nobody states")
+
+
 def test_an_effect_that_was_taken_back_is_said_to_be():
     one = tried("viscous_drag", 50.0, None)
     told = evidence(
