@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 STANDING = 0.3  # area that the x and y axes of the tip span in the plane: less, and the tip lies
 FEWEST_SEEN = 4  # poses that must be left to compare
-LONG_FREE = 3  # times the samples that give a free motion its velocity: of a longer one only the others are compared
+UNSURE = 3.0  # times the standard deviation of a free motion's start: the samples that tell it are compared, too
 NOTABLE_ERROR = 0.05  # of the tracker's deviation: what less of the hand does to the object is not seen
 FIRST_SIGMAS = 4.0  # of the tracker: motion that is surely none of its noise
 
@@ -218,13 +218,12 @@ UNKNOWN_HAND = HandUse()
 def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[Start, Array, int]:
     """Start pose from the rest before the motion, or pose and velocity of a free motion from its first samples.
 
-    Its standard deviations, and the first sample to be compared: what gave the start would count twice, and a
-    deceleration of 25 samples at 148 Hz would come out 10 % too sure (by linear algebra). Of a short free motion all
-    but the first sample count twice all the same: hardly any would be left.
+    Its standard deviations, and the first sample to be compared: what gave the start would count twice. The first
+    samples of a free motion are compared all the same, since they are its fastest, and of a short one nearly all; the
+    start is said to be less sure than they tell it, so that they count hardly more than once.
     """
     if free:
-        start, std, n = _moving_start(push, planar, noise)
-        return start, std, n if len(planar) >= LONG_FREE * n else 1
+        return *_moving_start(push, planar, noise), 0
     rests = rest_segments(push)
     if rests and rests[0].start == 0:
         still = planar[rests[0]]
@@ -233,8 +232,8 @@ def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[S
     return Start(pose=triple(planar[0])), noise.sigmas.copy(), 1
 
 
-def _moving_start(push: Push, planar: Array, noise: Noise) -> tuple[Start, Array, int]:
-    """Start, its standard deviations, and of how many samples it is."""
+def _moving_start(push: Push, planar: Array, noise: Noise) -> tuple[Start, Array]:
+    """Start, and ``UNSURE`` times its standard deviations."""
     times, sigmas = push.object.times, noise.sigmas
     n = int(min(len(times), max(FEWEST_FREE, np.searchsorted(times, times[0] + 0.08))))
     t = times[:n] - times[0]
@@ -244,8 +243,8 @@ def _moving_start(push: Push, planar: Array, noise: Noise) -> tuple[Start, Array
     fit = np.linalg.pinv(design)[:2]
     # Of place and velocity (2, 3), by the noise's correlation from sample to sample.
     spread = np.sqrt([np.diag(fit @ rho**apart @ fit.T) for rho in noise.correlations]).T
-    std = (spread * sigmas).ravel()
-    return Start(pose=triple(coefficients[0]), velocity=triple(coefficients[1])), std, n
+    std = UNSURE * (spread * sigmas).ravel()
+    return Start(pose=triple(coefficients[0]), velocity=triple(coefficients[1])), std
 
 
 def triple(values: Array) -> tuple[float, float, float]:

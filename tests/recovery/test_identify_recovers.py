@@ -156,7 +156,7 @@ NORMAL = tuple(GUESSED * np.exp(UNWEIGHED * stats.norm.ppf([0.05, 0.95])))  # on
 def test_what_a_free_slide_does_not_tell_keeps_its_prior(slid, name, interval):
     e = estimate(slid, name)
     assert e.value == pytest.approx(e.prior, rel=0.05)
-    assert e.ci90 == pytest.approx(interval, rel=5e-4)  # measured: 2e-4, of the prior's slope by differences
+    assert e.ci90 == pytest.approx(interval, rel=2e-3)  # measured: 9e-4, of slopes by differences; ends of 14 to 1
 
 
 def test_scatter_of_friction_is_found_push_by_push():
