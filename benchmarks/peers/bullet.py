@@ -6,14 +6,13 @@ and a box stands on its four corners.
 
 from __future__ import annotations
 
-import math
 import tempfile
 from pathlib import Path
 
 import numpy as np
 import pybullet
 
-from peers.push import FRICTION, GRAVITY, MASS, SIZE, TIP_HEIGHT, TIP_RADIUS, Array, Push
+from peers.push import FRICTION, GRAVITY, MASS, SIZE, TIP_HEIGHT, TIP_RADIUS, Array, Push, planar
 
 FOOT_RADIUS = 0.003  # m
 _LENGTH, _WIDTH, _HEIGHT = SIZE
@@ -47,6 +46,10 @@ class _Prescribed:
 
     def rollout(self, push: Push) -> Array:
         """End pose (3,) [m, rad]."""
+        return self.motion(push)[-1]
+
+    def motion(self, push: Push) -> Array:
+        """Poses (n, 3) [m, rad] after every step."""
         self._write_parameters()
         c, tip, body = self._client, self._tip, self._object
         places = np.column_stack([push.grid(self._dt), np.full(round(1.5 / self._dt) + 1, TIP_HEIGHT)])
@@ -59,8 +62,8 @@ class _Prescribed:
             pybullet.resetBaseVelocity(tip, speed, physicsClientId=c)
             pybullet.stepSimulation(physicsClientId=c)
             log.append(pybullet.getBasePositionAndOrientation(body, physicsClientId=c))
-        (x, y, _), (i, j, k, w) = log[-1]
-        return np.array([x, y, math.atan2(2.0 * (w * k + i * j), 1.0 - 2.0 * (j * j + k * k))])
+        places, quaternions = (np.array(column) for column in zip(*log, strict=True))
+        return planar(places, *quaternions[:, [3, 0, 1, 2]].T)
 
 
 class BulletBox(_Prescribed):

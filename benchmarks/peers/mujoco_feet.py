@@ -12,7 +12,7 @@ import math
 import mujoco
 import numpy as np
 
-from peers.push import FRICTION, GRAVITY, MASS, SIZE, TIP_HEIGHT, TIP_RADIUS, Array, Push
+from peers.push import FRICTION, GRAVITY, MASS, SIZE, TIP_HEIGHT, TIP_RADIUS, Array, Push, planar
 
 FOOT_RADIUS = 0.003  # m
 IMPEDANCE = 1e-4  # MuJoCo's smallest
@@ -40,6 +40,10 @@ class _Prescribed:
 
     def rollout(self, push: Push) -> Array:
         """End pose (3,) [m, rad]."""
+        return self.motion(push)[-1]
+
+    def motion(self, push: Push) -> Array:
+        """Poses (n, 3) [m, rad] after every step."""
         self._write_parameters()
         model, state, step, q = self.model, self._state, mujoco.mj_step, self._q
         places = push.grid(model.opt.timestep)
@@ -52,8 +56,7 @@ class _Prescribed:
             qpos[:2], qvel[:2] = places[k], speeds[k]
             step(model, state)
             log[k] = qpos[q : q + 7]
-        x, y, _, w, i, j, z = log[-1]
-        return np.array([x, y, math.atan2(2.0 * (w * z + i * j), 1.0 - 2.0 * (j * j + z * z))])
+        return planar(log[:, :3], *log[:, 3:].T)
 
 
 class NaiveBox(_Prescribed):

@@ -61,6 +61,12 @@ class Engine(Protocol):
         ...
 
 
+def planar(places: Array, w: Array, x: Array, y: Array, z: Array) -> Array:
+    """Poses (n, 3) [m, rad] of places (n, 3) and the components (n,) of quaternions; yaw does not leap."""
+    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return np.column_stack([places[:, :2], np.unwrap(yaw)])
+
+
 def _push(name: str, start: tuple[float, float], times: list[float], velocities: list[tuple[float, float]]) -> Push:
     return Push(name=name, times=np.array(times), velocities=np.array(velocities), start=np.array(start))
 
