@@ -59,10 +59,11 @@ def comes_nearer(case: Case, before: Sequence[Array], after: Sequence[Array]) ->
 
     Each push may be likelier than before and yet come out of the simulation no nearer to where it was: effects and a
     friction that scatters share what is missing, or an effect took up the cell's own error. The push that speaks most
-    against the model is left out: an object that is about to slip off the hand goes one way or the other for next to
-    nothing.
+    against "visibly" is left out: an object that is about to slip off the hand goes one way or the other for next to
+    nothing, and as far off with either model.
     """
-    return any(_nearer_without(int(np.argmax(new - old)), old, new) for old, new in _streams(case, before, after))
+    streams = _streams(case, before, after)
+    return any(_nearer_without(int(np.argmax(BETTER**2 * new - old)), old, new) for old, new in streams)
 
 
 def least_motion(case: Case, errors: Sequence[Array]) -> float:

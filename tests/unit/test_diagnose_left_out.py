@@ -54,6 +54,17 @@ def test_an_effect_shows_if_it_moves_the_pushes_far_enough(odd):
         assert comes_nearer(CASE, before, left) == shows
 
 
+def test_a_push_that_goes_the_wrong_way_with_either_model_does_not_hide_what_the_others_show():
+    """It comes a little nearer itself, and outweighs by far what the others gain."""
+    before, after = errors(6.0, odd=7.0), errors(1.5, odd=27.0)
+    assert errors_of(CASE, before).rms < 1.2 * errors_of(CASE, after).rms
+    assert comes_nearer(CASE, before, after)
+    assert shown_by_several(CASE, before, after)
+    # Two such pushes are more than a model may leave out.
+    before[0], after[0] = before[9], after[9]
+    assert not comes_nearer(CASE, before, after)
+
+
 def test_errors_are_in_deviations_and_in_metres():
     whole = errors_of(CASE, errors(2.0))
     assert whole.rms == pytest.approx(2.0) and whole.per_push == pytest.approx([2.0] * 10)
