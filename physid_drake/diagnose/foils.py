@@ -44,8 +44,9 @@ def better_foil(fitter: Fitter, without: Fitted, model: Fitted, name: str, tick:
         name: the effect's.
         tick: told the stage.
     """
-    found = signatures(fitter, without, FOILS)
-    for kind in FOILS:
+    kinds = [kind for kind in FOILS if kind.applies(fitter.case.around)]
+    found = signatures(fitter, without, kinds)
+    for kind in kinds:
         best = best_family([score(without, one) for one in found if one.kind is kind])
         if best.gain < PROMISES * 2.0 * (model.score - without.score):
             continue

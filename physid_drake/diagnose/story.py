@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.candidate import Candidate
+from physid_drake.diagnose.candidate import EXPLAINED, Candidate
 from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.classes import class_beside
 from physid_drake.diagnose.conclude import conclude
@@ -116,9 +116,10 @@ class _Answer:
 
 
 def _better_foil(growth: Growth, grown: Grown) -> Foil | None:
-    """A law beside the catalogue that does better than an effect of a model that explains the pushes."""
+    """A law beside the catalogue that does better than an effect of a model that explains the pushes, or nearly."""
     plain, model = grown.base.fitted, grown.last.fitted
-    if not grown.steps or unexplained(plain, model):
+    # On short ticks, which come later, a model may leave a little less.
+    if not grown.steps or (unexplained(plain, model) and model.reduced_chi2 > EXPLAINED):
         return None
     for step in grown.steps:
         name = step[0].name

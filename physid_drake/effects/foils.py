@@ -9,9 +9,18 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from physid_drake.cell import HandPath
 from physid_drake.cell.forces import FrictionLaw
 from physid_drake.cell.object_state import Complex, ObjectState
-from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
+from physid_drake.effects.effect import (
+    Coordinate,
+    Effect,
+    Family,
+    PushFacts,
+    Surroundings,
+    families_of_sizes,
+    parameter,
+)
 
 Array = NDArray[np.float64]
 LENGTHS = (0.01, 0.03, 0.1)  # m, after which most of the change is done
@@ -80,4 +89,40 @@ class _DistanceLaw:
         return np.full(len(state.underside.points), math.exp(self._log * done))
 
 
-FOILS: tuple[type[Effect], ...] = (FrictionByDistance,)
+@dc.dataclass(frozen=True, kw_only=True)
+class HandClock(Effect):
+    """The hand's clock runs fast by ``rate``, and is in step with the tracker's as the hand sets out."""
+
+    name: ClassVar[str] = "hand_clock"
+    element: ClassVar[str] = "hand"
+    statement: ClassVar[str] = "the clocks of hand and tracker do not run at the same rate"
+    frame: ClassVar[str] = "time"
+    amplitudes: ClassVar[tuple[str, ...]] = ("rate",)
+
+    rate: float = parameter(0.0, "-")
+
+    @classmethod
+    def applies(cls, around: Surroundings) -> bool:
+        """With a hand."""
+        return around.has_hand
+
+    @classmethod
+    def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
+        """The rate."""
+        del around
+        return (Coordinate(name="rate", step=2e-3, lower=-0.2, upper=0.2),)
+
+    @classmethod
+    def families(cls, around: Surroundings) -> tuple[Family, ...]:
+        """Small and large."""
+        del around
+        return families_of_sizes(1.0, 8.0)
+
+    def hand(self, path: HandPath, facts: PushFacts) -> HandPath:
+        """The path at another pace."""
+        del facts
+        pace, first = 1.0 + self.rate, path.times[0]
+        return dc.replace(path, times=first + (path.times - first) / pace, velocities=pace * path.velocities)
+
+
+FOILS: tuple[type[Effect], ...] = (FrictionByDistance, HandClock)

@@ -132,3 +132,14 @@ def test_what_the_model_has_beside_it_is_no_rival():
 def test_a_model_that_explains_nothing_has_no_next_push():
     far = SimpleNamespace(steps=(step("table_tilt", "tether"),), final=SimpleNamespace(reduced_chi2=50.0, state=None))
     assert story._rival_states(far) == []
+
+
+@pytest.mark.parametrize(("left", "explains", "tried"), [(1.0, True, 1), (1.22, False, 1), (1.6, False, 0)])
+def test_a_name_that_short_ticks_may_bear_out_is_compared_with_foils(monkeypatch, left, explains, tried):
+    asked = []
+    monkeypatch.setattr(story, "unexplained", lambda plain, model: not explains)
+    monkeypatch.setattr(story, "better_foil", lambda *given: asked.append(given[3]))
+    model = SimpleNamespace(fitted=SimpleNamespace(reduced_chi2=left))
+    grown = SimpleNamespace(steps=[[SimpleNamespace(name="actuator_lag")]], base=model, last=model)
+    assert story._better_foil(SimpleNamespace(fitter=None, tick=None), grown) is None
+    assert asked == ["actuator_lag"] * tried
