@@ -164,11 +164,13 @@ def test_scatter_of_friction_is_found_push_by_push():
     for seed in (2, 3):  # of the noise, which four pushes feel
         recording = recorded(BOX, TRUTH, pushes_of(BOX, 4, seed=9), seed=seed, friction_changes=changes)
         result = identified(recording, *FRICTIONS)
-        assert_recovered(result, "support_friction", 0.27, 0.1, widest=0.12)  # -7.6 %; half an interval is 10.5 %
-        assert 0.03 < result.polished.friction_scatter < 0.15  # 0.046 and 0.092; 0.102 is true
+        # With seed 3, half an interval is 10.5 % on one machine and 12.5 % on another, the scatter 0.092 and 0.057
+        # (0.102 is true), and the value 7.6 and 8.5 % too low.
+        assert_recovered(result, "support_friction", 0.27, 0.1, widest=0.15)
+        assert 0.03 < result.polished.friction_scatter < 0.15  # 0.046 for seed 2
         found = [unknowns["friction"] for unknowns in result.polished.unknowns]
         alike.append(np.corrcoef(found, changes)[0, 1])
-    assert np.mean(alike) > 0.93  # 0.896 and 0.997
+    assert np.mean(alike) > 0.93  # 0.896 and 0.994 or 0.997
 
 
 def test_the_same_seed_gives_the_same_result_to_the_bit_on_one_process_and_on_two():
