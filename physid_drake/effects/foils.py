@@ -21,6 +21,7 @@ from physid_drake.effects.effect import (
     families_of_sizes,
     parameter,
 )
+from physid_drake.effects.hand import HandEffect
 
 Array = NDArray[np.float64]
 LENGTHS = (0.01, 0.03, 0.1)  # m, after which most of the change is done
@@ -90,8 +91,12 @@ class _DistanceLaw:
 
 
 @dc.dataclass(frozen=True, kw_only=True)
-class HandClock(Effect):
-    """The hand's clock runs fast by ``rate``, and is in step with the tracker's as the hand sets out."""
+class HandClock(HandEffect):
+    """The hand's clock runs fast by ``rate`` [-], and is in step with the tracker's as the hand sets out, at t0.
+
+    At time t the tip is where the recording says it is at t0 + (1 + rate) (t - t0).
+    The plainest error of a clock, and from no source.
+    """
 
     name: ClassVar[str] = "hand_clock"
     element: ClassVar[str] = "hand"
@@ -100,11 +105,6 @@ class HandClock(Effect):
     amplitudes: ClassVar[tuple[str, ...]] = ("rate",)
 
     rate: float = parameter(0.0, "-")
-
-    @classmethod
-    def applies(cls, around: Surroundings) -> bool:
-        """With a hand."""
-        return around.has_hand
 
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:

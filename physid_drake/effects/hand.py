@@ -29,7 +29,7 @@ SHORTEST = 1e-7  # s between knots
 
 
 @dc.dataclass(frozen=True, kw_only=True)
-class _HandEffect(Effect):
+class HandEffect(Effect):
     """An effect that needs a hand."""
 
     @classmethod
@@ -39,7 +39,7 @@ class _HandEffect(Effect):
 
 
 @dc.dataclass(frozen=True, kw_only=True)
-class HandCompliance(_HandEffect):
+class HandCompliance(HandEffect):
     """The tip is on a spring and a damper: it is behind where the robot says by compliance times the force.
 
     Assumed: the spring is linear and alike in all directions of the plane; the hand columns are of its far end, which
@@ -103,7 +103,7 @@ class HandCompliance(_HandEffect):
 
 
 @dc.dataclass(frozen=True, kw_only=True)
-class ActuatorLag(_HandEffect):
+class ActuatorLag(HandEffect):
     """The hand columns are commands; the tip follows with a first-order lag."""
 
     name: ClassVar[str] = "actuator_lag"
@@ -136,7 +136,7 @@ class ActuatorLag(_HandEffect):
 
 
 @dc.dataclass(frozen=True, kw_only=True)
-class HandOffset(_HandEffect):
+class HandOffset(HandEffect):
     """The tip is not where its calibration says: an offset in P.
 
     The axes of P are the mean ones of each push; those of W where the recording has no rotation of the hand.
