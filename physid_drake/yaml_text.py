@@ -4,69 +4,135 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import yaml
 
 from physid_drake.errors import ConfigError
+from physid_drake.files import FileError, read_text
+from physid_drake.wording import named, one_line
 
 # A date of no calendar, a tag that does not fit its value, and a thousand brackets are no YAMLError.
-NO_YAML = (yaml.YAMLError, ValueError, TypeError, AttributeError, RecursionError)
+NO_YAML = (yaml.YAMLError, ValueError, TypeError, AttributeError, LookupError, RecursionError, OverflowError)
 WHOLE = re.compile(r"[-+]?(0|[1-9][0-9_]*|0x[0-9a-fA-F_]+)")
+MOST_BYTES: Final = 4_000_000  # of a text: what people write has thousands
+MOST_NODES: Final = 10_000  # of a text whose aliases are written out
+MOST_LETTERS: Final = 1000  # of a number
 
 
-class _Loader(yaml.SafeLoader):
+class Loader(yaml.SafeLoader):
     """YAML in which nothing is there twice, and no number is another than it looks."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode) and key.value != "<<"]
-        for k, key in enumerate(keys):
-            if key in keys[:k]:
-                raise yaml.constructor.ConstructorError(None, None, f"key '{key}' is there twice", node.start_mark)
+        """A mapping, in which no key stands twice."""
+        seen: set[str] = set()
+        for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode) or key.value == "<<":
+                continue
+            if key.value in seen:
+                message = f"key '{named(key.value)}' is there twice"
+                raise yaml.constructor.ConstructorError(None, None, message, node.start_mark)
+            seen.add(key.value)
         return super().construct_mapping(node, deep=deep)
 
     def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
         """YAML 1.1 takes 010 for 8 and 1:30 for 90."""
         text = str(node.value)
-        if not WHOLE.fullmatch(text):
-            raise yaml.constructor.ConstructorError(None, None, f"'{text}' is no number in base 10", node.start_mark)
+        if not WHOLE.fullmatch(text) or len(text) > MOST_LETTERS:
+            message = f"'{named(text)}' is no number in base 10"
+            raise yaml.constructor.ConstructorError(None, None, message, node.start_mark)
         return int(super().construct_yaml_int(node))
 
 
-_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_yaml_int)
+class PlainLoader(Loader):
+    """The same without aliases, for what programs write: nothing in it stands for something elsewhere."""
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """A node, which is neither named nor the name of another."""
+        event = self.peek_event()  # type: ignore[no-untyped-call]
+        if getattr(event, "anchor", None) is not None:
+            message = f"the anchor or alias '{named(event.anchor)}' is not read here; write its value out"
+            raise yaml.composer.ComposerError(None, None, message, event.start_mark)
+        node: yaml.Node | None = super().compose_node(parent, index)
+        return node
 
 
-def parsed(text: str, where: str) -> Any:
+for _loader in (Loader, PlainLoader):
+    _loader.add_constructor("tag:yaml.org,2002:int", _loader.construct_yaml_int)
+
+
+def parsed(text: str, where: str, *, aliases: bool = True) -> Any:
     """The content of a YAML text.
 
     Args:
         text: YAML.
         where: it is from, for the message.
+        aliases: whether anchors, aliases and merge keys are read; written out, they are 10,000 values at most.
 
     Raises:
-        ConfigError: if it is no YAML.
+        ConfigError: if it is no YAML, or too large.
     """
     try:
-        return yaml.load(text, Loader=_Loader)
+        loader = (Loader if aliases else PlainLoader)(text)
+        node = loader.get_single_node()
+        if node is None:
+            return None
+        if aliases:
+            check_size(node)
+        return loader.construct_document(node)
     except NO_YAML as error:
-        cause = " ".join(str(error).split()).rstrip(".") or type(error).__name__
-        raise ConfigError(f"{where}: is no YAML: {cause}.") from error
+        raise ConfigError(f"{where}: is no YAML: {one_line(error)}.") from error
 
 
-def read_yaml(path: Path, where: str) -> Any:
+def read_yaml(path: Path, where: str, *, aliases: bool = True) -> Any:
     """The content of a YAML file.
 
     Args:
         path: of the file.
         where: it is from, for the message.
+        aliases: whether anchors, aliases and merge keys are read; written out, they are 10,000 values at most.
 
     Raises:
         ConfigError: if it is not there, cannot be read, or is no YAML.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError as error:
-        raise ConfigError(f"{where}: there is no such file.") from error
-    except (OSError, ValueError) as error:  # no UTF-8; a path with a NUL
-        raise ConfigError(f"{where}: cannot be read: {' '.join(str(error).split())}.") from error
-    return parsed(text, where)
+        text = read_text(path, most=MOST_BYTES)
+    except FileError as error:
+        raise ConfigError(f"{where}: {error}.") from error
+    return parsed(text, where, aliases=aliases)
+
+
+def check_size(root: yaml.Node) -> None:
+    """Refuse a text that stands for too much: nine lists of nine aliases each are a billion values.
+
+    Every node is counted once and its size remembered, so that this takes as long as the text is.
+
+    Raises:
+        ComposerError: if it has more than 10,000 values with its aliases written out, or holds itself.
+    """
+    sizes: dict[int, int] = {}
+    entered: set[int] = set()
+    waiting = [root]
+    while waiting:
+        node = waiting[-1]
+        if id(node) in sizes:
+            waiting.pop()
+            continue
+        inner = _inner(node)
+        if id(node) not in entered:
+            entered.add(id(node))
+            waiting.extend(one for one in inner if id(one) not in sizes)
+            if any(id(one) in entered and id(one) not in sizes for one in inner):
+                raise yaml.composer.ComposerError(None, None, "an alias stands inside of what it names", None)
+            continue
+        waiting.pop()
+        sizes[id(node)] = 1 + sum(sizes[id(one)] for one in inner)
+        if sizes[id(node)] > MOST_NODES:
+            message = f"it holds more than {MOST_NODES} values with its aliases written out; leave some out"
+            raise yaml.composer.ComposerError(None, None, message, node.start_mark)
+
+
+def _inner(node: yaml.Node) -> list[yaml.Node]:
+    if isinstance(node, yaml.MappingNode):
+        return [one for pair in node.value for one in pair]
+    return list(node.value) if isinstance(node, yaml.SequenceNode) else []

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.common import MemoryFile
 from pydrake.geometry import Box as DrakeBox
-from pydrake.geometry import Convex, Mesh, Shape
+from pydrake.geometry import Convex, InMemoryMesh, Mesh, Shape
 from pydrake.geometry import Cylinder as DrakeCylinder
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.tree import CalcSpatialInertia, SpatialInertia
@@ -17,9 +18,11 @@ from scipy.spatial import ConvexHull, QhullError
 
 from physid_drake.cell.outline import Disc, Outline, Polygon, rectangle
 from physid_drake.cell.support import second_moments
-from physid_drake.errors import CellError
+from physid_drake.errors import CellError, RecordingError
 from physid_drake.recording import Box, Cylinder, MeshShape, Prism
 from physid_drake.recording import Shape as RecordedShape
+from physid_drake.recording.obj import ObjMesh, check_solid, read_obj
+from physid_drake.wording import named
 
 Array = NDArray[np.float64]
 FACE_THICKNESS = 2e-4  # m: how far a prism's colliding faces reach inward; at acute corners they end so early
@@ -143,31 +146,44 @@ def _convex_prism(polygon: Polygon, height: float) -> Convex:
 
 
 def _mesh(shape: MeshShape) -> Solid:
-    vertices = shape.scale * mesh_vertices(shape.file)
+    """From what was parsed, and never from the path: Drake and Meshcat would follow what the file names."""
+    try:
+        parsed = read_obj(shape.file)
+        check_solid(parsed, shape.scale, shape.file)
+    except RecordingError as error:
+        raise CellError(str(error)) from error
+    vertices = shape.scale * parsed.vertices
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     height = float(high[2] - low[2])
-    if height <= 0.0:
-        raise CellError(f"mesh '{shape.file}' is flat: it has no height along z.")
-    centroid, gyration = _volume(shape, vertices)
+    surface = _surface(parsed, shape.scale)
+    centroid, gyration = _volume(shape, vertices, surface)
     middle = np.array([centroid[0], centroid[1], 0.5 * (low[2] + high[2])])
     centred = vertices - middle
     hull = _hull(centred[:, :2], shape.file)
     standing = centred[centred[:, 2] < -0.5 * height + max(1e-4, 0.01 * height)]
     underside = _hull(standing[:, :2], shape.file)
-    visual = ((Mesh(str(shape.file), shape.scale), RigidTransform(-middle)),)
+    look = surface or Convex(vertices.T, label=shape.file.stem)
+    visual = ((look, RigidTransform(-middle)),)
     return Solid(outline=hull, underside=underside, height=height, gyration=gyration,
                  rolling_radius=None, faces=_polygon_faces(hull, height), visual=visual)  # fmt: skip
 
 
-def _volume(shape: MeshShape, vertices: Array) -> tuple[Array, tuple[float, float, float]]:
+def _surface(parsed: ObjMesh, scale: float) -> Mesh | None:
+    """The mesh in Drake, in memory; None where it has no faces."""
+    if not len(parsed.triangles):
+        return None
+    return Mesh(mesh_data=InMemoryMesh(mesh_file=MemoryFile(parsed.text(), ".obj", "object")), scale=scale)
+
+
+def _volume(shape: MeshShape, vertices: Array, surface: Mesh | None) -> tuple[Array, tuple[float, float, float]]:
     """Centroid (3,) [m] of a mesh's volume, and the squared radii of gyration about it [m^2].
 
     Of its convex hull where its surface does not enclose a volume.
     """
     hull = _inertia(Convex(vertices.T, label=shape.file.stem))
-    mesh = _inertia(Mesh(str(shape.file), shape.scale))
+    mesh = None if surface is None else _inertia(surface)
     if hull is None:
-        raise CellError(f"mesh '{shape.file}' has no volume: its vertices lie in a plane.")
+        raise CellError(f"mesh '{named(shape.file)}' has no volume: its vertices lie in a plane.")
     # A solid fills some of its hull; a surface with holes, or wound both ways, has a meaningless volume.
     found = mesh if mesh is not None and _is_within(mesh, hull.get_mass(), vertices) else hull
     x, y, z = found.Shift(found.get_com()).get_unit_inertia().get_moments().tolist()
@@ -189,31 +205,11 @@ def _inertia(shape: Shape) -> SpatialInertia | None:
         return None
 
 
-def mesh_vertices(file: Path) -> Array:
-    """Vertices (n, 3) of a Wavefront OBJ file, in the file's unit.
-
-    Raises:
-        CellError: if the file is missing, not an OBJ, or holds fewer than four vertices.
-    """
-    if file.suffix.lower() != ".obj":
-        raise CellError(f"mesh '{file}': only Wavefront .obj files are read; convert it to .obj.")
-    try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-        rows = [[float(word) for word in line.split()[1:4]] for line in lines if line.startswith("v ")]
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise CellError(f"mesh '{file}' does not load: {error}.") from error
-    if len(rows) < 4 or any(len(row) != 3 for row in rows):
-        raise CellError(
-            f"mesh '{file}' does not load: it holds {len(rows)} vertices 'v x y z'; a solid has at least 4."
-        )
-    return np.array(rows)
-
-
 def _hull(points: Array, file: Path) -> Polygon:
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError) as error:
         raise CellError(
-            f"mesh '{file}' has no area where it stands or is touched: its vertices lie on a line."
+            f"mesh '{named(file)}' has no area where it stands or is touched: its vertices lie on a line."
         ) from error
     return Polygon([(float(x), float(y)) for x, y in points[hull.vertices]])

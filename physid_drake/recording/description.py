@@ -12,7 +12,10 @@ from typing import Final, TypeVar, cast
 
 import yaml
 
+from physid_drake import files
 from physid_drake.errors import RecordingError
+from physid_drake.recording.limits import check_text
+from physid_drake.recording.obj import check_solid, read_obj
 from physid_drake.recording.values import (
     REFLEX_SF_TIP_RADIUS,
     Box,
@@ -28,6 +31,8 @@ from physid_drake.recording.values import (
     Table,
     TipShape,
 )
+from physid_drake.wording import named, one_line, shown
+from physid_drake.yaml_text import MOST_BYTES, NO_YAML, PlainLoader
 
 FORMAT: Final = "physid-recording/1"
 DESCRIPTION_FILE: Final = "recording.yaml"
@@ -40,6 +45,7 @@ _SHAPE_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 _TOP_KEYS: Final = ("format", "name", "description", "object", "table", "hand", "sensors", "pushes")
 _TEXT_KEYS: Final = ("name", "description", "file", "note")
+_LINES_KEYS: Final = ("description", "note")
 _LOOKS: Final = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("int", "float", "bool", "timestamp"))
 _SENSOR_KEYS: Final = ("object_position_std", "object_rotation_std", "hand_position_std", "force_std")
 _SENSOR_UNITS: Final = ("_m", "_rad", "_m", "_n")
@@ -47,7 +53,7 @@ _SENSOR_UNITS: Final = ("_m", "_rad", "_m", "_n")
 _T = TypeVar("_T")
 
 
-class _Loader(yaml.SafeLoader):
+class _Loader(PlainLoader):
     """Reads ``1e-3`` as a number, which YAML 1.1 takes for text."""
 
 
@@ -79,7 +85,7 @@ class Section:
     def _place(self, key: str) -> str:
         path = f"{self.path}.{key}".strip(".")
         line = self.lines.get(path, self.lines.get(self.path, 1))
-        return f"{self.file}: line {line}: {path or 'the file'}"
+        return f"{named(self.file)}: line {line}: {named(path) or 'the file'}"
 
     def refuse(self, key: str, message: str) -> RecordingError:
         """The error for one key."""
@@ -115,14 +121,17 @@ class Section:
             raise self.refuse(key, f"is required, but missing; give {kind}.")
         value = accept(self.values[key])
         if value is None:
-            raise self.refuse(key, f"must be {kind}, but got {_shown(self.values[key])}; correct it.")
+            raise self.refuse(key, f"must be {kind}, but got {shown(self.values[key])}; correct it.")
         return value
 
     def text(self, key: str, default: str | None = None) -> str:
         """A text; ``default`` where it is absent, required where that is None."""
         if default is not None and not self.has(key):
             return default
-        return self.get(key, "text", _as_text)
+        text = self.get(key, "text", _as_text)
+        with self.naming(key):
+            check_text("it", text, lines=key in _LINES_KEYS)
+        return text
 
     def choice(self, key: str, *choices: str) -> str:
         """One of some words."""
@@ -155,7 +164,8 @@ def load_description(folder: Path) -> Section:
         RecordingError: if it is missing, not UTF-8, not YAML, or of another format.
     """
     file = folder / DESCRIPTION_FILE
-    text = read_text(file)
+    text = read_text(file, most=MOST_BYTES)
+    place = named(file)
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
@@ -165,38 +175,36 @@ def load_description(folder: Path) -> Section:
         values = None if node is None else loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        line = mark.line + 1 if mark is not None else 1
-        raise RecordingError(f"{file}: line {line}: not valid YAML: {error.problem}; correct it.") from error
-    except (yaml.YAMLError, ValueError, RecursionError, TypeError, LookupError) as error:
+        line, problem = mark.line + 1 if mark is not None else 1, named(error.problem or error.context)
+        raise RecordingError(f"{place}: line {line}: not valid YAML: {problem}; correct it.") from error
+    except NO_YAML as error:
         if isinstance(error, RecordingError):
             raise
-        cause = " ".join(str(error).split()) or type(error).__name__
-        raise RecordingError(f"{file}: line 1: not valid YAML: {cause}; correct it.") from error
+        raise RecordingError(f"{place}: line 1: not valid YAML: {one_line(error)}; correct it.") from error
     if not isinstance(values, dict):
-        raise RecordingError(f"{file}: line 1: must be a mapping of keys to values, but got {_shown(values)}.")
+        raise RecordingError(f"{place}: line 1: must be a mapping of keys to values, but got {shown(values)}.")
     top = Section(file=file, path="", values=values, lines=lines)
     if top.values.get("format") != FORMAT:
-        got = _shown(top.values.get("format"))
+        got = shown(top.values.get("format"))
         raise top.refuse("format", f"unknown format {got}; this reader knows {FORMAT!r}.")
     top.check_keys(*_TOP_KEYS)
     return top
 
 
-def read_text(file: Path) -> str:
+def read_text(file: Path, *, most: int = files.MOST_BYTES) -> str:
     """The text of a UTF-8 file, without the byte order mark that spreadsheets write.
 
     Raises:
-        RecordingError: if it is missing, cannot be read, or is not UTF-8.
+        RecordingError: if it is missing, is no plain file, has more than ``most`` bytes, or is not UTF-8.
     """
     try:
-        return file.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        raise RecordingError(f"{file}: line {line}: not UTF-8 text; save the file as UTF-8.") from error
-    except FileNotFoundError as error:
-        raise RecordingError(f"{file}: missing file; a recording needs it.") from error
-    except OSError as error:
-        raise RecordingError(f"{file}: cannot be read: {error.strerror}.") from error
+        return files.read_text(file, most=most)
+    except files.NotTextError as error:
+        raise RecordingError(f"{named(file)}: line {error.line}: not UTF-8 text; save the file as UTF-8.") from error
+    except files.MissingFileError as error:
+        raise RecordingError(f"{named(file)}: missing file; a recording needs it.") from error
+    except files.FileError as error:
+        raise RecordingError(f"{named(file)}: {error}.") from error
 
 
 def inside(folder: Path, relative: str) -> Path | None:
@@ -267,25 +275,25 @@ def push_entries(top: Section, folder: Path) -> list[tuple[str, Path, str]]:
     for k, entry in enumerate(entries):
         key = f"pushes[{k}]"
         if not isinstance(entry, dict):
-            raise top.refuse(key, f"must be a mapping with the key file, but got {_shown(entry)}.")
+            raise top.refuse(key, f"must be a mapping with the key file, but got {shown(entry)}.")
         section = Section(file=top.file, path=key, values=entry, lines=top.lines)
         section.check_keys("file", "note")
         name = section.text("file")
         path = inside(folder, name)
         if path is None:
-            raise section.refuse("file", f"must lie inside the recording's folder, but got {name!r}; move it.")
-        if not _is_file(path):
-            raise section.refuse("file", f"missing file {name!r}; add it or remove this push.")
+            raise section.refuse("file", f"must lie inside the recording's folder, but got {shown(name)}; move it.")
+        if not _is_there(path):
+            raise section.refuse("file", f"missing file {shown(name)}; add it or remove this push.")
         if any(path == other for _, other, _ in found):
-            raise section.refuse("file", f"{name!r} is listed twice; remove one.")
+            raise section.refuse("file", f"{shown(name)} is listed twice; remove one.")
         found.append((name, path, section.text("note", "")))
     return found
 
 
-def _is_file(path: Path) -> bool:
+def _is_there(path: Path) -> bool:
     """Whether it is there; a name that is too long for any file is not."""
     try:
-        return path.is_file()
+        return path.exists()
     except OSError:
         return False
 
@@ -302,10 +310,12 @@ def _shape_from(section: Section, kind: str, folder: Path) -> Shape:
         return Prism(polygon=polygon, height=section.number("height_m"))
     name = section.text("file")
     path = inside(folder, name)
-    if path is None or not _is_file(path):
+    if path is None or not _is_there(path):
         problem = "must lie inside the recording's folder" if path is None else "is missing"
-        raise RecordingError(f"the mesh {name!r} {problem}; put it into the folder.")
-    return MeshShape(file=path, scale=section.number("scale") if section.has("scale") else 1.0)
+        raise RecordingError(f"the mesh {shown(name)} {problem}; put it into the folder.")
+    shape = MeshShape(file=path, scale=section.number("scale") if section.has("scale") else 1.0)
+    check_solid(read_obj(path), shape.scale, path)
+    return shape
 
 
 def _number_lines(file: Path, node: yaml.Node | None, path: str, lines: dict[str, int]) -> None:
@@ -322,11 +332,10 @@ def _number_lines(file: Path, node: yaml.Node | None, path: str, lines: dict[str
             inner = f"{path}.{key.value}".strip(".")
             line = key.start_mark.line + 1
             if not isinstance(key, yaml.ScalarNode):
-                raise RecordingError(
-                    f"{file}: line {line}: {path or 'the file'}: a key must be one word; correct it."
-                )
+                place = f"{named(file)}: line {line}: {named(path) or 'the file'}"
+                raise RecordingError(f"{place}: a key must be one word; correct it.")
             if key.value in seen:
-                raise RecordingError(f"{file}: line {line}: {inner}: the key stands twice; remove one.")
+                raise RecordingError(f"{named(file)}: line {line}: {named(inner)}: the key stands twice; remove one.")
             seen.add(key.value)
             lines[inner] = line
             _number_lines(file, child, inner, lines)
@@ -342,11 +351,6 @@ def _keep_texts(node: yaml.Node | None) -> None:
             if key.value in _TEXT_KEYS and child.tag in _LOOKS:
                 child.tag = "tag:yaml.org,2002:str"
             _keep_texts(child)
-
-
-def _shown(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _as_text(value: object) -> str | None:

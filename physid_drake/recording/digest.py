@@ -10,14 +10,17 @@ from typing import Any
 
 import numpy as np
 
+from physid_drake.errors import RecordingError
+from physid_drake.files import FileError, read_bytes
 from physid_drake.recording.values import Recording
+from physid_drake.wording import named
 
 
 def digest_of(recording: Recording) -> str:
     """SHA-256 of all that a recording says, its mesh among it and wherever it lies, in hexadecimal.
 
     Raises:
-        OSError: if its mesh cannot be read any more.
+        RecordingError: if its mesh cannot be read any more.
     """
     digest = hashlib.sha256()
     for piece in _pieces(recording):
@@ -30,7 +33,10 @@ def _pieces(value: Any) -> Iterator[bytes]:
         yield repr(value.shape).encode()
         yield np.ascontiguousarray(value).tobytes()
     elif isinstance(value, Path):
-        yield value.read_bytes()
+        try:
+            yield read_bytes(value)
+        except FileError as error:
+            raise RecordingError(f"mesh '{named(value)}': {error}.") from error
     elif dc.is_dataclass(value):
         for field in (f for f in dc.fields(value) if f.compare):
             yield field.name.encode()

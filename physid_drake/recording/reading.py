@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,8 @@ import numpy.typing as npt
 
 from physid_drake.errors import RecordingError
 from physid_drake.recording import description
+from physid_drake.recording.clocks import check_seconds
+from physid_drake.recording.limits import FURTHEST, STRONGEST, first_beyond
 from physid_drake.recording.screening import gap_warnings, screen_poses
 from physid_drake.recording.values import (
     QUATERNION_TOLERANCE,
@@ -24,6 +27,7 @@ from physid_drake.recording.values import (
     Push,
     Recording,
 )
+from physid_drake.wording import named, one_line, shown
 
 TIME: Final = "time_s"
 HAND_POSITION: Final = ("hand_x_m", "hand_y_m", "hand_z_m")
@@ -31,6 +35,9 @@ HAND_QUATERNION: Final = ("hand_qw", "hand_qx", "hand_qy", "hand_qz")
 OBJECT_POSITION: Final = ("object_x_m", "object_y_m", "object_z_m")
 OBJECT_QUATERNION: Final = ("object_qw", "object_qx", "object_qy", "object_qz")
 FORCE: Final = ("force_x_n", "force_y_n", "force_z_n")
+MOST_ROWS: Final = 300_000
+"""Of one table: five minutes at 1 kHz. A push takes seconds, and each of its rows some 20 us to read."""
+
 COLUMNS: Final = (TIME, *HAND_POSITION, *HAND_QUATERNION, *OBJECT_POSITION, *OBJECT_QUATERNION, *FORCE)
 
 
@@ -76,8 +83,10 @@ def read_recording(folder: Path) -> Recording:
         RecordingError: if a rule of ``physid-recording/1`` is broken; one line naming file, row and column.
     """
     folder = Path(folder)
-    if not folder.is_dir():
-        raise RecordingError(f"{folder}: is not a folder; give the folder that holds {description.DESCRIPTION_FILE}.")
+    if not os.path.isdir(folder):  # noqa: PTH112  # Path.is_dir raises for a name that is too long
+        raise RecordingError(
+            f"{named(folder)}: is not a folder; give the folder that holds {description.DESCRIPTION_FILE}."
+        )
     top = description.load_description(folder)
     name = top.text("name")
     hand = description.hand_from(top)
@@ -138,8 +147,11 @@ def _read_table(file: Path, with_hand: bool) -> _PushTable:
             else:
                 rows.append(_read_row(file, header, fields, reader.line_num))
                 lines.append(reader.line_num)
+                _check_length(file, lines)
     except csv.Error as error:
-        raise RecordingError(f"{file}: row {reader.line_num}: not a readable table: {error}; correct it.") from error
+        raise RecordingError(
+            f"{file}: row {reader.line_num}: not a readable table: {one_line(error)}; correct it."
+        ) from error
     if not rows:
         raise RecordingError(f"{file}: row 1: there are no samples under a header; a push needs at least two rows.")
     table = _PushTable(file=file, columns=header, values=np.array(rows, dtype=np.float64), lines=tuple(lines))
@@ -154,7 +166,7 @@ def _read_header(file: Path, fields: list[str], line: int) -> tuple[str, ...]:
     for k, column in enumerate(header):
         if column not in COLUMNS:
             hint = "separate columns by commas" if len(header) == 1 else "the format lists the columns it knows"
-            raise RecordingError(f"{file}: row {line}: column {column!r}: is unknown; {hint}.")
+            raise RecordingError(f"{file}: row {line}: column {shown(column)}: is unknown; {hint}.")
         if column in header[:k]:
             raise RecordingError(f"{file}: row {line}: column {column}: stands twice; remove one.")
     if TIME not in header:
@@ -181,11 +193,39 @@ def _read_row(file: Path, header: tuple[str, ...], fields: list[str], line: int)
             value = None
         if value is None or not math.isfinite(value):
             raise RecordingError(
-                f"{file}: row {line}: column {column}: must be a finite number, but got {text[:40]!r}; "
+                f"{file}: row {line}: column {column}: must be a finite number, but got {shown(text)}; "
                 "leave the field empty if there is no sample."
             )
         values.append(value)
     return values
+
+
+def _check_length(file: Path, lines: list[int]) -> None:
+    """Refuse a log of hours: each push is a table of its own."""
+    if len(lines) > MOST_ROWS:
+        raise RecordingError(
+            f"{file}: row {lines[-1]}: a table must have at most {MOST_ROWS} samples; cut the push out of the log."
+        )
+
+
+def _check_seconds(table: _PushTable, times: Array, what: str) -> None:
+    """Refuse times of one stream that can be no seconds, before anything is asked of them."""
+    try:
+        check_seconds(times, f"the {what}'s samples")
+    except RecordingError as error:
+        raise RecordingError(f"{table.file}: column {TIME}: {error}") from error
+
+
+def _check_near(table: _PushTable, rows: npt.NDArray[np.intp], columns: Sequence[str], most: float, unit: str) -> None:
+    """Refuse what is out of all proportion, which overflows in whatever is made of it."""
+    values = table.group(columns)[rows]
+    k = first_beyond(values, most)
+    if k is not None:
+        column = int(np.argmax(np.abs(values[k])))
+        raise RecordingError(
+            f"{table.file}: row {table.lines[rows[k]]}: column {columns[column]}: must be between {-most:g} and "
+            f"{most:g} {unit}, but got {float(values[k, column]):.6g} {unit}; is it in {unit}?"
+        )
 
 
 def _check_times(table: _PushTable) -> None:
@@ -234,6 +274,8 @@ def _pose_stream(
     if len(rows) == 0:
         return None
     times, positions = table.group([TIME])[rows, 0], table.group(position)[rows]
+    _check_seconds(table, times, what)
+    _check_near(table, rows, position, FURTHEST, "m")
     identity = np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1))
     quaternions = table.group(quaternion)[rows] if turned else identity
     lines = [table.lines[k] for k in rows]
@@ -251,7 +293,8 @@ def _pose_stream(
 
 
 def _check_norms(file: Path, positions: Array, quaternions: Array, lines: list[int], columns: Sequence[str]) -> None:
-    norms = np.linalg.norm(quaternions, axis=1)
+    with np.errstate(over="ignore"):
+        norms = np.linalg.norm(quaternions, axis=1)
     lost = (quaternions == 0.0).all(axis=1) & (positions == 0.0).all(axis=1)
     wrong = np.flatnonzero((np.abs(norms - 1.0) > QUATERNION_TOLERANCE) & ~lost)
     if len(wrong):
@@ -280,5 +323,7 @@ def _force_stream(table: _PushTable, warnings: list[str]) -> ForceStream | None:
     if len(rows) == 0:
         return None
     times = table.group([TIME])[rows, 0]
+    _check_seconds(table, times, "force")
+    _check_near(table, rows, FORCE, STRONGEST, "N")
     warnings.extend(gap_warnings(times, [table.lines[k] for k in rows], "force"))
     return ForceStream(times=times, forces=table.group(FORCE)[rows])

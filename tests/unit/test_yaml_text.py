@@ -1,5 +1,7 @@
 """YAML as people write it."""
 
+import os
+
 import pytest
 
 from physid_drake.errors import ConfigError
@@ -29,3 +31,78 @@ def test_what_a_template_gives_may_be_given_again():
 def test_a_path_that_cannot_be_is_one_line(tmp_path):
     with pytest.raises(ConfigError, match="cannot be read"):
         read_yaml(tmp_path / "a\0b.yaml", "here")
+
+
+def laughs(depth, form="[{}]"):
+    """Nine aliases in each of many lists: 9**depth values in a kilobyte."""
+    lines = ["a0: &a0 lol"]
+    for k in range(depth):
+        lines.append(f"a{k + 1}: &a{k + 1} " + form.format(", ".join([f"*a{k}"] * 9)))
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        laughs(9),
+        laughs(400),
+        "a: &a0 {k: 1}\n" + "".join(f"b{k}: &a{k + 1} {{<<: [*a{k}, *a{k}]}}\n" for k in range(60)),
+        "a: &a [*a]",
+        "a: &a {b: [1, {c: *a}]}",
+        "a: &a {<<: *a}",
+        "a: &a {<<: [*a, *a]}",
+        "? &a [*a]\n: 1",
+        "[" + "1, " * 20_000 + "1]",
+    ],
+    ids=["lists", "deep", "merged", "ring", "long ring", "merged ring", "merged twice", "key", "plain"],
+)
+def test_a_text_that_stands_for_too_much_is_refused_at_once(text):
+    with pytest.raises(ConfigError, match="here: is no YAML: ") as caught:
+        parsed(text, "here")
+    assert len(str(caught.value)) < 300
+
+
+def test_many_aliases_of_little_are_read():
+    assert len(parsed(laughs(3), "here")["a3"]) == 9
+    assert parsed("[&a [1, 2], *a, *a]", "here") == [[1, 2]] * 3
+
+
+@pytest.mark.parametrize("text", ["a: &a 1\nb: *a", "a: &a 1", "b: *a", "a: &a {b: 1}\nc: {<<: *a}", "a: &a [*a]"])
+def test_where_no_aliases_are_read_they_are_refused_by_name(text):
+    with pytest.raises(ConfigError, match="the anchor or alias 'a' is not read here"):
+        parsed(text, "here", aliases=False)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 100_000,
+        "{a: " * 50_000,
+        "- " * 50_000,
+        "!!bool maybe",
+        "!!int x",
+        "!!float x",
+        "!!timestamp x",
+        "!!binary é",
+        "!!python/object/apply:os.getcwd []",
+        "0x" + "f" * 100_000,
+        "1" * 100_000,
+        "2026-99-99",
+        "{[1]: 2}",
+        "*" + "a" * 70_000,
+        "!" + "a" * 70_000 + " 1",
+        "a" * 70_000 + ": 1\n" + "a" * 70_000 + ": 1",
+    ],
+    ids=range(16),
+)
+@pytest.mark.parametrize("aliases", [True, False])
+def test_whatever_is_wrong_is_one_short_line(text, aliases):
+    with pytest.raises(ConfigError, match="here: is no YAML") as caught:
+        parsed(text, "here", aliases=aliases)
+    assert str(caught.value).isprintable() and len(str(caught.value)) < 300
+
+
+def test_a_named_pipe_is_no_yaml(tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    with pytest.raises(ConfigError, match="here: cannot be read: it is a named pipe"):
+        read_yaml(tmp_path / "pipe.yaml", "here")

@@ -1,0 +1,101 @@
+"""Reads files that somebody else wrote: whole, of a bounded size, and never what is no plain file.
+
+A named pipe hangs whoever opens it, a device never ends. So what is opened is looked at first, and once more when it
+is open.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+from typing import Final
+
+MOST_BYTES: Final = 64_000_000
+_KINDS: Final = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a named pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+class FileError(OSError):
+    """A file cannot be read; the message is the end of a sentence that begins with its name.
+
+    Those who read turn it into their room's error, which names the file.
+    """
+
+
+class MissingFileError(FileError, FileNotFoundError):
+    """There is no such file."""
+
+
+class NotTextError(FileError):
+    """A file is not UTF-8 text; ``line`` is where."""
+
+    def __init__(self, line: int) -> None:
+        super().__init__(f"cannot be read: line {line} is not UTF-8 text; save the file as UTF-8")
+        self.line = line
+
+
+def read_bytes(path: Path | str, *, most: int = MOST_BYTES) -> bytes:
+    """What is in a plain file.
+
+    Args:
+        path: of the file; links are followed.
+        most: bytes that it may have.
+
+    Raises:
+        MissingFileError: if it is not there.
+        FileError: if it is no plain file, is larger, or cannot be read.
+    """
+    try:
+        _check(os.stat(path), most)  # noqa: PTH116  # Path.stat has words of its own for a NUL
+        # Without O_NONBLOCK, a pipe that took the file's place since then would hang.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
+        with os.fdopen(descriptor, "rb") as file:
+            _check(os.fstat(descriptor), most)
+            content = file.read(most + 1)
+    except FileError:
+        raise
+    except FileNotFoundError as error:
+        raise MissingFileError("there is no such file") from error
+    except (OSError, ValueError) as error:  # ValueError: a path with a NUL
+        cause = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise FileError(f"cannot be read: {cause[:80]}") from error
+    if len(content) > most:
+        raise FileError(_too_large(most))
+    return content
+
+
+def read_text(path: Path | str, *, most: int = MOST_BYTES) -> str:
+    """The text of a UTF-8 file, without the byte order mark that spreadsheets write.
+
+    Args:
+        path: of the file; links are followed.
+        most: bytes that it may have.
+
+    Raises:
+        MissingFileError: if it is not there.
+        NotTextError: if it is not UTF-8.
+        FileError: if it is no plain file, is larger, or cannot be read.
+    """
+    content = read_bytes(path, most=most)
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise NotTextError(content[: error.start].count(b"\n") + 1) from error
+
+
+def _check(found: os.stat_result, most: int) -> None:
+    if not stat.S_ISREG(found.st_mode):
+        kind = next((name for test, name in _KINDS if test(found.st_mode)), "no plain file")
+        raise FileError(f"cannot be read: it is {kind}; give a plain file")
+    if found.st_size > most:
+        raise FileError(_too_large(most))
+
+
+def _too_large(most: int) -> str:
+    return f"cannot be read: it is larger than {most / 1e6:g} MB; is it the right file?"

@@ -1,0 +1,34 @@
+"""How a value that somebody else wrote is put into a message of one line."""
+
+from __future__ import annotations
+
+MOST = 60  # characters of a value
+MOST_CAUSE = 200  # characters of another library's words
+
+
+def shown(value: object) -> str:
+    """A value as Python writes it: at most 60 characters, none of which can move a terminal's cursor."""
+    try:
+        text = repr(value[: MOST + 1] if isinstance(value, str | bytes) else value)
+    except (ValueError, RecursionError):  # a whole number of thousands of digits; lists in lists in lists
+        text = f"a {type(value).__name__} too large to show"
+    return _cut(_printable(text), MOST)
+
+
+def named(name: object) -> str:
+    """A path or a word, to stand in a message's own quotes: whole, unless it is longer than any that people give."""
+    return _cut(_printable(str(name)), MOST_CAUSE)
+
+
+def one_line(error: BaseException) -> str:
+    """What another library says of an error, in one line without its full stop; its kind if that is nothing."""
+    text = " ".join(str(error)[: 20 * MOST_CAUSE].split()).rstrip(".")
+    return _cut(_printable(text), MOST_CAUSE) or type(error).__name__
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else text[: most - 3] + "..."
