@@ -33,7 +33,7 @@ from physid_drake.report.page import result_page
 from physid_drake.report.plan import plan_table, push_files
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.result import result_json
-from physid_drake.report.stage import ShownMotion, Stage
+from physid_drake.report.stage import LOOPBACK, ShownMotion, Stage, served
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
 from physid_drake.report.terminal import terminal
 from physid_drake.run_diagnose import ALPHA, STATE, recording_folder, run_case, show, write
@@ -41,9 +41,10 @@ from physid_drake.run_folder import RunFolder, made_with, named_after, versions
 from physid_drake.run_plan import FILES as PLAN
 from physid_drake.run_plan import forget as forget_plan
 from physid_drake.run_plan import write as write_plan
-from physid_drake.scenario import dump_scenario, load_scenario
+from physid_drake.scenario import config_folders, dump_scenario, load_scenario
 from physid_drake.scenario_schema import Scenario
 
+COMMAND = "run_cell"
 BELIEF = "belief.npz"  # of an interrupted identification
 DIAGNOSIS_PAGE = "diagnosis.html"
 DIAGNOSIS = ("diagnosis.json", DIAGNOSIS_PAGE, "scene.html")
@@ -83,6 +84,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--no-diagnosis", action="store_true", help="identify and plan with the plain cell only")
     parser.add_argument("--no-plan", action="store_true", help="plan no push")
     parser.add_argument("--no-view", action="store_true", help="serve no live Meshcat while working")
+    parser.add_argument(
+        "--host", default=LOOPBACK, metavar="ADDRESS",
+        help=f"where the live Meshcat listens (default {LOOPBACK}: this machine only; * for all its networks)",
+    )  # fmt: skip
     return parser
 
 
@@ -95,22 +100,49 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     name, scenario = load_scenario(
         arguments.config, arguments.override, recording=arguments.recording, seed=arguments.seed
     )
-    recording = read_recording(recording_folder(scenario.recording))
+    source = recording_folder(scenario.recording)
     out = arguments.out or Path("runs") / named_after(name)
     # Everything that can be refused is refused before anything is written.
-    RunFolder.check(out, "run_cell")
+    RunFolder.check(out, COMMAND, inputs=[source, *config_folders(arguments.config)])
+    recording = read_recording(source)
     identifier = _identifier(scenario, recording, out)
     planner = None if arguments.no_plan else _planner(scenario, recording, identifier, console)
     # A comment, so that the file is still a configuration that can be given to this command.
     made_by = f"{dump_scenario(name, scenario)}# of recording {digest_of(recording)}\n# by {made_with()}\n"
-    folder = RunFolder.open(out, made_by, state=(BELIEF, STATE), results=RESULTS)
-    stage = None if arguments.no_view else _live(recording, console)
+    had_one = (out / RESULTS[0]).exists()
+    with RunFolder.open(out, COMMAND, made_by, state=(BELIEF, STATE), results=RESULTS) as folder:
+        if had_one and not folder.holds(RESULTS[0]):
+            console.print(f"Note: {out} held results of another recording, or of other settings; they are gone.")
+        _refuse_to_drop(folder, arguments)
+        stage = None if arguments.no_view else _live(recording, arguments.host, console)
+        stage = _fill(folder, identifier, planner, scenario, recording, stage, arguments, console)
+    _keep_serving(arguments.no_view, stage, console)
+
+
+def _refuse_to_drop(folder: RunFolder, arguments: argparse.Namespace) -> None:
+    """A result of the same settings is not dropped by a flag that only says not to make it."""
+    for flag, left_out, file in (
+        ("--no-diagnosis", arguments.no_diagnosis, DIAGNOSIS[0]),
+        ("--no-plan", arguments.no_plan, PLAN[0]),
+    ):
+        if left_out and folder.holds(file):
+            raise ConfigError(
+                f"'{folder.path / file}' would be dropped: leave {flag} out, or choose another --out to keep it."
+            )
+
+
+def _fill(
+    folder: RunFolder, identifier: Identifier, planner: Planner | None, scenario: Scenario, recording: Recording,
+    stage: Stage | None, arguments: argparse.Namespace, console: Console,
+) -> Stage:  # fmt: skip
+    """Identify, plan and diagnose; each result is written as soon as it is there."""
+    folder.own(BELIEF)
     result, plan = _identify(identifier, planner, scenario, recording, console)
     hand = HandUse.of(identifier.problems)
     model = identified_model(result, identifier.pool.spec, recording.name, hand=hand)
     stage = stage or Stage(recording)
     marks = stage.play(_scenes(result, identifier, recording))
-    note = f"{recording.description} Seed {scenario.seed}; {identifier.pool.count} rollouts."
+    note = f"{recording.description} Seed {scenario.seed}."
     html = stage.meshcat.StaticHtml()
     page = partial(result_page, html, result, name=recording.name, marks=marks, note=note)
     folder.write("page.html", page(plan=plan))
@@ -133,7 +165,7 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
             _show_plan(plan, folder, console, hindsight=hindsight)
         folder.forget(STATE)
     folder.forget(BELIEF)
-    _keep_serving(arguments.no_view, stage, console)
+    return stage
 
 
 def _show(result: Identification, identifier: Identifier, recording: Recording, console: Console) -> None:
@@ -173,7 +205,7 @@ def _diagnose(
     """Say what physics is missing, and keep the model with it."""
     console.print("\nDiagnosing: what these pushes say beyond the plain cell")
     case = case_of(recording, scenario.cell, scenario.theta, jobs=scenario.search.jobs)
-    kept = KeptRollouts(folder.path / STATE)
+    kept = KeptRollouts(folder.own(STATE))
     diagnosis, evidence = run_case(case, console, seed=scenario.seed, alpha=ALPHA, kept=kept)
     write(folder, diagnosis, evidence, page=DIAGNOSIS_PAGE)
     show(console, diagnosis)
@@ -199,8 +231,8 @@ def _caveat(diagnosis: Diagnosis) -> str:
     return caveat_of(diagnosis.verdict, {e.name: e.indistinguishable_from for e in diagnosis.effects})
 
 
-def _live(recording: Recording, console: Console) -> Stage:
-    stage = Stage(recording)
+def _live(recording: Recording, host: str, console: Console) -> Stage:
+    stage = Stage(recording, meshcat=served(host))
     stage.show_start()
     console.print(f"Meshcat: {stage.meshcat.web_url()}")
     return stage

@@ -68,24 +68,24 @@ def run(arguments: argparse.Namespace) -> int:
     })  # fmt: skip
     # Not the recording's name, which those that were converted from one data set share.
     out = arguments.out or Path("diagnoses") / named_after(source.resolve().name)
-    RunFolder.check(out, COMMAND)
+    RunFolder.check(out, COMMAND, inputs=[source])
     had_one = (out / FILES[0]).exists()
-    folder = RunFolder.open(out, settings, name=SETTINGS, state=(STATE,), results=FILES)
-    if had_one and not (out / FILES[0]).exists():
-        console.print(f"Note: {out} held a diagnosis of another recording, or with other settings; it is gone.")
-    kept = KeptRollouts(folder.path / STATE)
-    if len(kept):
-        console.print(f"going on with what was kept, rollouts: {len(kept)}")
-    try:
-        diagnosis, evidence = run_case(
-            case, console, seed=arguments.seed, alpha=arguments.alpha, effects=arguments.effects, kept=kept
-        )
-    except KeyboardInterrupt:
+    with RunFolder.open(out, COMMAND, settings, name=SETTINGS, state=(STATE,), results=FILES) as folder:
+        if had_one and not folder.holds(FILES[0]):
+            console.print(f"Note: {out} held a diagnosis of another recording, or with other settings; it is gone.")
+        kept = KeptRollouts(folder.own(STATE))
         if len(kept):
-            console.print("what was found is kept, and the same command goes on from there")
-        raise
-    write(folder, diagnosis, evidence)
-    folder.forget(STATE)
+            console.print(f"going on with what was kept, rollouts: {len(kept)}")
+        try:
+            diagnosis, evidence = run_case(
+                case, console, seed=arguments.seed, alpha=arguments.alpha, effects=arguments.effects, kept=kept
+            )
+        except KeyboardInterrupt:
+            if len(kept):
+                console.print("what was found is kept, and the same command goes on from there")
+            raise
+        write(folder, diagnosis, evidence)
+        folder.forget(STATE)
     show(console, diagnosis)
     console.print(f"written: diagnosis.json, page.html, scene.html and model.yaml in {folder.path}")
     return 0

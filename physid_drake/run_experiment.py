@@ -35,12 +35,12 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.name, Wish(seed=arguments.seed, quick=arguments.quick, pushes=arguments.data)
     )
     out: Path = arguments.out or Path("experiments") / (arguments.name + ("_quick" if arguments.quick else ""))
-    folder = claim(arguments.name, experiment, out)
     console = terminal()
-    with ended_softly(), progress_bar(console) as tick:
-        records = run_all(experiment, folder, jobs=arguments.jobs, tick=tick)
-    result = experiment.result(records)
-    write(folder, result, arguments.name, command_of(arguments))
+    with claim(arguments.name, experiment, out) as folder:
+        with ended_softly(), progress_bar(console) as tick:
+            records = run_all(experiment, folder, jobs=arguments.jobs, tick=tick)
+        result = experiment.result(records)
+        write(folder, result, arguments.name, command_of(arguments))
     _show(console, result, out)
     return 0
 

@@ -1,21 +1,27 @@
-"""A run's folder: files that are written whole or not at all, the state to go on from, and what made them."""
+"""A run's folder: what a command wrote there and may replace, one run at a time, each file whole or not at all."""
 
 from __future__ import annotations
 
+import errno
+import fcntl
 import json
 import os
 import platform
 import re
-import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from physid_drake.errors import ConfigError, OutputError
 
-SEAL = "seal.sha256"  # of a proof
+MANIFEST: Final = "manifest.json"
+FORMAT: Final = "physid-folder/1"
+LOCK: Final = ".lock"
+_BEFORE: Final = (LOCK, f".{MANIFEST}.part")  # what a run that was killed as it began may leave
+_NO_LOCKS: Final = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS)
 CONFIG, SETTINGS = "config.yaml", "settings.json"  # what a folder was made with: by run_cell, by other commands
 PACKAGES = ("physid_drake", "drake", "mujoco", "numpy", "scipy", "scikit-learn")
 
@@ -38,7 +44,7 @@ def made_with() -> str:
 
 def named_after(name: str) -> str:
     """A recording's name as the name of one folder: letters, digits, dots within, dashes and underscores."""
-    return re.sub(r"[^\w.-]+", "_", name).strip("._") or "recording"
+    return re.sub(r"[^\w.-]+", "_", name)[:100].strip("._") or "recording"
 
 
 def settings_text(command: str, settings: Mapping[str, Any]) -> str:
@@ -46,108 +52,152 @@ def settings_text(command: str, settings: Mapping[str, Any]) -> str:
     return json.dumps({"command": command, **settings}, indent=2) + "\n"
 
 
-def command_of(path: Path) -> str | None:
-    """The command that wrote a folder; None where nothing says so."""
-    try:
-        if (path / CONFIG).exists():
-            return "run_cell"
-        if (path / SEAL).exists():
-            return "prove"
-        content = json.loads((path / SETTINGS).read_text(encoding="utf-8"))
-        return str(content["command"])
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-
-
 @dataclass(frozen=True, kw_only=True)
 class RunFolder:
-    """A run's folder: its configuration, the state to go on from, the results."""
+    """A folder that one command writes to.
+
+    Its manifest lists what the command wrote there. Nothing else in the folder is ever replaced or removed, and a
+    folder that holds something and has no manifest is not written to.
+
+    Attributes:
+        path: of the folder.
+        command: whose folder it is.
+    """
 
     path: Path
+    command: str
 
     @classmethod
+    def check(cls, path: Path, command: str, *, inputs: Sequence[Path] = ()) -> None:
+        """Refuse a folder that cannot or may not be written to, before anything is computed.
+
+        Args:
+            path: of the folder.
+            command: that is to write there.
+            inputs: folders that the command reads, which are somebody's own.
+
+        Raises:
+            OutputError: if it is no folder, or cannot be written to.
+            ConfigError: if it is an input, or holds what this command did not write.
+        """
+        try:
+            for one in inputs:
+                if path.resolve() == one.resolve():
+                    raise ConfigError(f"output folder '{path}': is a folder that is read from; choose another --out.")
+            existing = next(one for one in (path, *path.absolute().parents) if _is_there(one))
+            if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
+                raise OutputError(
+                    f"output folder '{path}': cannot be written: '{existing}' is no folder to write to."
+                )
+            cls(path=path, command=command)._refuse_others()
+        except (OSError, ValueError, RuntimeError) as error:  # too long a name, a NUL, a loop of links, no folder
+            if isinstance(error, ConfigError | OutputError):
+                raise
+            raise OutputError(f"output folder '{path}': cannot be written: {_cause(error)}.") from error
+
+    @classmethod
+    def begin(cls, path: Path, command: str) -> RunFolder:
+        """Make the folder with an empty manifest, or go on in one of the same command.
+
+        Raises:
+            ConfigError: if it holds what this command did not write.
+            OutputError: if it cannot be written.
+        """
+        cls.check(path, command)
+        folder = cls(path=path, command=command)
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"output folder '{path}': cannot be written: {_cause(error)}.") from error
+        if not (path / MANIFEST).exists():
+            folder._list(())
+        return folder
+
+    @classmethod
+    @contextmanager
     def open(
         cls,
         path: Path,
+        command: str,
         configuration: str,
         *,
         name: str = CONFIG,
         state: Sequence[str] = (),
         results: Sequence[str] = (),
-    ) -> RunFolder:
-        """Make the folder, or go on in one; the files of a run with another configuration are dropped.
+    ) -> Iterator[RunFolder]:
+        """Make the folder, or go on in one, while no other run does; what other settings made there is dropped.
 
         Args:
             path: of the folder.
+            command: that writes there.
             configuration: text that says what the run is; kept in the folder.
             name: of the file that keeps it.
-            state: names of the files that an interrupted run goes on from; dropped, too, where nothing says whose.
+            state: names of the files that an interrupted run goes on from.
             results: names of its results.
 
         Raises:
+            ConfigError: if it holds what this command did not write, or another run writes there.
             OutputError: if it cannot be written.
         """
-        folder = cls(path=path)
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            config = path / name
-            same = config.exists() and config.read_text(encoding="utf-8") == configuration
-            for file in () if same else (*state, *(results if config.exists() else ())):
-                folder.forget(file)
-        except (OSError, UnicodeDecodeError) as error:
-            raise OutputError(f"output folder '{path}': cannot be written: {error}.") from error
-        folder.write(name, configuration)
-        return folder
-
-    @staticmethod
-    def check(path: Path, command: str) -> None:
-        """Refuse a folder that cannot be written to or belongs to another command, before anything is computed.
-
-        Args:
-            path: of the folder.
-            command: that is to write there.
-
-        Raises:
-            OutputError: if it is no folder, or may not be written to.
-            ConfigError: if results of another command are in it, whose files have the same names.
-        """
-        other = command_of(path)
-        if other not in (None, command):
-            raise ConfigError(f"output folder '{path}': holds what {other} wrote; choose another --out.")
-        existing = next(one for one in (path, *path.absolute().parents) if one.exists())
-        if not existing.is_dir() or not os.access(existing, os.W_OK):
-            raise OutputError(f"output folder '{path}': cannot be written: '{existing}' is no folder to write to.")
+        with _locked(path, command):
+            folder = cls.begin(path, command)
+            for file in (name, *state, *results):
+                folder._refuse_foreign(file)
+            if folder.read(name) != configuration:
+                for file in (*state, *results):
+                    folder.forget(file)
+                folder.write(name, configuration)
+            yield folder
 
     @classmethod
-    def claim(cls, path: Path, configuration: str, *, name: str, what: str) -> RunFolder:
-        """Make the folder, or go on in one that was made for the same; any other is refused.
+    @contextmanager
+    def claim(cls, path: Path, command: str, configuration: str, *, name: str = SETTINGS) -> Iterator[RunFolder]:
+        """Make the folder, or go on in one that was made with the same settings; any other is refused.
 
         Args:
             path: of the folder.
+            command: that writes there.
             configuration: text that says what the run is; kept in the folder.
             name: of the file that keeps it.
-            what: is in such a folder, for the message.
 
         Raises:
-            ConfigError: if it holds another run.
+            ConfigError: if it holds another run, or another run writes there.
             OutputError: if it cannot be read or written.
         """
-        file = path / name
+        with _locked(path, command):
+            folder = cls.begin(path, command)
+            earlier = folder.read(name)
+            if earlier is not None and earlier != configuration:
+                raise ConfigError(
+                    f"'{path}' holds another run of {command} ({' '.join(earlier.split())[:300]}); choose another"
+                    " --out, or the same settings."
+                )
+            if earlier is None:
+                folder.write(name, configuration)
+            yield folder
+
+    def read(self, name: str) -> str | None:
+        """The text of a file that this command wrote; None where there is none.
+
+        Raises:
+            OutputError: if it cannot be read.
+        """
         try:
-            earlier = file.read_text(encoding="utf-8") if file.exists() else configuration
-        except (OSError, UnicodeDecodeError) as error:
-            raise OutputError(f"'{file}': cannot be read: {error}.") from error
-        if earlier != configuration:
-            raise ConfigError(
-                f"'{path}' holds another {what} ({' '.join(earlier.split())}); choose another --out, or the same"
-                " settings."
-            )
-        return cls.open(path, configuration, name=name)
+            return (self.path / name).read_text(encoding="utf-8") if self.holds(name) else None
+        except UnicodeDecodeError:
+            return ""  # somebody changed it: it is no text of ours
+        except OSError as error:
+            raise OutputError(f"'{self.path / name}': cannot be read: {_cause(error)}.") from error
+
+    def holds(self, name: str) -> bool:
+        """Whether this command wrote a file of that name, and it is still there."""
+        return self._lists(name) and (self.path / name).is_file()
 
     def write(self, name: str, text: str) -> None:
         """Write a text file whole or not at all.
 
         Raises:
+            ConfigError: if there is one of that name which this command did not write.
             OutputError: if it cannot be written.
         """
         self.write_bytes(name, text.encode("utf-8"))
@@ -156,26 +206,168 @@ class RunFolder:
         """Write a file of bytes whole or not at all.
 
         Raises:
+            ConfigError: if there is one of that name which this command did not write.
             OutputError: if it cannot be written.
         """
-        part = None
-        try:
-            with tempfile.NamedTemporaryFile("wb", dir=self.path, delete=False) as part:
-                part.write(content)
-            Path(part.name).chmod(0o644)
-            os.replace(part.name, self.path / name)  # noqa: PTH105
-        except OSError as error:
-            if part is not None:
-                Path(part.name).unlink(missing_ok=True)
-            raise OutputError(f"'{self.path / name}': cannot be written: {error}.") from error
+        self.own(name)
+        write_whole(self.path / name, content)
+
+    def own(self, name: str) -> Path:
+        """Take a name into the manifest, for a file or (``name/``) a folder that others write; its path.
+
+        Raises:
+            ConfigError: if there is one of that name which this command did not write.
+            OutputError: if the manifest cannot be written.
+        """
+        if not self._lists(name):
+            self._refuse_foreign(name)
+            self._list((*self._listed(), name))
+        path = self.path / name
+        if name.endswith("/"):
+            try:
+                path.mkdir(exist_ok=True)
+            except OSError as error:
+                raise OutputError(f"'{path}': cannot be written: {_cause(error)}.") from error
+        return path
 
     def forget(self, name: str) -> None:
-        """Drop a file: the run is done, or it was another run's.
+        """Drop a file that this command wrote: the run is done, or it was another run's.
 
         Raises:
             OutputError: if it cannot be dropped.
         """
+        if not self._lists(name):
+            return
         try:
             (self.path / name).unlink(missing_ok=True)
         except OSError as error:
-            raise OutputError(f"'{self.path / name}': cannot be removed: {error}.") from error
+            raise OutputError(f"'{self.path / name}': cannot be removed: {_cause(error)}.") from error
+
+    def _lists(self, name: str) -> bool:
+        within = [f"{parent}/" for parent in Path(name).parents if parent != Path()]
+        return not {name, *within}.isdisjoint(self._listed())
+
+    def _listed(self) -> tuple[str, ...]:
+        """The names in the manifest; none where there is no manifest."""
+        command, names = _manifest(self.path)
+        return names if command == self.command else ()
+
+    def _list(self, names: Sequence[str]) -> None:
+        content = {"format": FORMAT, "command": self.command, "files": sorted(names)}
+        write_whole(self.path / MANIFEST, (json.dumps(content, indent=2) + "\n").encode("utf-8"))
+
+    def _refuse_foreign(self, name: str) -> None:
+        if not self._lists(name) and os.path.lexists(self.path / name):
+            raise ConfigError(
+                f"'{self.path / name}': was not written by this command, which would replace it; move it away, or"
+                " choose another --out."
+            )
+
+    def _refuse_others(self) -> None:
+        command, _ = _manifest(self.path)
+        if command is None and self.path.is_dir() and any(one.name not in _BEFORE for one in self.path.iterdir()):
+            raise ConfigError(
+                f"output folder '{self.path}': is not empty, and not of this program (it has no {MANIFEST}); choose"
+                " another --out."
+            )
+        if command not in (None, self.command):
+            raise ConfigError(f"output folder '{self.path}': holds what {command} wrote; choose another --out.")
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all.
+
+    Raises:
+        OutputError: if it cannot be written.
+    """
+    part = path.with_name(f".{path.name}.part")
+    try:
+        try:
+            part.write_bytes(content)
+            os.replace(part, path)  # noqa: PTH105
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise OutputError(f"'{path}': cannot be written: {_cause(error)}.") from error
+
+
+def _manifest(path: Path) -> tuple[str | None, tuple[str, ...]]:
+    """Whose a folder is, and what of it; (None, ()) where nothing says so.
+
+    Raises:
+        ConfigError: if its manifest is none.
+    """
+    file = path / MANIFEST
+    if not file.exists():
+        return None, ()
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        command, names = content["command"], content["files"]
+        if content["format"] != FORMAT or not all(isinstance(word, str) for word in (command, *names)):
+            raise ValueError("not of this format")
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+        raise ConfigError(
+            f"'{file}': cannot be read, so that nothing says what may be replaced here; choose another --out."
+        ) from error
+    return str(command), tuple(names)
+
+
+@contextmanager
+def _locked(path: Path, command: str) -> Iterator[None]:
+    """Keep every other run out of a folder, which is made; the system lets go of it where a run is killed."""
+    RunFolder.check(path, command)
+    file = path / LOCK
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        while True:
+            descriptor = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o644)
+            try:
+                _take(descriptor, path)
+            except BaseException:
+                os.close(descriptor)
+                raise
+            # The run that held it may have removed it between opening and locking.
+            if file.exists() and os.path.samestat(os.fstat(descriptor), file.stat()):
+                break
+            os.close(descriptor)
+    except OSError as error:
+        if isinstance(error, OutputError):
+            raise
+        raise OutputError(f"output folder '{path}': cannot be written: {_cause(error)}.") from error
+    try:
+        yield
+    finally:
+        file.unlink(missing_ok=True)
+        os.close(descriptor)
+
+
+def _take(descriptor: int, path: Path) -> None:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise ConfigError(
+            f"output folder '{path}': another run writes to it; wait for that, or choose another --out."
+        ) from error
+    except OSError as error:
+        if error.errno not in _NO_LOCKS:  # some network file systems: there, nothing keeps two runs apart
+            raise
+
+
+def _is_there(path: Path) -> bool:
+    """Whether something has that name, if only a link to nothing.
+
+    Raises:
+        OSError: if nothing can have it: too long a name.
+        ValueError: likewise, of a NUL in it.
+    """
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    return True
+
+
+def _cause(error: BaseException) -> str:
+    """Why, in the system's words, without the path, which the message has already."""
+    return str(getattr(error, "strerror", None) or error)

@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
     )  # fmt: skip
     policy = policy_for(arguments.policy, model, start, goal, choices)
     out = arguments.out or Path("plans") / named_after(model.recording)
-    RunFolder.check(out, COMMAND)
+    RunFolder.check(out, COMMAND, inputs=[one for one in (arguments.run_folder,) if one is not None])
     console = terminal()
     with progress_bar(console) as tick:
         made = plan(
@@ -86,8 +86,8 @@ def run(arguments: argparse.Namespace) -> int:
         )
     with_effects = outcome_under(made, full) if arguments.plain and full.effects else None
     hindsight = Hindsight(caveat=learnt.caveat) if learnt.caveat else None
-    folder = RunFolder.open(out, settings_text(COMMAND, _settings(arguments)), name=SETTINGS)
-    write(folder, made, seed=arguments.seed, with_effects=with_effects, hindsight=hindsight)
+    with RunFolder.open(out, COMMAND, settings_text(COMMAND, _settings(arguments)), name=SETTINGS) as folder:
+        write(folder, made, seed=arguments.seed, with_effects=with_effects, hindsight=hindsight)
     console.print(plan_table(made, with_effects=with_effects, hindsight=hindsight))
     nothing = made.cost_function.at(np.array(start[:2]))
     if made.cost > nothing:

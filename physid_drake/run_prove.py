@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from types import FrameType
 
@@ -31,7 +31,7 @@ from physid_drake.prove.diagnosing import (
 from physid_drake.prove.figures import figures_of
 from physid_drake.prove.make import world_id
 from physid_drake.prove.score import read_outcomes
-from physid_drake.prove.seal import SEALED, check_seal, read_seal, sealed_names, shut, unlock
+from physid_drake.prove.seal import LINES, SEALED, TOTAL, check_seal, read_seal, sealed_names, shut, unlock
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.proof import Proof, proof_json, proof_markdown, proof_tables
 from physid_drake.report.proof_page import proof_page
@@ -60,20 +60,22 @@ def run(arguments: argparse.Namespace, command: Commander = diagnose_command) ->
     out: Path = arguments.out or Path("proofs") / "_".join(filter(None, (f"seed_{arguments.seed}", arguments.kind)))
     worlds = _checked(arguments, out)
     opening = read_seal(out) if arguments.open else None  # before the folder is claimed: there may be none
-    folder = claim(out, {"seed": arguments.seed, "kind": arguments.kind})
     console = terminal()
     names = [world_id(index, arguments.seed) for index in range(worlds)]
-    if opening is not None:
-        seal = opening
-    else:
-        with ended_softly():
-            seal = _make(arguments, worlds, out, console)
-            console.print(f"seal of {worlds} worlds, before any is diagnosed: sha256 {seal}", soft_wrap=True)
-            diagnose_worlds(out, names, arguments, console, command)
-    proof = opened(out, names, seal, seed=arguments.seed, kind=arguments.kind)
-    if arguments.open:
-        console.print(f"{len(proof.outcomes)} of {worlds} worlds have been diagnosed")
-    write(folder, proof)
+    with claim(out, {"seed": arguments.seed, "kind": arguments.kind}) as folder:
+        if opening is not None:
+            seal = opening
+        else:
+            with ended_softly():
+                for name in ("recordings/", f"{SEALED}/", "diagnoses/", LINES, TOTAL):
+                    folder.own(name)
+                seal = _make(arguments, worlds, out, console)
+                console.print(f"seal of {worlds} worlds, before any is diagnosed: sha256 {seal}", soft_wrap=True)
+                diagnose_worlds(out, names, arguments, console, command)
+        proof = opened(out, names, seal, seed=arguments.seed, kind=arguments.kind)
+        if arguments.open:
+            console.print(f"{len(proof.outcomes)} of {worlds} worlds have been diagnosed")
+        write(folder, proof)
     for table in proof_tables(proof):
         console.print(table)
     console.print(
@@ -109,10 +111,9 @@ def check_running(arguments: argparse.Namespace) -> None:
         raise ConfigError(f"--timeout must be positive, but is {arguments.timeout:g} s.")
 
 
-def claim(out: Path, settings: dict[str, object]) -> RunFolder:
-    """The folder of a proof, refused where it holds another."""
-    RunFolder.check(out, COMMAND)
-    return RunFolder.claim(out, settings_text(COMMAND, settings), name=SETTINGS, what="proof")
+def claim(out: Path, settings: dict[str, object]) -> AbstractContextManager[RunFolder]:
+    """The folder of a proof, refused where it holds another, or where another run writes."""
+    return RunFolder.claim(out, COMMAND, settings_text(COMMAND, settings), name=SETTINGS)
 
 
 @contextmanager

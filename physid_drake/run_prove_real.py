@@ -16,7 +16,7 @@ from physid_drake.identify.noise import noise_of
 from physid_drake.identify.problem import PushProblem, problems_of
 from physid_drake.model import ModelCell
 from physid_drake.model_reading import load_model
-from physid_drake.prove.diagnosing import FRESH_ERRORS, Task, attempt_of, diagnose_command
+from physid_drake.prove.diagnosing import DIAGNOSE, FRESH_ERRORS, Task, attempt_of, diagnose_command
 from physid_drake.prove.real import RealCase, chosen_cases, prepare
 from physid_drake.prove.real_score import RealOutcome, real_outcome
 from physid_drake.prove.shapes import height_of
@@ -46,23 +46,24 @@ def run_real(arguments: argparse.Namespace, command: Commander = diagnose_comman
     check_running(arguments)
     cases = chosen_cases(arguments.only)
     out: Path = arguments.out or Path("proofs") / "real"
-    folder = claim(out, {"real": True, "seed": arguments.seed, "pushes": pushes})
     console = terminal()
-    with ended_softly():
+    with claim(out, {"real": True, "seed": arguments.seed, "pushes": pushes}) as folder, ended_softly():
+        for name in ("recordings/", "held_out/", "diagnoses/"):
+            folder.own(name)
         reasons = {c.name: prepare(c, published, out, pushes=pushes, seed=arguments.seed) for c in cases}
         there = [case for case in cases if reasons[case.name] is None]
         hidden = (published, out / "held_out")
         tasks = [_task(case, out, command, hidden, pushes) for case in there]
         run_tasks(tasks, arguments, console)
         _measure_fresh(there, out)
-    outcomes = [
-        real_outcome(case, published, out)
-        if reasons.get(case.name) is None
-        else RealOutcome(case=case, skipped=f"left out: {reasons[case.name]}")
-        for case in chosen_cases(None)
-        if case in cases or attempt_of(out / "diagnoses" / case.id) is not None
-    ]
-    _write(folder, outcomes)
+        outcomes = [
+            real_outcome(case, published, out)
+            if reasons.get(case.name) is None
+            else RealOutcome(case=case, skipped=f"left out: {reasons[case.name]}")
+            for case in chosen_cases(None)
+            if case in cases or attempt_of(out / "diagnoses" / case.id) is not None
+        ]
+        _write(folder, outcomes)
     console.print(real_table(outcomes))
     console.print(f"written: {out / 'real.md'}, {out / 'real.json'}", soft_wrap=True)
     return 0
@@ -87,7 +88,7 @@ def _measure_fresh(cases: Sequence[RealCase], out: Path) -> None:
         except PhysidError:
             continue  # a model that cannot run leaves a dash in the table
         position, rotation = (float(np.sqrt(np.mean(np.square(column)))) for column in errors.T)
-        RunFolder(path=diagnosis).write(
+        RunFolder.begin(diagnosis, DIAGNOSE).write(
             FRESH_ERRORS, json.dumps({"position_m": position, "rotation_rad": rotation, "pushes": len(errors)}) + "\n"
         )
 

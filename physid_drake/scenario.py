@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses as dc
+import functools
 import math
-import re
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, get_args, get_origin
@@ -15,13 +16,29 @@ from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 from physid_drake.cell.checks import check_config
 from physid_drake.errors import ConfigError
 from physid_drake.policies import POLICIES
+from physid_drake.ranges import Range
 from physid_drake.resources import shipped
 from physid_drake.run_folder import named_after
 from physid_drake.scenario_schema import Scenario
 from physid_drake.search import SEARCHES
+from physid_drake.wording import named, one_line, shown
 from physid_drake.yaml_text import parsed, read_yaml
 
 DEFAULT = "sealed.yaml"
+FARTHEST = 100.0  # m: of a goal or a start
+Rule = tuple[str, object, bool, str]  # key, value, whether it is fine, and what it must be
+WHOLE = {
+    "search.refine_every": (0, 10_000), "search.candidates": (2, 20_000), "search.budget": (1, 2_000),
+    "search.batch": (1, 1_000), "search.patience": (1, 10_000), "search.jobs": (0, 1_000),
+    "plan.budget": (1, 2_000), "plan.sweep": (0, 1_000), "plan.draws": (0, 1_000), "seed": (0, 2**32 - 1),
+}  # fmt: skip
+"""From, to. Beyond, memory or patience end before the run does."""
+REAL = {
+    "search.entropy_tolerance_nats": (Range(least=0.0, most=100.0), "at least 0 nats, at most 100"),
+    "plan.tolerance_m": (Range(above=0.0, most=10.0), "above 0 m, at most 10"),
+    "plan.start_deg": (Range(least=-3600.0, most=3600.0), "from -3600 to 3600 degrees"),
+    "held_out_share": (Range(least=0.0, below=1.0), "in [0, 1)"),
+}
 
 
 def load_scenario(
@@ -43,7 +60,7 @@ def load_scenario(
         ConfigError: naming the file and the key.
     """
     if config is None and recording is not None:
-        name, scenario, where = named_after(Path(recording).resolve().name), Scenario(), "the defaults"
+        name, scenario, where = named_after(Path(os.path.realpath(recording)).name), Scenario(), "the defaults"
     else:
         name, scenario, where = _named_scenario(config or DEFAULT)
     if override is not None:
@@ -55,6 +72,11 @@ def load_scenario(
     return name, _checked(scenario, where)
 
 
+def config_folders(config: str | None) -> tuple[Path, ...]:
+    """The folder of the CONFIG that was given, which is somebody's own; none where none was."""
+    return () if config is None else (_locate(config)[0].absolute().parent,)
+
+
 def _named_scenario(config: str) -> tuple[str, Scenario, str]:
     """A scenario's name, its values, and where they are from, in words."""
     path, name = _locate(config)
@@ -62,8 +84,10 @@ def _named_scenario(config: str) -> tuple[str, Scenario, str]:
     if name is None:
         name = next(iter(scenarios))
     if name not in scenarios:
-        raise ConfigError(f"config '{path}': there is no scenario '{name}'; it holds {', '.join(scenarios)}.")
-    where = f"config '{path}', scenario '{name}'"
+        raise ConfigError(
+            f"config '{named(path)}': there is no scenario '{named(name)}'; it holds {named(', '.join(scenarios))}."
+        )
+    where = f"config '{named(path)}', scenario '{named(name)}'"
     return name, _typed(scenarios[name], Scenario(), where), where
 
 
@@ -73,25 +97,33 @@ def dump_scenario(name: str, scenario: Scenario) -> str:
 
 
 def _locate(config: str) -> tuple[Path, str | None]:
-    file, _, name = (config, "", "") if Path(config).exists() else config.rpartition(":")
+    file, _, name = (config, "", "") if _is_there(Path(config)) else config.rpartition(":")
     file, name = (file, name) if file else (name, "")
     path = Path(file)
-    if not path.exists() and path.parent == Path():
+    if not _is_there(path) and path.parent == Path():
         for candidate in (shipped("configs") / file, shipped("configs") / f"{file}.yaml"):
-            if candidate.exists():
+            if _is_there(candidate):
                 path = candidate
                 break
     return path, name or None
 
 
+def _is_there(path: Path) -> bool:
+    """Whether it is there; a name that is too long for any file is not."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
+
+
 def _read_yaml(path: Path) -> dict[str, Any]:
-    content = read_yaml(path, f"config '{path}'")
+    content = read_yaml(path, f"config '{named(path)}'")
     if not isinstance(content, dict) or not content:
-        raise ConfigError(f"config '{path}': needs named scenarios at the top level, 'name: {{...}}'.")
+        raise ConfigError(f"config '{named(path)}': needs named scenarios at the top level, 'name: {{...}}'.")
     # Keys that start with an underscore are for anchors and templates.
     scenarios = {str(key): value for key, value in content.items() if not str(key).startswith("_")}
     if not scenarios:
-        raise ConfigError(f"config '{path}': holds no scenario; names that start with '_' are templates.")
+        raise ConfigError(f"config '{named(path)}': holds no scenario; names that start with '_' are templates.")
     return scenarios
 
 
@@ -101,8 +133,8 @@ def _typed(content: Any, defaults: Scenario, where: str) -> Scenario:
     _refuse_wrong(content, Scenario, where)
     try:
         loaded: Scenario = yaml_load_typed(schema=Scenario, data=yaml.safe_dump(content), defaults=defaults)
-    except (RuntimeError, ValueError, TypeError, KeyError, AssertionError) as error:
-        raise ConfigError(f"{where}: {_one_line(error)}.") from error
+    except (RuntimeError, ValueError, TypeError, KeyError, AssertionError, OverflowError) as error:
+        raise ConfigError(f"{where}: {one_line(error)}.") from error
     return loaded
 
 
@@ -115,26 +147,28 @@ def _refuse_wrong(content: Any, schema: Any, where: str, key: str = "") -> None:
         where: file and scenario, for the message.
         key: dotted path of the content.
     """
-    place = f"{where}, key '{key}'" if key else where
+    place = f"{where}, key '{named(key)}'" if key else where
     if dc.is_dataclass(schema):
         if not isinstance(content, dict):
-            raise ConfigError(f"{place}: needs keys and values, but got {content!r}.")
+            raise ConfigError(f"{place}: needs keys and values, but got {shown(content)}.")
         fields = {field.name: field.type for field in dc.fields(schema)}
         for name, value in content.items():
             if name not in fields:
-                raise ConfigError(f"{place}: the key '{name}' is unknown; known are {', '.join(fields)}.")
+                raise ConfigError(f"{place}: the key '{named(name)}' is unknown; known are {', '.join(fields)}.")
             _refuse_wrong(value, fields[name], where, f"{key}.{name}".lstrip("."))
         return
     origin, inner = get_origin(schema), get_args(schema)
     if origin is not None:
         if not isinstance(content, origin):
-            raise ConfigError(f"{place}: needs a {'list' if origin is list else 'mapping'}, but got {content!r}.")
+            raise ConfigError(
+                f"{place}: needs a {'list' if origin is list else 'mapping'}, but got {shown(content)}."
+            )
         for name, value in content.items() if isinstance(content, dict) else enumerate(content):
             _refuse_wrong(value, inner[-1], where, f"{key}.{name}")
         return
     kind, fits = _KINDS[schema]
     if not fits(content):
-        raise ConfigError(f"{place}: needs {kind}, but got {content!r}.")
+        raise ConfigError(f"{place}: needs {kind}, but got {shown(content)}.")
 
 
 def _is_text(value: Any) -> bool:
@@ -169,32 +203,40 @@ def _checked(scenario: Scenario, where: str) -> Scenario:
         check_config(scenario.cell)
     except ConfigError as error:
         raise ConfigError(f"{where}, {error}") from error
-    search, plan = scenario.search, scenario.plan
-    rules: list[tuple[str, object, bool, str]] = [
-        ("search.method", search.method, search.method in SEARCHES, f"one of {', '.join(SEARCHES)}"),
-        ("search.refine_every", search.refine_every, search.refine_every >= 0, "at least 0"),
-        ("search.candidates", search.candidates, search.candidates >= 2, "at least 2"),
-        ("search.budget", search.budget, search.budget >= 1, "at least 1"),
-        ("search.batch", search.batch, search.batch >= 1, "at least 1"),
-        ("search.patience", search.patience, search.patience >= 1, "at least 1"),
-        ("search.jobs", search.jobs, search.jobs >= 0, "at least 0"),
-        ("search.entropy_tolerance_nats", search.entropy_tolerance_nats, search.entropy_tolerance_nats >= 0.0,
-         "at least 0 nats"),
-        ("plan.policy", plan.policy, plan.policy in POLICIES, f"one of {', '.join(POLICIES)}"),
-        ("plan.goal_m", plan.goal_m, len(plan.goal_m) in (0, 2), "[x, y], or empty"),
-        ("plan.start_m", plan.start_m, len(plan.start_m) in (0, 2), "[x, y], or empty"),
-        ("plan.budget", plan.budget, plan.budget >= 1, "at least 1"),
-        ("plan.sweep", plan.sweep, plan.sweep >= 0, "at least 0"),
-        ("plan.draws", plan.draws, plan.draws >= 0, "at least 0"),
-        ("plan.tolerance_m", plan.tolerance_m, plan.tolerance_m > 0.0, "above 0 m"),
-        ("seed", scenario.seed, scenario.seed >= 0, "at least 0"),
-        ("held_out_share", scenario.held_out_share, 0.0 <= scenario.held_out_share < 1.0, "in [0, 1)"),
-    ]  # fmt: skip
-    for key, value, fine, rule in rules:
+    for key, value, fine, rule in (*_words(scenario), *_numbers(scenario), *_places(scenario)):
         if not fine:
-            raise ConfigError(f"{where}, key '{key}': must be {rule}, but is {value!r}.")
+            raise ConfigError(f"{where}, key '{key}': must be {rule}, but is {shown(value)}.")
     return scenario
 
 
-def _one_line(error: BaseException) -> str:
-    return re.sub(r"\s+", " ", str(error)).strip().rstrip(".")
+def _words(scenario: Scenario) -> list[Rule]:
+    method, policy = scenario.search.method, scenario.plan.policy
+    return [
+        ("search.method", method, method in SEARCHES, f"one of {', '.join(SEARCHES)}"),
+        ("plan.policy", policy, policy in POLICIES, f"one of {', '.join(POLICIES)}"),
+    ]
+
+
+def _numbers(scenario: Scenario) -> list[Rule]:
+    rules: list[Rule] = []
+    for key, (least, most) in WHOLE.items():
+        value = _at(scenario, key)
+        rules.append((key, value, least <= value <= most, f"at least {least}, at most {most}"))
+    for key, (allowed, rule) in REAL.items():
+        value = _at(scenario, key)
+        rules.append((key, value, allowed.holds(value), rule))
+    return rules
+
+
+def _places(scenario: Scenario) -> list[Rule]:
+    rule = f"[x, y] within {FARTHEST:g} m, or empty"
+    places = {key: _at(scenario, key) for key in ("plan.goal_m", "plan.start_m")}
+    return [
+        (key, place, len(place) in (0, 2) and all(abs(value) <= FARTHEST for value in place), rule)
+        for key, place in places.items()
+    ]
+
+
+def _at(scenario: Scenario, key: str) -> Any:
+    """The value at a dotted path."""
+    return functools.reduce(getattr, key.split("."), scenario)

@@ -6,6 +6,7 @@ import dataclasses as dc
 import functools
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,21 +20,18 @@ COMMAND = "experiment"
 KEPT = "repetitions"
 
 
-def claim(name: str, experiment: Experiment, out: Path) -> RunFolder:
+@contextmanager
+def claim(name: str, experiment: Experiment, out: Path) -> Iterator[RunFolder]:
     """The folder of an experiment, refused where it holds another or the same with other sizes.
 
     Raises:
-        ConfigError: if it does.
+        ConfigError: if it does, or another run writes to it.
         OutputError: if it cannot be written.
     """
-    RunFolder.check(out, COMMAND)
     text = settings_text(COMMAND, {"experiment": name, **settings_of(experiment)})
-    folder = RunFolder.claim(out, text, name=SETTINGS, what="experiment")
-    try:
-        (out / KEPT).mkdir(exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"'{out}': cannot be written: {error}.") from error
-    return folder
+    with RunFolder.claim(out, COMMAND, text, name=SETTINGS) as folder:
+        folder.own(f"{KEPT}/")
+        yield folder
 
 
 def settings_of(experiment: Experiment) -> dict[str, Any]:

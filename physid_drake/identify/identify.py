@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -206,11 +207,7 @@ class Identifier:
         resume = self._saved_belief(candidates)
 
         def keep(belief: Belief) -> None:
-            if self._state is not None:
-                # Written beside and renamed, so that an interrupt leaves the last whole one.
-                part = self._state.with_suffix(".part")
-                belief.to_npz(part)
-                part.replace(self._state)
+            self._keep(belief)
             self._progress(f"search ({config.method.replace('_', ' ')})", belief.n_trials, config.budget)
 
         return search_minimum(
@@ -218,6 +215,19 @@ class Identifier:
             batch=config.batch, entropy_tolerance=config.entropy_tolerance_nats, patience=config.patience,
             refine_every=config.refine_every, on_trial=keep, resume_from=resume,
         )  # fmt: skip
+
+    def _keep(self, belief: Belief) -> None:
+        """Written beside and renamed, so that an interruption leaves the last whole one; a full disk ends no run."""
+        if self._state is None:
+            return
+        part = self._state.with_name(f".{self._state.name}.part")
+        try:
+            belief.to_npz(part)
+            part.replace(self._state)
+        except OSError as error:
+            warnings.warn(f"the search's state is not kept, so that it cannot go on from here: {error}", stacklevel=2)
+            self._state = None
+            part.unlink(missing_ok=True)
 
     def _saved_belief(self, candidates: Array) -> Belief | None:
         """The belief of an interrupted run of the same search; one with other candidates is not taken."""

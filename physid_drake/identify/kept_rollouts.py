@@ -9,13 +9,13 @@ import hashlib
 import os
 import pickle
 import struct
+import warnings
 import zlib
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
-from physid_drake.errors import OutputError
 from physid_drake.identify.prediction import Prediction
 
 KEY = 16  # bytes
@@ -47,11 +47,7 @@ class KeptRollouts:
     """Predictions by key, as many as ``most`` bytes hold; in a file, too, where one is given."""
 
     def __init__(self, path: Path | None = None, *, most: int = MOST_BYTES) -> None:
-        """Read what the file holds; of one that was cut off, what is whole.
-
-        Raises:
-            OutputError: if it cannot be read or cut.
-        """
+        """Read what the file holds; of one that was cut off, what is whole; of one that cannot be read, nothing."""
         self._path, self._most, self._size = path, most, 0
         self._kept: dict[bytes, Prediction | None] = {}
         if path is None or not path.is_file():
@@ -62,7 +58,7 @@ class KeptRollouts:
             if whole < len(content):
                 os.truncate(path, whole)
         except OSError as error:
-            raise OutputError(f"'{path}': cannot be read or written: {error}.") from error
+            self._give_up(error)
 
     def __len__(self) -> int:
         return len(self._kept)
@@ -75,11 +71,7 @@ class KeptRollouts:
         return self._kept[key]
 
     def keep(self, predictions: dict[bytes, Prediction | None]) -> None:
-        """Keep what rollouts said, as long as there is room.
-
-        Raises:
-            OutputError: if the file cannot be written.
-        """
+        """Keep what rollouts said, as long as there is room; what a full disk does not take is kept in memory."""
         records = {key: _record(key, said) for key, said in predictions.items()}
         content = b"".join(records.values())
         if self._size + len(content) > self._most:
@@ -92,7 +84,16 @@ class KeptRollouts:
             with self._path.open("ab") as file:
                 file.write(content if file.tell() else magic() + content)
         except OSError as error:
-            raise OutputError(f"'{self._path}': cannot be written: {error}.") from error
+            self._give_up(error)
+
+    def _give_up(self, error: OSError) -> None:
+        """Without the file: it spares time where a run is interrupted, and no result depends on it."""
+        warnings.warn(
+            f"'{self._path}': rollouts are no longer kept, so that an interrupted run makes them again:"
+            f" {error.strerror or error}",
+            stacklevel=3,
+        )
+        self._path = None
 
     def _read(self, content: bytes) -> int:
         """Take up all records up to one that is not whole; where they end."""

@@ -17,6 +17,8 @@ from typing import IO, Final
 
 from physid_drake.run_folder import RunFolder
 
+DIAGNOSE: Final = "diagnose"
+"""The command that answers."""
 RESULT: Final = "diagnosis.json"
 ATTEMPT: Final = "attempt.json"
 """Beside a diagnosis: how long it took [s], or why there is none."""
@@ -135,7 +137,7 @@ def code_digest() -> str:
 
 def _note(run: _Running, attempt: Attempt) -> None:
     content = {"seconds": round(attempt.seconds, 3), "error": attempt.error, "code": run.code}
-    RunFolder(path=run.task.folder).write(ATTEMPT, json.dumps(content, indent=2) + "\n")
+    RunFolder.begin(run.task.folder, DIAGNOSE).write(ATTEMPT, json.dumps(content, indent=2) + "\n")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,10 +152,10 @@ class _Running:
 
     @classmethod
     def begin(cls, task: Task) -> _Running:
-        task.folder.mkdir(parents=True, exist_ok=True)
+        folder = RunFolder.begin(task.folder, DIAGNOSE)
         for name in (ATTEMPT, RESULT, FRESH_ERRORS):  # of an attempt that failed
-            (task.folder / name).unlink(missing_ok=True)
-        log = (task.folder / LOG).open("wb")
+            folder.forget(name)
+        log = folder.own(LOG).open("wb")
         # One thread each: several diagnoses run side by side.
         threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
         child = subprocess.Popen(

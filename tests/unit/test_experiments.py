@@ -112,47 +112,49 @@ def test_a_result_is_written_without_what_is_not_known():
 def test_a_result_is_written_to_the_same_bytes(tmp_path):
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        write(RunFolder(path=tmp_path / name), example(), "name", "command")
+        write(RunFolder.begin(tmp_path / name, "experiment"), example(), "name", "command")
     files = sorted(file.name for file in (tmp_path / "one").iterdir())
     assert "figure.svg" in files
     assert all((tmp_path / "one" / f).read_bytes() == (tmp_path / "two" / f).read_bytes() for f in files)
 
 
+def run_in(out, experiment, jobs=1):
+    with claim("counted", experiment, out) as folder:
+        return run_all(experiment, folder, jobs=jobs, tick=silent)
+
+
 def test_repetitions_that_are_done_are_not_made_again(counted, tmp_path):
-    folder = claim("counted", counted, tmp_path / "out")
-    first = run_all(counted, folder, jobs=1, tick=silent)
+    first = run_in(tmp_path / "out", counted)
     assert made(counted) == [0, 1, 2, 3]
     (tmp_path / "out" / "repetitions" / "002.json").unlink()
-    again = run_all(counted, claim("counted", counted, tmp_path / "out"), jobs=1, tick=silent)
+    again = run_in(tmp_path / "out", counted)
     assert made(counted) == [0, 1, 2, 2, 3]
     assert [r["value"] for r in again] == [r["value"] for r in first]
 
 
 def test_an_interrupted_experiment_keeps_what_is_done(counted, tmp_path):
-    folder = claim("counted", counted, tmp_path / "out")
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt), claim("counted", counted, tmp_path / "out") as folder:
         run_all(dc.replace(counted, stop_at=2), folder, jobs=1, tick=silent)
-    assert len(run_all(counted, folder, jobs=1, tick=silent)) == 4
+    assert len(run_in(tmp_path / "out", counted)) == 4
     assert made(counted) == [0, 1, 2, 3]
 
 
 def test_records_do_not_depend_on_the_number_of_jobs(counted, tmp_path):
-    one = run_all(counted, claim("counted", counted, tmp_path / "one"), jobs=1, tick=silent)
-    two = run_all(counted, claim("counted", counted, tmp_path / "two"), jobs=2, tick=silent)
+    one, two = run_in(tmp_path / "one", counted), run_in(tmp_path / "two", counted, jobs=2)
     assert [r["value"] for r in one] == [r["value"] for r in two]
 
 
 def test_a_folder_of_other_sizes_is_refused(counted, tmp_path):
-    claim("counted", counted, tmp_path)
+    run_in(tmp_path / "out", counted)
     with pytest.raises(ConfigError, match="choose another --out"):
-        claim("counted", dc.replace(counted, seed=4), tmp_path)
+        run_in(tmp_path / "out", dc.replace(counted, seed=4))
 
 
 def test_a_broken_record_is_named(counted, tmp_path):
-    folder = claim("counted", counted, tmp_path / "out")
+    run_in(tmp_path / "out", counted)
     (tmp_path / "out" / "repetitions" / "001.json").write_text("{")
     with pytest.raises(OutputError, match=r"001\.json"):
-        run_all(counted, folder, jobs=1, tick=silent)
+        run_in(tmp_path / "out", counted)
 
 
 def bowl(theta):

@@ -15,6 +15,7 @@ from physid_drake.errors import ProofError
 from physid_drake.prove.diagnosing import Task, attempt_of, diagnose_all, diagnose_command
 from physid_drake.prove.make import world_id
 from physid_drake.prove.seal import write_seal
+from physid_drake.run_folder import RunFolder
 
 # Notes that it was called, then does as the world's answer says.
 FAKE = """
@@ -133,9 +134,9 @@ def test_an_interrupted_run_keeps_what_is_finished_and_opens_the_seal_again(worl
 
 def test_a_failure_that_is_tried_again_and_interrupted_has_not_ended(tmp_path):
     tasks = [Task(name="a", words=(sys.executable, "-c", "import time; time.sleep(60)"), folder=tmp_path / "a")]
-    (tmp_path / "a").mkdir()
-    (tmp_path / "a" / "attempt.json").write_text(json.dumps({"seconds": 1.0, "error": "error: no"}))
-    (tmp_path / "a" / "diagnosis.json").write_text("{}")  # written before it failed
+    folder = RunFolder.begin(tmp_path / "a", "diagnose")
+    folder.write("attempt.json", json.dumps({"seconds": 1.0, "error": "error: no"}))
+    folder.write("diagnosis.json", "{}")  # written before it failed
 
     def stop(seconds):
         raise KeyboardInterrupt
@@ -211,6 +212,8 @@ def test_there_is_nothing_to_open_before_worlds_are_sealed_and_diagnosed(worlds,
     with pytest.raises(ProofError, match="holds no sealed worlds"):
         prove(tmp_path / "empty", "--open")
     assert not (tmp_path / "empty").exists()
+    for name in ("sealed/", "recordings/", "seal.txt", "seal.sha256"):
+        RunFolder.begin(worlds, "prove").own(name)
     run_prove._make(build_parser().parse_args(["prove"]), 3, worlds, None)
     with pytest.raises(ProofError, match="none of the 3 sealed worlds"):
         prove(worlds, "--open")
@@ -218,7 +221,7 @@ def test_there_is_nothing_to_open_before_worlds_are_sealed_and_diagnosed(worlds,
 
 def test_another_proof_in_the_same_folder_is_refused(worlds):
     prove(worlds)
-    with pytest.raises(run_prove.ConfigError, match="holds another proof"):
+    with pytest.raises(run_prove.ConfigError, match="holds another"):
         prove(worlds, "--seed", "5")
 
 

@@ -3,6 +3,7 @@
 import json
 import shutil
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from runs import laid_over, quick, write_small
 from physid_drake import run_cell
 from physid_drake.identify import Identifier
 from physid_drake.identify.polish import Polisher
+from physid_drake.run_folder import RunFolder
 from physid_drake.scenario import load_scenario
 
 
@@ -32,7 +34,13 @@ def result_of(folder):
 
 
 def test_a_run_leaves_its_configuration_its_result_and_its_page(done):
-    assert {path.name for path in done.iterdir()} == {"config.yaml", "result.json", "page.html", "model.yaml"}
+    assert {path.name for path in done.iterdir()} == {
+        "manifest.json",
+        "config.yaml",
+        "result.json",
+        "page.html",
+        "model.yaml",
+    }
     assert {oct(path.stat().st_mode & 0o777) for path in done.iterdir()} == {"0o644"}
 
 
@@ -177,7 +185,7 @@ def test_ctrl_c_keeps_what_was_found_and_the_same_command_goes_on(
         _CtrlC(patch, trial)
         assert quick(out, recording=recording, **SEARCH) == 130
     assert "interrupted" in capsys.readouterr().err
-    assert {path.name for path in out.iterdir()} == {"config.yaml", "belief.npz"}
+    assert {path.name for path in out.iterdir()} == {"manifest.json", "config.yaml", "belief.npz"}
     with monkeypatch.context() as patch:
         count = _CtrlC(patch, trial=-1)
         assert quick(out, recording=recording, **SEARCH) == 0
@@ -211,7 +219,7 @@ def test_another_configuration_does_not_go_on_from_there(recording, tmp_path, mo
     with monkeypatch.context() as patch:
         _CtrlC(patch)
         assert quick(out, recording=recording) == 130
-    (out / "rollouts.bin").touch()  # of a diagnosis
+    RunFolder.begin(out, "run_cell").own("rollouts.bin").touch()  # of a diagnosis
     other = laid_over(SEARCH, {"seed": 4})
     with monkeypatch.context() as patch:
         count = _CtrlC(patch, trial=-1)
@@ -261,3 +269,56 @@ def test_an_unknown_search_is_refused_before_anything_is_written(tmp_path, capsy
     assert quick(tmp_path / "out", recording=recording, search={"method": "annealing"}) == 1
     assert "search.method" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def everything(folder):
+    return {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def refused(capsys, *argv):
+    assert run_cell.main([*map(str, argv), "--no-view"]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("error: ") and error.count("\n") == 1
+    return error
+
+
+def test_a_recordings_folder_is_no_place_for_results(tmp_path, capsys):
+    """Its tables may have the names of results."""
+    flat = write_small(tmp_path / "flat", 2)
+    for k in (1, 2):
+        (flat / f"push_{k}.csv").write_text("raw")
+    before = everything(flat)
+    assert "read from" in refused(capsys, "--recording", flat, "--out", flat)
+    assert everything(flat) == before
+
+
+def test_a_configurations_folder_is_no_place_for_results(tmp_path, recording, capsys):
+    (tmp_path / "config.yaml").write_text(f"lab: {{recording: {recording}}}")
+    for name in ("model.yaml", "page.html", "push.csv"):
+        (tmp_path / name).write_text("mine")
+    before = everything(tmp_path)
+    assert "read from" in refused(capsys, tmp_path / "config.yaml", "--out", tmp_path)
+    assert everything(tmp_path) == before
+
+
+def test_a_folder_of_somebodys_own_is_refused(tmp_path, recording, capsys):
+    (tmp_path / "page.html").write_text("mine")
+    assert "is not empty" in refused(capsys, "--recording", recording, "--out", tmp_path)
+    assert everything(tmp_path) == {Path("page.html"): b"mine"}
+
+
+@pytest.mark.parametrize(("flag", "file"), [("--no-diagnosis", "diagnosis.json"), ("--no-plan", "plan.json")])
+def test_a_flag_that_leaves_a_result_out_does_not_drop_the_one_that_is_there(
+    tmp_path, recording, capsys, monkeypatch, flag, file
+):
+    monkeypatch.setattr(run_cell, "_fill", lambda folder, *_: folder.write(file, "{}"))
+    monkeypatch.setattr(run_cell, "_keep_serving", lambda *_: None)
+    asked = ["--recording", str(recording), "--out", str(tmp_path / "out"), "--no-view"]
+    assert run_cell.main(asked) == 0
+    assert flag in refused(capsys, *asked, flag)
+    assert (tmp_path / "out" / file).exists()
+    # With other settings it is another run's, and a line says that it is gone.
+    monkeypatch.setattr(run_cell, "_fill", lambda folder, *_: folder.write("result.json", "{}"))
+    assert run_cell.main(asked) == 0
+    assert run_cell.main([*asked, "--seed", "5", flag]) == 0
+    assert "they are gone" in capsys.readouterr().out and not (tmp_path / "out" / file).exists()

@@ -9,6 +9,7 @@ from runs import quick, rewrite_yaml, shipped_pushes, write_small
 from physid_drake import run_cell
 from physid_drake.cell.stepper import Stepper
 from physid_drake.recording import PoseStream, write_recording
+from physid_drake.run_folder import RunFolder
 
 
 @pytest.fixture(scope="module")
@@ -206,26 +207,23 @@ def test_an_output_folder_that_the_system_refuses(refused):
 
 def test_a_folder_in_the_place_of_the_config(refused, tmp_path):
     (tmp_path / "out" / "config.yaml").mkdir(parents=True)
-    assert "config.yaml" in refused(*out(tmp_path))
+    assert "is not empty" in refused(*out(tmp_path))
 
 
 @pytest.mark.slow
 def test_a_folder_in_the_place_of_the_result_leaves_no_scraps(tmp_path, recording, capsys):
-    (tmp_path / "out" / "result.json").mkdir(parents=True)
+    RunFolder.begin(tmp_path / "out", "run_cell")
+    (tmp_path / "out" / "result.json").mkdir()
     assert quick(tmp_path / "out", recording=recording) == 1
     assert "result.json" in capsys.readouterr().err
-    assert {p.name for p in (tmp_path / "out").iterdir()} <= {"config.yaml", "page.html", "result.json", "belief.npz"}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"manifest.json", "result.json"}
 
 
 @pytest.mark.parametrize("content", [b"garbage", b"", None], ids=["garbage", "empty", "folder"])
 def test_a_state_to_go_on_from_that_is_none(tmp_path, recording, capsys, content):
     """Either it is not taken, or one line says so."""
-    state = tmp_path / "out" / "belief.npz"
-    if content is None:
-        state.mkdir(parents=True)
-    else:
-        state.parent.mkdir()
-        state.write_bytes(content)
+    state = RunFolder.begin(tmp_path / "out", "run_cell").own("belief.npz")
+    state.mkdir() if content is None else state.write_bytes(content)
     status = quick(tmp_path / "out", recording=recording)
     error = capsys.readouterr().err
     assert status == 0 or (status == 1 and "belief.npz" in error)

@@ -21,6 +21,7 @@ from physid_drake.model_reading import load_model
 from physid_drake.plan import PlanConfig
 from physid_drake.plan.system import planner_of
 from physid_drake.recording import Table
+from physid_drake.run_folder import RunFolder
 from physid_drake.scenario_schema import Scenario
 
 
@@ -49,7 +50,7 @@ def few_rows(monkeypatch):
 def test_the_command_writes_the_plan_and_the_same_seed_the_same_bytes(folder, tmp_path, capsys, few_rows):
     files = planned_files(folder, tmp_path / "one")
     shown = capsys.readouterr().out
-    assert set(files) == {"plan.json", "push.csv", "plan.png", "page.html", "settings.json"}
+    assert set(files) == {"plan.json", "push.csv", "plan.png", "page.html", "settings.json", "manifest.json"}
     again = planned_files(folder, tmp_path / "two")
     assert all(again[name] == content for name, content in files.items() if name != "settings.json")
     content = json.loads(files["plan.json"])
@@ -119,10 +120,13 @@ def test_a_push_faster_than_every_recorded_one_is_said(folder, tmp_path, few_row
 
 
 def test_a_plan_takes_no_other_commands_folder(folder, capsys):
-    (folder / "settings.json").write_text(json.dumps({"command": "diagnose"}))
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert main(["plan", str(folder), *QUICK, "--out", str(folder)]) == 1
+    assert "read from" in capsys.readouterr().err
+    RunFolder.begin(folder / "of_diagnose", "diagnose")
+    assert main(["plan", str(folder), *QUICK, "--out", str(folder / "of_diagnose")]) == 1
     assert "holds what diagnose wrote" in capsys.readouterr().err
-    assert not (folder / "plan.json").exists()
+    assert {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()} == before
 
 
 def test_a_push_that_loses_the_object_is_no_plan(folder, tmp_path, capsys, few_rows):

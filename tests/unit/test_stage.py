@@ -1,5 +1,6 @@
 """What is put on Meshcat's stage."""
 
+import socket
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -8,8 +9,9 @@ import numpy as np
 import pytest
 
 from physid_drake.diagnose.localise import MissingWrench
+from physid_drake.errors import ConfigError
 from physid_drake.recording import read_recording
-from physid_drake.report.stage import Stage
+from physid_drake.report.stage import Stage, _listening, served
 from physid_drake.resources import shipped
 from physid_drake.run_diagnose import unit_force_of
 
@@ -47,11 +49,29 @@ def test_a_wrench_stands_out_beyond_two_standard_deviations():
     assert not missing(0.19, 0.19, 0.1).stands_out
 
 
+def test_nobody_can_connect_to_a_stage_without_a_view(stage):
+    assert _listening() == set()
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", stage.meshcat.port()), timeout=5.0)
+    assert len(stage.meshcat.StaticHtml()) > 100_000
+
+
+def test_a_view_listens_on_this_machine_alone():
+    meshcat = served()
+    with socket.create_connection(("127.0.0.1", meshcat.port()), timeout=5.0):
+        pass
+    with pytest.raises(ConnectionRefusedError):  # 127.0.0.2 is another address of the same machine
+        socket.create_connection(("127.0.0.2", meshcat.port()), timeout=5.0)
+    with pytest.raises(ConfigError, match="--host"):
+        served("203.0.113.7")
+
+
 def test_a_stage_that_another_thread_collects_does_not_end_the_process():
     code = """
 import gc, threading
 from physid_drake.recording import read_recording
-from physid_drake.report.stage import Stage
+from physid_drake.errors import ConfigError
+from physid_drake.report.stage import Stage, _listening, served
 from physid_drake.resources import shipped
 Stage(read_recording(shipped("recordings") / "eraser_reference"))
 thread = threading.Thread(target=gc.collect)
