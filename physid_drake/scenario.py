@@ -26,6 +26,7 @@ from physid_drake.yaml_text import parsed, read_yaml
 
 DEFAULT = "sealed.yaml"
 FARTHEST = 100.0  # m: of a goal or a start
+LARGEST = 1e6  # of theta, in SI units
 Rule = tuple[str, object, bool, str]  # key, value, whether it is fine, and what it must be
 WHOLE = {
     "search.refine_every": (0, 10_000), "search.candidates": (2, 20_000), "search.budget": (1, 2_000),
@@ -34,9 +35,11 @@ WHOLE = {
 }  # fmt: skip
 """From, to. Beyond, memory or patience end before the run does."""
 REAL = {
-    "search.entropy_tolerance_nats": (Range(least=0.0, most=100.0), "at least 0 nats, at most 100"),
-    "plan.tolerance_m": (Range(above=0.0, most=10.0), "above 0 m, at most 10"),
+    "search.entropy_tolerance_nats": (Range(least=0.0, most=100.0), "from 0 to 100 nats"),
+    "plan.tolerance_m": (Range(above=0.0, most=10.0), "above 0, at most 10 m"),
     "plan.start_deg": (Range(least=-3600.0, most=3600.0), "from -3600 to 3600 degrees"),
+    "theta.cell_spread": (Range(least=1e-3, most=10.0), "from 0.001 to 10"),
+    "theta.cell_length": (Range(least=1e-3, most=100.0), "from 0.001 to 100"),
     "held_out_share": (Range(least=0.0, below=1.0), "in [0, 1)"),
 }
 
@@ -221,7 +224,7 @@ def _numbers(scenario: Scenario) -> list[Rule]:
     rules: list[Rule] = []
     for key, (least, most) in WHOLE.items():
         value = _at(scenario, key)
-        rules.append((key, value, least <= value <= most, f"at least {least}, at most {most}"))
+        rules.append((key, value, least <= value <= most, f"from {least} to {most}"))
     for key, (allowed, rule) in REAL.items():
         value = _at(scenario, key)
         rules.append((key, value, allowed.holds(value), rule))
@@ -229,9 +232,16 @@ def _numbers(scenario: Scenario) -> list[Rule]:
 
 
 def _places(scenario: Scenario) -> list[Rule]:
-    rule = f"[x, y] within {FARTHEST:g} m, or empty"
+    rule = f"[x, y], each from {-FARTHEST:g} to {FARTHEST:g} m, or empty"
     places = {key: _at(scenario, key) for key in ("plan.goal_m", "plan.start_m")}
-    return [
+    theta = scenario.theta
+    numbers = {f"theta.bounds.{name}": ends for name, ends in theta.bounds.items()}
+    numbers |= {f"theta.nominal.{name}": [value] for name, value in theta.nominal.items()}
+    large: list[Rule] = [
+        (key, values, all(abs(value) <= LARGEST for value in values), f"numbers from {-LARGEST:g} to {LARGEST:g}")
+        for key, values in numbers.items()
+    ]
+    return large + [
         (key, place, len(place) in (0, 2) and all(abs(value) <= FARTHEST for value in place), rule)
         for key, place in places.items()
     ]

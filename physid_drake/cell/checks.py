@@ -4,16 +4,27 @@ from __future__ import annotations
 
 from physid_drake.cell.config import CellConfig
 from physid_drake.errors import ConfigError
+from physid_drake.ranges import Range
+from physid_drake.wording import shown
 
 MODELS = ("hydroelastic", "point")
 SCHEMES = ("cenic", "lagged", "similar", "sap", "tamsi")
-LONGEST_TICK = 0.05  # s
+SHORTEST_TICK, LONGEST_TICK = 1e-5, 0.05  # s
+MOST_DISSIPATION = 1e4  # s/m
+MOST_FREQUENCY = 1e6  # rad/s
 MOST_CELLS = 10  # along a side
 LIGHTEST, HEAVIEST = 20.0, 8000.0  # kg/m^3 of the box around the object: foam, steel
+
+Rule = tuple[str, object, bool, str]  # key, value, whether it is fine, and what it must be
 
 
 def _is_whole(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _in(value: object, allowed: Range) -> bool:
+    """Whether it is a number, and one of those; a configuration may hold whatever YAML does."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and allowed.holds(value)
 
 
 def check_config(config: CellConfig) -> None:
@@ -22,32 +33,52 @@ def check_config(config: CellConfig) -> None:
     Raises:
         ConfigError: naming the key and the rule.
     """
-    contact, solver, cells = config.contact, config.solver, config.friction_cells
-    rules: list[tuple[str, object, bool, str]] = [
+    for key, value, fine, rule in (*_contact_rules(config), *_solver_rules(config), *_object_rules(config)):
+        if not fine:
+            raise ConfigError(f"key 'cell.{key}': must be {rule}, but is {shown(value)}.")
+
+
+def _contact_rules(config: CellConfig) -> list[Rule]:
+    contact = config.contact
+    points = contact.support_points
+    enough = _is_whole(points) and 4 <= points <= 1000
+    numbers: list[tuple[str, Range, str]] = [
+        ("rest_depth_m", Range(least=1e-8, most=1e-2), "from 1e-8 to 1e-2 m"),
+        ("dissipation_s_per_m", Range(least=0.0, most=MOST_DISSIPATION), f"from 0 to {MOST_DISSIPATION:g} s/m"),
+        ("stiction_tolerance_mps", Range(above=0.0, most=1.0), "above 0, at most 1 m/s"),
+        ("hand_frequency_rad_s", Range(above=0.0, most=MOST_FREQUENCY), f"above 0, at most {MOST_FREQUENCY:g} rad/s"),
+    ]  # fmt: skip
+    return [
         ("contact.model", contact.model, contact.model in MODELS, " or ".join(repr(m) for m in MODELS)),
-        ("contact.support_points", contact.support_points,
-         _is_whole(contact.support_points) and 4 <= contact.support_points <= 1000, "a whole number from 4 to 1000"),
-        ("contact.rest_depth_m", contact.rest_depth_m, 1e-8 <= contact.rest_depth_m <= 1e-2, "from 1e-8 to 1e-2 m"),
-        ("contact.dissipation_s_per_m", contact.dissipation_s_per_m, contact.dissipation_s_per_m >= 0.0,
-         "at least 0 s/m"),
-        ("contact.stiction_tolerance_mps", contact.stiction_tolerance_mps, contact.stiction_tolerance_mps > 0.0,
-         "above 0 m/s"),
-        ("contact.hand_frequency_rad_s", contact.hand_frequency_rad_s, contact.hand_frequency_rad_s > 0.0,
-         "above 0 rad/s"),
+        ("contact.support_points", points, enough, "a whole number from 4 to 1000"),
+        *((f"contact.{key}", getattr(contact, key), _in(getattr(contact, key), allowed), rule)
+          for key, allowed, rule in numbers),
+    ]  # fmt: skip
+
+
+def _solver_rules(config: CellConfig) -> list[Rule]:
+    solver = config.solver
+    tick, slide = solver.time_step_s, solver.slide_time_step_s
+    ticks = Range(least=SHORTEST_TICK, most=LONGEST_TICK)
+    switches = {name: getattr(solver, name) for name in ("impact_law", "drift_feedforward", "trapezoid_slide")}
+    return [
         ("solver.scheme", solver.scheme, solver.scheme in SCHEMES, f"one of {', '.join(SCHEMES)}"),
-        ("solver.time_step_s", solver.time_step_s, 0.0 < solver.time_step_s <= LONGEST_TICK,
-         f"in (0, {LONGEST_TICK:g}] s"),
-        ("solver.slide_time_step_s", solver.slide_time_step_s,
-         solver.time_step_s <= solver.slide_time_step_s <= LONGEST_TICK,
+        ("solver.time_step_s", tick, _in(tick, ticks), f"from {SHORTEST_TICK:g} to {LONGEST_TICK:g} s"),
+        ("solver.slide_time_step_s", slide, _in(slide, ticks) and tick <= slide,
          f"between time_step_s and {LONGEST_TICK:g} s"),
-        ("friction_cells", cells, len(cells) == 2 and all(_is_whole(n) and 1 <= n <= MOST_CELLS for n in cells),
-         f"whole [nx, ny] from 1 to {MOST_CELLS}"),
-        ("default_density_kgpm3", config.default_density_kgpm3, LIGHTEST <= config.default_density_kgpm3 <= HEAVIEST,
+        *((f"solver.{key}", value, isinstance(value, bool), "true or false") for key, value in switches.items()),
+    ]  # fmt: skip
+
+
+def _object_rules(config: CellConfig) -> list[Rule]:
+    cells, density = config.friction_cells, config.default_density_kgpm3
+    even = (
+        isinstance(cells, list | tuple)
+        and len(cells) == 2
+        and all(_is_whole(n) and 1 <= n <= MOST_CELLS for n in cells)
+    )
+    return [
+        ("friction_cells", cells, even, f"whole [nx, ny] from 1 to {MOST_CELLS}"),
+        ("default_density_kgpm3", density, _in(density, Range(least=LIGHTEST, most=HEAVIEST)),
          f"from {LIGHTEST:g} to {HEAVIEST:g} kg/m^3"),
     ]  # fmt: skip
-    switches = ("impact_law", "drift_feedforward", "trapezoid_slide")
-    values = {name: getattr(solver, name) for name in switches}
-    rules += [(f"solver.{k}", v, isinstance(v, bool), "true or false") for k, v in values.items()]
-    for key, value, fine, rule in rules:
-        if not fine:
-            raise ConfigError(f"key 'cell.{key}': must be {rule}, but is {value!r}.")

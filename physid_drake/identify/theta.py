@@ -18,6 +18,7 @@ from physid_drake.identify.config import ThetaConfig
 from physid_drake.ranges import ANY, COEFFICIENT, POSITIVE, Range
 from physid_drake.recording import ObjectModel
 from physid_drake.space import Parameter, ParameterSpace
+from physid_drake.wording import named, shown
 
 Array = NDArray[np.float64]
 
@@ -98,7 +99,7 @@ def theta_map(
     known = _catalogue(model, solid, cells, density, config.bounds.get("mass"))
     for name in [*config.parameters, *config.bounds, *config.nominal]:
         if name not in known and name != "support_friction":
-            raise ConfigError(f"theta: there is no parameter '{name}'; known are {', '.join(known)}.")
+            raise ConfigError(f"theta: there is no parameter '{named(name)}'; known are {', '.join(known)}.")
     wanted = [
         n
         for name in config.parameters
@@ -125,13 +126,13 @@ def _adjusted(parameter: Parameter, config: ThetaConfig) -> Parameter:
     nominal = config.nominal.get(parameter.name, config.nominal.get(family))
     if bounds is not None:
         if len(bounds) != 2:
-            raise ConfigError(f"theta.bounds.{family}: needs [lower, upper], but got {bounds}.")
+            raise ConfigError(f"theta.bounds.{family}: needs [lower, upper], but got {shown(bounds)}.")
         lower, upper = float(bounds[0]), float(bounds[1])
         middle = min(max(parameter.prior_mean, lower), upper)
         parameter = dc.replace(parameter, lower=lower, upper=upper, prior_mean=middle)
         allowed = range_of(parameter.name)
         if not (allowed.holds(lower) and allowed.holds(upper)):
-            raise ConfigError(f"theta.bounds.{family}: needs numbers {allowed.rule}, but got {bounds}.")
+            raise ConfigError(f"theta.bounds.{family}: needs numbers {allowed.rule}, but got {shown(bounds)}.")
     if nominal is not None:
         parameter = dc.replace(parameter, prior_mean=float(nominal))
     return parameter

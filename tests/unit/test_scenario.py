@@ -1,6 +1,7 @@
 """Scenarios: what a configuration may say, and how it is refused."""
 
 import dataclasses as dc
+import os
 
 import pytest
 import yaml
@@ -235,6 +236,34 @@ def test_an_unknown_scenario_is_answered_with_the_known_ones():
         pytest.param("cell.contact.stiction_tolerance_mps", 0.0),
         pytest.param("cell.contact.hand_frequency_rad_s", 0.0),
         pytest.param("cell.contact.hand_frequency_rad_s", -5.0),
+        ("search.candidates", 99999999999999),
+        ("search.budget", 10**9),
+        ("search.batch", 10**9),
+        ("search.patience", 10**30),
+        ("search.refine_every", 10**9),
+        ("search.jobs", 10**9),
+        ("search.entropy_tolerance_nats", 1e300),
+        ("plan.budget", 10**9),
+        ("plan.sweep", 10**9),
+        ("plan.draws", 10**9),
+        ("plan.tolerance_m", 1e308),
+        ("plan.goal_m", [1e308, 0.0]),
+        ("plan.goal_m", [1e300] * 1000),
+        ("plan.start_m", [0.0, -1e308]),
+        ("plan.start_deg", 1e308),
+        ("seed", 10**30),
+        ("theta.cell_spread", 1e300),
+        ("theta.cell_length", 1e-320),
+        ("theta.bounds.mass", [1e300, 1e308]),
+        ("theta.bounds.mass", [0.1] * 1000 + [1e300]),
+        ("theta.nominal.com_x", -1e308),
+        ("cell.friction_cells", [10**9, 10**9]),
+        ("cell.friction_cells", [1] * 9000),
+        ("cell.solver.time_step_s", 1e-300),
+        ("cell.contact.support_points", 10**30),
+        ("cell.contact.dissipation_s_per_m", 1e300),
+        ("cell.contact.stiction_tolerance_mps", 1e300),
+        ("cell.contact.hand_frequency_rad_s", 1e300),
     ],
 )
 def test_a_value_that_no_run_can_use_is_refused_by_its_key(key, value):
@@ -242,4 +271,50 @@ def test_a_value_that_no_run_can_use_is_refused_by_its_key(key, value):
     for part in reversed(key.split(".")):
         content = {part: content}
     message = refusal(None, yaml.safe_dump(content))
-    assert f"key '{key}'" in message
+    assert f"key '{key}'" in message and len(message) < 250
+
+
+LONG = "x" * 70_000
+
+
+@pytest.mark.parametrize(
+    "override",
+    [
+        f"{{seed: {LONG}}}",
+        f"{{{LONG}: 1}}",
+        f"{{search: {{{LONG}: 1}}}}",
+        f"{{search: {LONG}}}",
+        f"{{search: {{method: {LONG}}}}}",
+        f"{{plan: {{policy: {LONG}}}}}",
+        f"{{plan: {{goal_m: [{'1, ' * 5000}1]}}}}",
+        f"{{theta: {{bounds: {{{LONG}: 3}}}}}}",
+        f"{{cell: {{contact: {{model: {LONG}}}}}}}",
+        f"{{seed: !{LONG} 1}}",
+        f"{{seed: {'[' * 70_000}}}",
+        f"{{seed: 0x{'f' * 70_000}}}",
+    ],
+    ids=range(12),
+)
+def test_a_value_of_many_letters_is_cut(override):
+    message = refusal(None, override)
+    assert message.isprintable() and len(message) < 600
+
+
+@pytest.mark.parametrize(
+    "name", [LONG, f"{LONG}.yaml", f"eraser.yaml:{LONG}", f"{LONG}:{LONG}", "a/" * 5000], ids=range(5)
+)
+def test_a_name_of_many_letters_is_cut(name):
+    assert len(refusal(name)) < 600
+
+
+def test_aliases_that_stand_for_a_billion_values_are_refused_at_once(tmp_path):
+    lines = ["_a0: &a0 [lol]", *(f"_a{k + 1}: &a{k + 1} [{', '.join([f'*a{k}'] * 9)}]" for k in range(9))]
+    text = "\n".join([*lines, "mine: {recording: *a9}"])
+    assert "holds more than 10000 values" in refusal(config(tmp_path, text))
+    assert "holds more than 10000 values" in refusal(None, "{" + ", ".join([*lines, "seed: *a9"]) + "}")
+    assert "inside of what it names" in refusal(None, "{seed: &a [*a]}")
+
+
+def test_a_named_pipe_is_no_config(tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    assert "it is a named pipe" in refusal(str(tmp_path / "pipe.yaml"))
