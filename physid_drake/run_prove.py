@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import functools
-import json
 import os
 import re
 import signal
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -20,18 +20,18 @@ from rich.console import Console
 from physid_drake.errors import ConfigError, ProofError
 from physid_drake.prove.diagnosing import (
     GRACE,
-    RESULT,
     Attempt,
     Task,
     attempt_of,
     diagnose_all,
     diagnose_command,
     is_open,
+    verdict_of,
 )
 from physid_drake.prove.figures import figures_of
-from physid_drake.prove.make import world_id
 from physid_drake.prove.score import read_outcomes
 from physid_drake.prove.seal import LINES, SEALED, TOTAL, check_seal, read_seal, sealed_names, shut, unlock
+from physid_drake.prove.secret import Secret, keep_secret, settled_secret
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.proof import Proof, proof_json, proof_markdown, proof_tables
 from physid_drake.report.proof_page import proof_page
@@ -42,6 +42,8 @@ from physid_drake.run_folder import SETTINGS, RunFolder, settings_text, versions
 
 WORLDS, QUICK = 200, 10
 COMMAND = "prove"
+WRITTEN = ("page.html", "proof.md", "proof.json", "confusion.png")
+UNKNOWN = "unknown"  # what hid the truth from a diagnosis that does not say so
 Commander = Callable[..., tuple[str, ...]]
 """Recording, folder of the results, what must not be seen (one or more): the words of the command that diagnoses."""
 
@@ -57,29 +59,32 @@ def run(arguments: argparse.Namespace, command: Commander = diagnose_command) ->
         PhysidError: one line that says what is wrong.
         KeyboardInterrupt: when interrupted; all that is finished is kept.
     """
-    out: Path = arguments.out or Path("proofs") / "_".join(filter(None, (f"seed_{arguments.seed}", arguments.kind)))
+    out: Path = arguments.out or Path("proofs") / "worlds"  # no seed or kind: the diagnosis sees the folder's name
     worlds = _checked(arguments, out)
     opening = read_seal(out) if arguments.open else None  # before the folder is claimed: there may be none
     console = terminal()
-    names = [world_id(index, arguments.seed) for index in range(worlds)]
-    with claim(out, {"seed": arguments.seed, "kind": arguments.kind}) as folder:
+    with claim(out, {}) as folder:
         if opening is not None:
-            seal = opening
+            seal, secret = opening, settled_secret(out, arguments.seed, arguments.kind)
+            names = secret.names(worlds)
         else:
             with ended_softly():
                 for name in ("recordings/", f"{SEALED}/", "diagnoses/", LINES, TOTAL):
                     folder.own(name)
+                unlock(out / SEALED)
+                secret = keep_secret(out, arguments.seed, arguments.kind)
+                names = secret.names(worlds)
                 seal = _make(arguments, worlds, out, console)
                 console.print(f"seal of {worlds} worlds, before any is diagnosed: sha256 {seal}", soft_wrap=True)
-                diagnose_worlds(out, names, arguments, console, command)
-        proof = opened(out, names, seal, seed=arguments.seed, kind=arguments.kind)
+                diagnose_worlds(folder, names, arguments, console, command)
+        proof = opened(out, names, seal, secret)
         if arguments.open:
             console.print(f"{len(proof.outcomes)} of {worlds} worlds have been diagnosed")
         write(folder, proof)
     for table in proof_tables(proof):
         console.print(table)
     console.print(
-        f"written: {', '.join(str(out / n) for n in ('page.html', 'proof.md', 'proof.json', 'confusion.png'))}",
+        f"written: {', '.join(str(out / name) for name in WRITTEN)}",
         soft_wrap=True,
     )
     return 0
@@ -105,7 +110,7 @@ def check_running(arguments: argparse.Namespace) -> None:
         ConfigError: which one, and what it must be.
     """
     for name, value, least in (("seed", arguments.seed, 0), ("jobs", arguments.jobs, 1)):
-        if value < least:
+        if value is not None and value < least:
             raise ConfigError(f"--{name} must be at least {least}, but is {value}.")
     if not arguments.timeout > 0.0:
         raise ConfigError(f"--timeout must be positive, but is {arguments.timeout:g} s.")
@@ -140,10 +145,9 @@ def ended_softly() -> Iterator[None]:
 
 
 def _make(arguments: argparse.Namespace, worlds: int, out: Path, console: Console) -> str:
-    """Make and seal the worlds in a process of their own; the seal's hash."""
-    unlock(out / SEALED)
-    words = [sys.executable, "-m", "physid_drake.prove.make", "--worlds", str(worlds), "--seed", str(arguments.seed),
-             "--out", str(out), "--jobs", str(arguments.jobs)]  # fmt: skip
+    """Make and seal the worlds in a process of their own, which finds their seed in the folder; the seal's hash."""
+    words = [sys.executable, "-m", "physid_drake.prove.make", "--worlds", str(worlds), "--out", str(out),
+             "--jobs", str(arguments.jobs)]  # fmt: skip
     words += ["--kind", arguments.kind] if arguments.kind else []
     last = ""
     with (
@@ -175,14 +179,18 @@ def _make(arguments: argparse.Namespace, worlds: int, out: Path, console: Consol
 
 
 def diagnose_worlds(
-    out: Path, names: Sequence[str], arguments: argparse.Namespace, console: Console, command: Commander
+    folder: RunFolder, names: Sequence[str], arguments: argparse.Namespace, console: Console, command: Commander
 ) -> None:
     """Diagnose every world that has not been, with the sealed folder shut."""
+    out = folder.path
     tasks = [
         Task(name=name, words=command(out / "recordings" / name, out / "diagnoses" / name, out / SEALED),
              folder=out / "diagnoses" / name)
         for name in names
     ]  # fmt: skip
+    if any(is_open(task, arguments.retry) for task in tasks):
+        for name in WRITTEN:  # they say of the worlds that were opened from which seed all of them are
+            folder.forget(name)
     with shut(out / SEALED):
         run_tasks(tasks, arguments, console)
 
@@ -205,37 +213,34 @@ def _tell(
     task: Task,
     attempt: Attempt,
 ) -> None:
-    said = "failed: " + attempt.error if attempt.error is not None else _verdict(task.folder)
+    said = "failed: " + attempt.error if attempt.error is not None else verdict_of(task.folder)
     k = next(done)
     console.print(f"{task.name}  {k}/{left}  {attempt.seconds:.0f} s  {said}", soft_wrap=True, markup=False)
     tick("diagnosed", k, left)
 
 
-def _verdict(folder: Path) -> str:
-    return str(json.loads((folder / RESULT).read_text(encoding="utf-8"))["verdict"])
-
-
-def opened(out: Path, names: Sequence[str], seal: str, *, seed: int, kind: str | None) -> Proof:
+def opened(out: Path, names: Sequence[str], seal: str, secret: Secret) -> Proof:
     """Check the seal and score the worlds whose diagnosis has ended.
 
     Args:
         out: folder of the proof.
         names: of all worlds.
         seal: hash that was written down before the diagnosis.
-        seed: of the worlds.
-        kind: of the worlds, None for the mix.
+        secret: what the worlds were drawn from.
 
     Raises:
         ProofError: if the truth is not the one that was sealed, or nothing is diagnosed yet.
     """
     check_seal(out, seal)
-    ended = [name for name in names if attempt_of(out / "diagnoses" / name) is not None]
+    attempts = {name: attempt_of(out / "diagnoses" / name) for name in names}
+    ended = {name: attempt for name, attempt in attempts.items() if attempt is not None}
     if not ended:
         raise ProofError(f"'{out}': none of the {len(names)} sealed worlds has been diagnosed yet.")
-    outcomes = tuple(read_outcomes(out / SEALED, out / "diagnoses", ended))
+    outcomes = tuple(read_outcomes(out / SEALED, out / "diagnoses", list(ended)))
     return Proof(
-        seed=seed, kind=kind, seal=seal, sealed=len(names), outcomes=outcomes, figures=figures_of(outcomes),
-        versions=versions(),
+        seed=secret.seed, kind=secret.kind, seal=seal, sealed=len(names), outcomes=outcomes,
+        figures=figures_of(outcomes), versions=versions(),
+        hidden_by=Counter(sorted(attempt.hidden_by or UNKNOWN for attempt in ended.values())),
     )  # fmt: skip
 
 

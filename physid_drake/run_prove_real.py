@@ -45,12 +45,13 @@ def run_real(arguments: argparse.Namespace, command: Commander = diagnose_comman
         raise ConfigError(f"--pushes must be at least {LEAST_PUSHES}, but is {pushes}.")
     check_running(arguments)
     cases = chosen_cases(arguments.only)
+    seed = 0 if arguments.seed is None else int(arguments.seed)
     out: Path = arguments.out or Path("proofs") / "real"
     console = terminal()
-    with claim(out, {"real": True, "seed": arguments.seed, "pushes": pushes}) as folder, ended_softly():
+    with claim(out, {"real": True, "seed": seed, "pushes": pushes}) as folder, ended_softly():
         for name in ("recordings/", "held_out/", "diagnoses/"):
             folder.own(name)
-        reasons = {c.name: prepare(c, published, out, pushes=pushes, seed=arguments.seed) for c in cases}
+        reasons = {c.name: prepare(c, published, out, pushes=pushes, seed=seed) for c in cases}
         there = [case for case in cases if reasons[case.name] is None]
         hidden = (published, out / "held_out")
         tasks = [_task(case, out, command, hidden, pushes) for case in there]

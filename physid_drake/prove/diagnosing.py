@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import signal
 import subprocess
@@ -15,7 +16,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Final
 
+from physid_drake.errors import ProofError
+from physid_drake.prove.blindfold import HIDDEN_BY
+from physid_drake.prove.written import AGAIN, broken, is_number, read_object
 from physid_drake.run_folder import RunFolder
+from physid_drake.wording import shown
 
 DIAGNOSE: Final = "diagnose"
 """The command that answers."""
@@ -47,10 +52,17 @@ class Task:
 
 @dataclass(frozen=True, kw_only=True)
 class Attempt:
-    """How a diagnosis ended: how long it took [s], and one line on why it failed, None where it did not."""
+    """How a diagnosis ended.
+
+    Attributes:
+        seconds: that it took [s]; NaN where unknown.
+        error: one line on why it failed, None where it did not.
+        hidden_by: what hid the truth from it; None where nothing says so.
+    """
 
     seconds: float
     error: str | None
+    hidden_by: str | None = None
 
 
 def diagnose_command(recording: Path, folder: Path, *sealed: Path) -> tuple[str, ...]:
@@ -69,15 +81,36 @@ def diagnose_command(recording: Path, folder: Path, *sealed: Path) -> tuple[str,
 
 
 def attempt_of(folder: Path) -> Attempt | None:
-    """How the diagnosis in a folder ended; None where there is none yet."""
-    noted: dict[str, object] = {}
-    if (folder / ATTEMPT).is_file():
-        noted = json.loads((folder / ATTEMPT).read_text(encoding="utf-8"))
-    seconds = noted.get("seconds")
-    taken = float(seconds) if isinstance(seconds, int | float) else float("nan")
-    if noted.get("error"):  # also of one that failed after its answer was written
-        return Attempt(seconds=taken, error=str(noted["error"]))
-    return Attempt(seconds=taken, error=None) if (folder / RESULT).is_file() else None
+    """How the diagnosis in a folder ended; None where there is none yet.
+
+    Raises:
+        ProofError: if what is written of it cannot be read.
+    """
+    file = folder / ATTEMPT
+    noted = read_object(file, AGAIN) if file.exists() else {}
+    seconds, error, hidden_by = (noted.get(name) for name in ("seconds", "error", "hidden_by"))
+    if not (seconds is None or is_number(seconds)):
+        raise broken(file, f"'seconds' must be a number, but is {shown(seconds)}", AGAIN)
+    for name, word in (("error", error), ("hidden_by", hidden_by)):
+        if not (word is None or isinstance(word, str)):
+            raise broken(file, f"'{name}' must be a text or null, but is {shown(word)}", AGAIN)
+    attempt = Attempt(
+        seconds=math.nan if seconds is None else float(seconds), error=error or None, hidden_by=hidden_by
+    )
+    # One that failed may have done so after its answer was written.
+    return attempt if attempt.error is not None or (folder / RESULT).is_file() else None
+
+
+def verdict_of(folder: Path) -> str:
+    """The verdict of a diagnosis.
+
+    Raises:
+        ProofError: if it cannot be read.
+    """
+    verdict = read_object(folder / RESULT, AGAIN).get("verdict")
+    if not isinstance(verdict, str):
+        raise broken(folder / RESULT, f"'verdict' must be a text, but is {shown(verdict)}", AGAIN)
+    return verdict
 
 
 def diagnose_all(
@@ -136,7 +169,12 @@ def code_digest() -> str:
 
 
 def _note(run: _Running, attempt: Attempt) -> None:
-    content = {"seconds": round(attempt.seconds, 3), "error": attempt.error, "code": run.code}
+    content = {
+        "seconds": round(attempt.seconds, 3),
+        "error": attempt.error,
+        "code": run.code,
+        "hidden_by": attempt.hidden_by,
+    }
     RunFolder.begin(run.task.folder, DIAGNOSE).write(ATTEMPT, json.dumps(content, indent=2) + "\n")
 
 
@@ -159,8 +197,9 @@ class _Running:
         # One thread each: several diagnoses run side by side.
         threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
         child = subprocess.Popen(
-            task.words, stdout=log, stderr=subprocess.STDOUT, start_new_session=True, env={**os.environ, **threads}
-        )
+            task.words, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, start_new_session=True,
+            env={**os.environ, **threads},
+        )  # fmt: skip
         return cls(task=task, child=child, log=log, since=time.monotonic(), code=code_digest())
 
     def look(self, timeout: float) -> Attempt | None:
@@ -169,14 +208,24 @@ class _Running:
         if code is None and seconds < timeout:
             return None
         self.stop()
+        said = _said(self.task.folder / LOG)
+        hidden_by = next((line.removeprefix(HIDDEN_BY) for line in said if line.startswith(HIDDEN_BY)), None)
+        return Attempt(seconds=seconds, error=self._error(code, timeout, said), hidden_by=hidden_by)
+
+    def _error(self, code: int | None, timeout: float, said: Sequence[str]) -> str | None:
+        """One line on why it failed; None where it did not."""
         if code is None:
-            return Attempt(seconds=seconds, error=f"stopped after {timeout:g} s (--timeout).")
+            return f"stopped after {timeout:g} s (--timeout)."
         if code == 0 and (self.task.folder / RESULT).is_file():
-            return Attempt(seconds=seconds, error=None)
-        last = _last_line(self.task.folder / LOG)
+            try:
+                verdict_of(self.task.folder)
+            except ProofError as error:
+                return str(error)
+            return None
+        last = _last_line(said)
         if code < 0:  # killed: its last line may tell how far it was, but hardly why
-            return Attempt(seconds=seconds, error=f"signal {-code}, after '{last}'.")
-        return Attempt(seconds=seconds, error=last or f"exit status {code}, without a word.")
+            return f"signal {-code}, after '{last}'."
+        return last or f"exit status {code}, without a word."
 
     def interrupt(self) -> None:
         self._signal(signal.SIGINT)
@@ -194,8 +243,14 @@ class _Running:
             os.killpg(self.child.pid, number)
 
 
-def _last_line(file: Path) -> str:
-    """What a command said last, its own error line first."""
-    lines = [line.strip() for line in file.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()]
+def _said(log: Path) -> list[str]:
+    """What a command said, line by line."""
+    text = log.read_text(encoding="utf-8", errors="replace")
+    return [line.strip() for line in text.splitlines() if line.strip()]
+
+
+def _last_line(said: Sequence[str]) -> str:
+    """What it said last, its own error line first."""
+    lines = [line for line in said if not line.startswith(HIDDEN_BY)]
     errors = [line for line in lines if line.startswith("error:")]
     return (errors or lines or [""])[-1][:_LONGEST_LINE]

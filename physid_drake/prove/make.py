@@ -1,15 +1,15 @@
 """Makes sealed worlds: recordings that tell nothing, and apart from them the truth, under a hash.
 
 ``python -m physid_drake.prove.make --worlds 20 --seed 0 --out FOLDER`` writes ``recordings/<id>/``,
-``sealed/<id>.json``, ``seal.txt`` and ``seal.sha256``. The same seed gives the same bytes;
-worlds that exist are skipped.
+``sealed/<id>.json``, ``sealed/secret.json``, ``seal.txt`` and ``seal.sha256``. The same seed gives the same worlds
+under other names; worlds that exist are skipped. ``--names-by-seed`` gives the names, too, and all the same bytes: it
+is for opened seeds only, since who knows a seed finds its worlds by such names.
 """
 
 from __future__ import annotations
 
 import argparse
 import functools
-import hashlib
 import json
 import math
 import shutil
@@ -22,7 +22,7 @@ from typing import Final, Literal, TypeAlias, get_args
 
 import numpy as np
 
-from physid_drake.errors import ParameterError, PhysidError
+from physid_drake.errors import ConfigError, ParameterError, PhysidError, ProofError
 from physid_drake.processes import in_processes
 from physid_drake.prove.contact import RESIDUAL_RESTITUTION
 from physid_drake.prove.effects.catalogue import CATALOGUED, OTHERS
@@ -32,7 +32,8 @@ from physid_drake.prove.floor import floor_of
 from physid_drake.prove.knobs import Knob, draw_knob
 from physid_drake.prove.mujoco_world import PushWorld
 from physid_drake.prove.scene import Rng, Scene, draw_scene
-from physid_drake.prove.seal import RECORDING, files_digest, write_seal
+from physid_drake.prove.seal import LINES, RECORDING, SEALED, TOTAL, files_digest, write_seal
+from physid_drake.prove.secret import Secret, keep_secret, name_by_seed
 from physid_drake.prove.sensing import record, recording_of
 from physid_drake.prove.shapes import Array
 from physid_drake.prove.world_plan import Motion
@@ -40,7 +41,11 @@ from physid_drake.recording import (
     Recording,
     write_recording,
 )
+from physid_drake.run_folder import RunFolder, write_whole
 
+COMMAND: Final = "prove"
+"""Whose the folder is, also one that is made by hand."""
+RECORDINGS: Final = "recordings"
 Kind: TypeAlias = Literal["none", "effect", "other", "pair"]
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
 BLOCK: Final[tuple[Kind, ...]] = ("none",) * 5 + ("effect",) * 10 + ("other",) * 3 + ("pair",) * 2
@@ -101,13 +106,8 @@ def assign(index: int, seed: int, kind: Kind | None = None, effect: str | None =
     return Assignment(index=index, kind=chosen, effects=(first, second))
 
 
-def world_id(index: int, seed: int) -> str:
-    """Eight hex digits that tell nothing."""
-    return hashlib.sha256(f"world {seed} {index}".encode()).hexdigest()[:8]
-
-
 def make_world(
-    index: int, seed: int, kind: Kind | None = None, effect: str | None = None
+    index: int, seed: int, kind: Kind | None = None, effect: str | None = None, name: str | None = None
 ) -> tuple[Recording, dict[str, object]]:
     """One recording, and the truth about it.
 
@@ -116,6 +116,7 @@ def make_world(
         seed: of the whole set.
         kind: none, effect, other or pair; None: by the mix.
         effect: name of the effect; None: in turn.
+        name: of the world, on which nothing else depends; None: by its seed.
     """
     chosen = assign(index, seed, kind, effect)
     for attempt in range(_ATTEMPTS):
@@ -126,7 +127,7 @@ def make_world(
             break
     motions = simulate(scene, effects)
     size = _difference(scene, motions, simulate(scene, ())) if effects else 0.0
-    name = world_id(index, seed)
+    name = name_by_seed(index, seed) if name is None else name
     pushes = [record(rng, scene, k, motion) for k, motion in enumerate(motions)]
     recording = recording_of(name, scene, [push for push, _ in pushes], _lags(effects))
     truth = _truth(chosen, seed, scene, effects, sizes, size, motions, [poses for _, poses in pushes])
@@ -279,72 +280,112 @@ def _truth(
 def make(
     out: Path,
     worlds: int,
-    seed: int,
+    seed: int | None = None,
     kind: Kind | None = None,
     effect: str | None = None,
     jobs: int = 1,
+    *,
+    names_by_seed: bool = False,
 ) -> str:
     """Writes ``worlds`` worlds and their seal; returns the seal's SHA-256. Worlds that exist are skipped.
 
     Args:
-        out: folder for ``recordings``, ``sealed`` and the seal.
+        out: folder for ``recordings``, ``sealed`` and the seal; new, empty, or of the same settings.
         worlds: how many.
-        seed: of all of them.
+        seed: of all of them; None: as the folder has it, or any.
         kind: only this kind; None: the mix.
         effect: only this effect.
         jobs: processes.
+        names_by_seed: name them by their seed, which is for opened seeds.
+
+    Raises:
+        ConfigError: if the folder holds something else.
+        ProofError: if it is not as it was left.
+        OutputError: if it cannot be written.
     """
-    missing = [index for index in range(worlds) if not _exists(out, world_id(index, seed))]
+    folder = RunFolder.begin(out, COMMAND)
+    for name in (f"{RECORDINGS}/", f"{SEALED}/", LINES, TOTAL):
+        folder.own(name)
+    secret = keep_secret(out, seed, kind, effect, by_seed=names_by_seed)
+    names = secret.names(worlds)
+    missing = [index for index, name in enumerate(names) if not _exists(out, name)]
     begin = time.monotonic()
-    for done, identity in enumerate(_made(out, missing, seed, kind, effect, jobs), start=1):
+    for done, identity in enumerate(_made(out, missing, secret, jobs), start=1):
         left = (time.monotonic() - begin) / done * (len(missing) - done)
         print(f"{identity}  {done}/{len(missing)}  {left:.0f} s left", file=sys.stderr, flush=True)
-    return write_seal(out, [world_id(index, seed) for index in range(worlds)])
+    return write_seal(out, names)
 
 
 def _exists(out: Path, identity: str) -> bool:
-    return (out / "sealed" / f"{identity}.json").is_file() and (out / "recordings" / identity).is_dir()
+    return (out / SEALED / f"{identity}.json").is_file() and (out / RECORDINGS / identity).is_dir()
 
 
-def _made(
-    out: Path, indices: Sequence[int], seed: int, kind: Kind | None, effect: str | None, jobs: int
-) -> Iterator[str]:
+def _made(out: Path, indices: Sequence[int], secret: Secret, jobs: int) -> Iterator[str]:
     if jobs <= 1 or len(indices) <= 1:
-        yield from (_write_world(out, index, seed, kind, effect) for index in indices)
+        yield from (_write_world(out, index, secret) for index in indices)
         return
-    write = functools.partial(_write_world, out, seed=seed, kind=kind, effect=effect)
+    write = functools.partial(_write_world, out, secret=secret)
     yield from (identity for _, identity in in_processes(write, indices, jobs))
 
 
-def _write_world(out: Path, index: int, seed: int, kind: Kind | None, effect: str | None) -> str:
-    """Writes one world, the truth last and at once, so that what was interrupted is made again."""
-    recording, truth = make_world(index, seed, kind, effect)
-    folder, sealed = out / "recordings" / recording.name, out / "sealed" / f"{recording.name}.json"
-    if folder.exists():
+def _write_world(out: Path, index: int, secret: Secret) -> str:
+    """Writes one world, the truth last and at once, so that what was interrupted is made again.
+
+    Raises:
+        ProofError: if something lies where its recording goes that was not begun by such an interrupted making.
+        OutputError: if it cannot be written.
+    """
+    name = secret.name_of(index)
+    recording, truth = make_world(index, secret.seed, kind_of(secret), secret.effect, name)
+    folder, sealed = out / RECORDINGS / name, out / SEALED / f"{name}.json"
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise ProofError(f"'{folder}': must be a folder, or nothing yet; move it away.")
+    if folder.exists():  # without its truth, or it would not be made: what an interrupted making began
         shutil.rmtree(folder)
     write_recording(recording, folder)
     truth[RECORDING] = files_digest(folder)
-    sealed.parent.mkdir(parents=True, exist_ok=True)
-    partial = sealed.with_suffix(".partial")
-    partial.write_text(json.dumps(truth, sort_keys=True) + "\n", encoding="utf-8")
-    partial.rename(sealed)
-    return recording.name
+    write_whole(sealed, (json.dumps(truth, sort_keys=True) + "\n").encode("utf-8"))
+    return name
+
+
+def kind_of(secret: Secret) -> Kind | None:
+    """The kind of a proof's worlds; None for the mix.
+
+    Raises:
+        ProofError: if there is no such kind.
+    """
+    for kind in KINDS:
+        if secret.kind == kind:
+            return kind
+    if secret.kind is not None:
+        raise ProofError(f"no worlds are of kind '{secret.kind}'; there are {', '.join(KINDS)}.")
+    return None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Command line; returns the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m physid_drake.prove.make", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m physid_drake.prove.make", description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
     parser.add_argument("--worlds", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--seed", type=int, help="of all worlds (default: the folder's, or one that is drawn)")
+    parser.add_argument("--out", type=Path, required=True, help="new, empty, or of the same settings")
     parser.add_argument("--kind", choices=KINDS, help="only this kind, instead of the mix")
     parser.add_argument("--effect", choices=[*CATALOGUED, *OTHERS], help="only this effect")
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--names-by-seed", action="store_true", help="as they once were: for opened seeds only")
     given = parser.parse_args(arguments)
     try:
-        seal = make(given.out, given.worlds, given.seed, given.kind, given.effect, given.jobs)
+        for name, value, least in (("seed", given.seed, 0), ("worlds", given.worlds, 1), ("jobs", given.jobs, 1)):
+            if value is not None and value < least:
+                raise ConfigError(f"--{name} must be at least {least}, but is {value}.")
+        seal = make(
+            given.out, given.worlds, given.seed, given.kind, given.effect, given.jobs,
+            names_by_seed=given.names_by_seed,
+        )  # fmt: skip
     except PhysidError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print("error: " + " ".join(str(error).split()), file=sys.stderr)
         return 1
     print(f"seal  sha256 {seal}")
     return 0

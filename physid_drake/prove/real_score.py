@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import math
 import re
 from dataclasses import dataclass
@@ -13,10 +12,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.prove.diagnosing import FRESH_ERRORS, RESULT, attempt_of
+from physid_drake.prove.diagnosing import FRESH_ERRORS, RESULT, attempt_of, verdict_of
 from physid_drake.prove.real import RealCase
-from physid_drake.prove.score import number
+from physid_drake.prove.score import NOT_AS_WRITTEN, described, number
 from physid_drake.prove.shapes import Array
+from physid_drake.prove.written import AGAIN, broken, is_number, read_object
 from physid_drake.recording import read_recording
 
 """Beside a diagnosis: end-point errors of its model on pushes that it did not get."""
@@ -92,6 +92,9 @@ def real_outcome(case: RealCase, published: Path, out: Path) -> RealOutcome:
         case: which.
         published: folder of all published files.
         out: folder of the proof.
+
+    Raises:
+        ProofError: if what was written of it cannot be read.
     """
     recording, folder = out / "recordings" / case.id, out / "diagnoses" / case.id
     pushes = read_recording(recording).pushes
@@ -99,24 +102,35 @@ def real_outcome(case: RealCase, published: Path, out: Path) -> RealOutcome:
     if attempt is None or attempt.error is not None:
         error = "there is no diagnosis." if attempt is None else attempt.error
         return RealOutcome(case=case, pushes=len(pushes), skipped=f"failed: {error}")
-    said = json.loads((folder / RESULT).read_text(encoding="utf-8"))
+    verdict = verdict_of(folder)
+    said = read_object(folder / RESULT, AGAIN)
+    try:
+        return RealOutcome(
+            case=case,
+            pushes=len(pushes),
+            verdict=verdict,
+            fresh=_fresh(folder / FRESH_ERRORS),
+            published=published_errors(published / case.source, [p.note for p in pushes])
+            if case.group == "mit"
+            else None,
+            seconds=attempt.seconds,
+            **_said(case, said),
+        )
+    except NOT_AS_WRITTEN as error:
+        raise broken(folder / RESULT, f"it is not as a diagnosis writes it ({described(error)})", AGAIN) from error
+
+
+def _said(case: RealCase, said: dict[str, Any]) -> dict[str, Any]:
+    """What a diagnosis says, as the fields of an outcome."""
     fit = said["fit"]
-    return RealOutcome(
-        case=case,
-        pushes=len(pushes),
-        verdict=said["verdict"],
-        classes=tuple((e["name"], *e["indistinguishable_from"]) for e in said["effects"]),
-        chi2=(number(said["reduced_chi2_before"]), number(said["reduced_chi2_after"])),
-        position=(number(fit["held_out_rms_before_m"]), number(fit["held_out_rms_after_m"])),
-        rotation=(number(fit["held_out_rms_before_rad"]), number(fit["held_out_rms_after_rad"])),
-        force=(number(fit.get("held_out_rms_before_n")), number(fit.get("held_out_rms_after_n"))),
-        fresh=_fresh(folder / FRESH_ERRORS),
-        published=published_errors(published / case.source, [p.note for p in pushes])
-        if case.group == "mit"
-        else None,
-        pressure=_pressure(case, said) if case.group == "cmu" else None,
-        seconds=attempt.seconds,
-    )
+    return {
+        "classes": tuple((e["name"], *e["indistinguishable_from"]) for e in said["effects"]),
+        "chi2": (number(said["reduced_chi2_before"]), number(said["reduced_chi2_after"])),
+        "position": (number(fit["held_out_rms_before_m"]), number(fit["held_out_rms_after_m"])),
+        "rotation": (number(fit["held_out_rms_before_rad"]), number(fit["held_out_rms_after_rad"])),
+        "force": (number(fit.get("held_out_rms_before_n")), number(fit.get("held_out_rms_after_n"))),
+        "pressure": _pressure(case, said) if case.group == "cmu" else None,
+    }
 
 
 def published_errors(file: Path, notes: list[str]) -> dict[str, tuple[float, float]]:
@@ -232,5 +246,8 @@ def _pressure(case: RealCase, said: dict[str, Any]) -> Pressure | None:
 def _fresh(file: Path) -> tuple[float, float]:
     if not file.is_file():
         return math.nan, math.nan
-    errors = json.loads(file.read_text(encoding="utf-8"))
-    return number(errors["position_m"]), number(errors["rotation_rad"])
+    errors = read_object(file, remedy := "delete it, and it is written again")
+    both = [errors.get("position_m"), errors.get("rotation_rad")]
+    if not all(map(is_number, both)):
+        raise broken(file, "it must have the numbers 'position_m' and 'rotation_rad'", remedy)
+    return number(both[0]), number(both[1])

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import dataclasses as dc
-import json
 import math
 from collections.abc import Sequence
 from itertools import permutations
 from pathlib import Path
 from typing import Any
 
-from physid_drake.prove.diagnosing import RESULT, Attempt, attempt_of
+from physid_drake.prove.diagnosing import RESULT, Attempt, attempt_of, verdict_of
+from physid_drake.prove.seal import REMEDY
+from physid_drake.prove.written import AGAIN, broken, is_number, read_object
+from physid_drake.wording import one_line
 
 FOUND = ("explained", "ambiguous", "unexplained")
 NAMED = ("explained", "ambiguous")
 FAILED = "failed"
 CLEAR = 5.0  # standard deviations of motion: an effect that must be found
 MOST_NAMES = 2  # in a class that counts as the right answer
+_KINDS = ("none", "effect", "pair", "other")
+NOT_AS_WRITTEN = (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError)
+"""What Python raises where JSON holds another value than it should."""
 _NO_ERRORS = (math.nan, math.nan, math.nan)
 _HALF_TURN = math.pi  # rad: a grain is the same from both sides
 # Components of one vector: their errors are over its length, since one of them may be next to nothing.
@@ -190,6 +195,9 @@ def read_outcomes(sealed: Path, diagnoses: Path, identities: Sequence[str] | Non
         sealed: folder of the truths.
         diagnoses: folder with one folder for each world.
         identities: only these worlds; None: all. Those that have not been diagnosed yet are left out.
+
+    Raises:
+        ProofError: if a truth, or what was said of a world, is not as it was written.
     """
     outcomes = []
     names = [file.stem for file in sealed.glob("*.json")] if identities is None else list(identities)
@@ -197,13 +205,67 @@ def read_outcomes(sealed: Path, diagnoses: Path, identities: Sequence[str] | Non
         attempt = attempt_of(diagnoses / name)
         if attempt is None:
             continue
-        truth = json.loads((sealed / f"{name}.json").read_text(encoding="utf-8"))
+        truth = _read_truth(sealed / f"{name}.json")
         if attempt.error is not None:
             outcomes.append(failed_outcome(truth, attempt))
             continue
-        found = json.loads((diagnoses / name / RESULT).read_text(encoding="utf-8"))
-        outcomes.append(outcome(truth, found, attempt.seconds))
+        verdict_of(diagnoses / name)
+        file = diagnoses / name / RESULT
+        try:
+            outcomes.append(checked(outcome(truth, read_object(file, AGAIN), attempt.seconds)))
+        except NOT_AS_WRITTEN as error:
+            raise broken(file, f"it is not as a diagnosis writes it ({described(error)})", AGAIN) from error
     return outcomes
+
+
+def _read_truth(file: Path) -> dict[str, Any]:
+    """What was put into a world.
+
+    Raises:
+        ProofError: if it cannot be read, or is not as the worlds' maker writes it.
+    """
+    truth = read_object(file, REMEDY)
+    rules = {
+        "'id' must be a text": isinstance(truth.get("id"), str),
+        f"'kind' must be one of {', '.join(_KINDS)}": truth.get("kind") in _KINDS,
+        "'size_sigma' must be a number": is_number(truth.get("size_sigma")),
+        "'effects' must be a list of names with their parameters": _are_effects(truth.get("effects")),
+        "'theta' must be numbers by name": _are_numbers(truth.get("theta", {})),
+        "'held_out_floor' must be numbers by name": _are_numbers(truth.get("held_out_floor", {})),
+    }
+    for rule, holds in rules.items():
+        if not holds:
+            raise broken(file, rule, REMEDY)
+    return truth
+
+
+def _are_effects(value: object) -> bool:
+    return isinstance(value, list) and all(
+        isinstance(one, dict) and isinstance(one.get("name"), str) and isinstance(one.get("parameters"), dict)
+        for one in value
+    )
+
+
+def _are_numbers(value: object) -> bool:
+    return isinstance(value, dict) and all(one is None or is_number(one) for one in value.values())
+
+
+def checked(found: Outcome) -> Outcome:
+    """An outcome whose names are words and whose figures are numbers; JSON may hold anything.
+
+    Raises:
+        TypeError: if they are not.
+    """
+    if not all(isinstance(name, str) for names in found.classes for name in names):
+        raise TypeError("a name must be a text")
+    if not all(map(is_number, (*found.probabilities, *found.errors, *found.theta_errors))):
+        raise TypeError("a probability or an error must be a number")
+    return found
+
+
+def described(error: Exception) -> str:
+    """Why a value is not as it was written, in words."""
+    return f"it has no {error}" if isinstance(error, KeyError) else one_line(error)
 
 
 def _parameters(true: Sequence[dict[str, Any]], effect: dict[str, Any]) -> list[tuple[float, bool]]:

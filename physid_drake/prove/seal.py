@@ -7,20 +7,27 @@ sealed file has the hash of its recording, so that the seal is over the recordin
 from __future__ import annotations
 
 import hashlib
-import json
+import re
 import stat
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
 from physid_drake.errors import ProofError
+from physid_drake.files import FileError, MissingFileError, read_bytes, read_text
+from physid_drake.prove.written import broken, read_object
+from physid_drake.run_folder import write_whole
+from physid_drake.wording import shown
 
 SEALED: Final = "sealed"
 LINES: Final = "seal.txt"
 TOTAL: Final = "seal.sha256"
 RECORDING: Final = "recording_sha256"
 """Key, in the truth, of `files_digest` of the recording."""
+REMEDY: Final = "put it back as it was, or choose another --out"
+"""What to do about a file that was sealed."""
+_LINE: Final = re.compile(rf"([0-9a-f]{{64}})  {SEALED}/([\w-]+)\.json")
 
 
 def files_digest(folder: Path) -> str:
@@ -43,10 +50,7 @@ def seal_of(folder: Path, identities: Sequence[str]) -> str:
     Raises:
         ProofError: if one is missing.
     """
-    total = hashlib.sha256()
-    for identity, digest in sorted(_digests(folder, identities).items()):
-        total.update(f"{identity} {digest}\n".encode())
-    return total.hexdigest()
+    return _total(_digests(folder, identities))
 
 
 def write_seal(out: Path, identities: Sequence[str]) -> str:
@@ -60,6 +64,7 @@ def write_seal(out: Path, identities: Sequence[str]) -> str:
 
     Raises:
         ProofError: if a file is missing, or is not as it was when it was sealed.
+        OutputError: if the seal cannot be written.
     """
     digests = _digests(out / SEALED, identities)
     earlier = _read_lines(out / LINES)
@@ -69,10 +74,12 @@ def write_seal(out: Path, identities: Sequence[str]) -> str:
             f"'{out / SEALED / changed[0]}.json' has changed since it was sealed in '{out / LINES}';"
             " choose another --out."
         )
-    lines = [f"{digest}  {SEALED}/{name}.json\n" for name, digest in sorted({**earlier, **digests}.items())]
-    (out / LINES).write_text("".join(lines), encoding="utf-8")
-    total = seal_of(out / SEALED, sealed_names(out))
-    (out / TOTAL).write_text(f"{total}\n", encoding="utf-8")
+    everything = {**earlier, **digests}
+    lines = [f"{digest}  {SEALED}/{name}.json\n" for name, digest in sorted(everything.items())]
+    total = seal_of(out / SEALED, list(everything))
+    # Whoever is killed between the two begins again from the first, which says all that the second does.
+    write_whole(out / LINES, "".join(lines).encode("utf-8"))
+    write_whole(out / TOTAL, f"{total}\n".encode())
     return total
 
 
@@ -80,12 +87,17 @@ def read_seal(out: Path) -> str:
     """The hash over all that was written down.
 
     Raises:
-        ProofError: if nothing was sealed here.
+        ProofError: if nothing was sealed here, or what was written down is no such hash.
     """
     try:
-        return (out / TOTAL).read_text(encoding="utf-8").strip()
-    except OSError as error:
+        written = read_text(out / TOTAL).strip()
+    except MissingFileError as error:
         raise ProofError(f"'{out}' holds no sealed worlds: run the command without --open first.") from error
+    except FileError as error:
+        raise ProofError(f"'{out / TOTAL}' {error}; {REMEDY}.") from error
+    if re.fullmatch(r"[0-9a-f]{64}", written) is None:
+        raise broken(out / TOTAL, f"it must be 64 hex digits, but is {shown(written)}", REMEDY)
+    return written
 
 
 def sealed_names(out: Path) -> list[str]:
@@ -103,7 +115,13 @@ def check_seal(out: Path, written: str) -> None:
     Raises:
         ProofError: if a hash is another now.
     """
-    identities = sealed_names(out)
+    lines = _read_lines(out / LINES)
+    if _total(lines) != written:
+        raise ProofError(
+            f"the seal is broken: '{out / LINES}' has other hashes than {written}, which was written down over them;"
+            " nothing is scored. If sealing was interrupted, the command without --open ends it."
+        )
+    identities = sorted(lines)
     now = seal_of(out / SEALED, identities)
     if now != written:
         raise ProofError(
@@ -111,7 +129,7 @@ def check_seal(out: Path, written: str) -> None:
             " diagnosis; nothing is scored."
         )
     for identity in identities:
-        sealed = json.loads((out / SEALED / f"{identity}.json").read_text(encoding="utf-8")).get(RECORDING)
+        sealed = read_object(out / SEALED / f"{identity}.json", REMEDY).get(RECORDING)
         if sealed is not None and files_digest(out / "recordings" / identity) != sealed:
             raise ProofError(
                 f"the seal is broken: '{out / 'recordings' / identity}' is not the recording that was sealed; nothing"
@@ -123,7 +141,8 @@ def check_seal(out: Path, written: str) -> None:
 def shut(folder: Path) -> Iterator[None]:
     """Take all permissions off a folder while the block runs, and give them back whatever ends it.
 
-    It stops any user but root; against root there is the blindfold (`physid_drake.prove.blindfold`).
+    It stops any user but root. Where the system allows it, the folder is hidden from a diagnosis altogether
+    (`physid_drake.prove.hiding`); where not, there is the blindfold (`physid_drake.prove.blindfold`) against root.
     """
     unlock(folder)
     before = stat.S_IMODE(folder.stat().st_mode)
@@ -140,24 +159,47 @@ def unlock(folder: Path) -> None:
         folder.chmod(0o755)
 
 
+def shut_error(file: Path) -> ProofError:
+    """What to raise where a sealed file may not be read."""
+    return ProofError(
+        f"sealed truth '{file}': is shut, as while worlds are diagnosed; where nothing runs any more, the command"
+        " without --open gives it back."
+    )
+
+
 def _digests(folder: Path, identities: Sequence[str]) -> dict[str, str]:
     digests = {}
     for identity in identities:
         file = folder / f"{identity}.json"
         try:
-            digests[identity] = hashlib.sha256(file.read_bytes()).hexdigest()
-        except PermissionError as error:
-            raise ProofError(
-                f"sealed truth '{file}': is shut, as while worlds are diagnosed; where nothing runs any more, the"
-                " command without --open gives it back."
-            ) from error
-        except OSError as error:
-            raise ProofError(f"sealed truth '{file}': cannot be read: {error.strerror or error}.") from error
+            digests[identity] = hashlib.sha256(read_bytes(file)).hexdigest()
+        except FileError as error:
+            if isinstance(error.__cause__, PermissionError):
+                raise shut_error(file) from error
+            raise ProofError(f"sealed truth '{file}': cannot be read: {error}; {REMEDY}.") from error
     return digests
 
 
+def _total(digests: Mapping[str, str]) -> str:
+    total = hashlib.sha256()
+    for identity, digest in sorted(digests.items()):
+        total.update(f"{identity} {digest}\n".encode())
+    return total.hexdigest()
+
+
 def _read_lines(file: Path) -> dict[str, str]:
-    if not file.is_file():
+    """Hashes that were written down, by the world's name; none where there is no such file."""
+    try:
+        text = read_text(file)
+    except MissingFileError:
         return {}
-    rows = [line.split(maxsplit=1) for line in file.read_text(encoding="utf-8").splitlines() if line.strip()]
-    return {Path(name).stem: digest for digest, name in rows}
+    except FileError as error:
+        raise ProofError(f"'{file}' {error}; {REMEDY}.") from error
+    digests = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        found = _LINE.fullmatch(line)
+        if found is None:
+            rule = f"line {number} must be '<sha256>  {SEALED}/<world>.json', but is {shown(line)}"
+            raise broken(file, rule, REMEDY)
+        digests[found[2]] = found[1]
+    return digests

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses as dc
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.table import Table
@@ -35,6 +35,7 @@ class Proof:
         outcomes: of those that were diagnosed, by name.
         figures: of them.
         versions: of the packages that made it.
+        hidden_by: what hid the truth from the diagnoses, and from how many.
     """
 
     seed: int
@@ -44,6 +45,7 @@ class Proof:
     outcomes: tuple[Outcome, ...]
     figures: Figures
     versions: dict[str, str]
+    hidden_by: Mapping[str, int] = dc.field(default_factory=dict)
 
     @property
     def faults(self) -> tuple[Outcome, ...]:
@@ -73,6 +75,7 @@ def proof_json(proof: Proof) -> str:
         "kind": proof.kind,
         "seal_sha256": proof.seal,
         "sealed": proof.sealed,
+        "hidden_by": dict(proof.hidden_by),
         "versions": proof.versions,
         "figures": figures,
         "faults": [
@@ -152,6 +155,7 @@ def proof_markdown(proof: Proof) -> str:
     parts = [
         "# Proof on sealed worlds",
         f"{_worlds(proof)}, seed {proof.seed}. Seal, written down before the diagnosis: `sha256 {proof.seal}`.",
+        *_hidden(proof),
         f"{', '.join(f'{name} {version}' for name, version in proof.versions.items())}.",
         _markdown(MAIN, table(figures)),
         "## Power against the size of the effect",
@@ -174,6 +178,13 @@ def proof_markdown(proof: Proof) -> str:
         ),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _hidden(proof: Proof) -> list[str]:
+    """What hid the truth from the diagnoses; nothing of a proof that does not say so."""
+    worlds = sum(proof.hidden_by.values())
+    parts = [f"{what}, {count} of {worlds}" for what, count in proof.hidden_by.items()]
+    return [f"What hid the truth from the diagnoses: {'; '.join(parts)}."] if parts else []
 
 
 def _worlds(proof: Proof) -> str:

@@ -13,8 +13,8 @@ from physid_drake import run_prove
 from physid_drake.cli import build_parser, main
 from physid_drake.errors import ProofError
 from physid_drake.prove.diagnosing import Task, attempt_of, diagnose_all, diagnose_command
-from physid_drake.prove.make import world_id
 from physid_drake.prove.seal import write_seal
+from physid_drake.prove.secret import keep_secret, read_secret
 from physid_drake.run_folder import RunFolder
 
 # Notes that it was called, then does as the world's answer says.
@@ -54,7 +54,7 @@ def worlds(tmp_path, monkeypatch):
     """Three worlds, as if they had been made: one is right without an effect, one named, one fails."""
 
     def make(arguments, count, out, console):
-        names = [world_id(k, arguments.seed) for k in range(count)]
+        names = read_secret(out).names(count)
         for name, (kind, true, answer) in zip(names, ANSWERS, strict=False):
             for part in ("sealed", f"recordings/{name}"):
                 (out / part).mkdir(parents=True, exist_ok=True)
@@ -75,6 +75,10 @@ def prove(out, *words):
     return run_prove.run(arguments, command=fake)
 
 
+def world(out, index):
+    return read_secret(out).name_of(index)
+
+
 def calls(out):
     file = out / "calls.txt"
     return file.read_text().split() if file.exists() else []
@@ -83,7 +87,7 @@ def calls(out):
 def test_a_world_that_fails_is_counted_and_listed_and_ends_nothing(worlds, capsys):
     assert prove(worlds) == 0
     content = json.loads((worlds / "proof.json").read_text())
-    lost = world_id(2, 0)
+    lost = world(worlds, 2)
     assert content["faults"] == [
         {"id": lost, "fault": "failed", "true": ["table_tilt"], "size_sigma": 8.0,
          "said": "failed (error: the cell fell apart.)"}
@@ -96,7 +100,7 @@ def test_a_world_that_fails_is_counted_and_listed_and_ends_nothing(worlds, capsy
     for name in ("proof.md", "page.html", "confusion.png"):
         assert (worlds / name).stat().st_size > 500
     said = capsys.readouterr().out
-    assert said.index("sha256 " + content["seal_sha256"]) < said.index(world_id(0, 0))  # before the first diagnosis
+    assert said.index("sha256 " + content["seal_sha256"]) < said.index(world(worlds, 0))  # before the first diagnosis
 
 
 def test_what_is_done_is_not_done_again(worlds):
@@ -106,7 +110,7 @@ def test_what_is_done_is_not_done_again(worlds):
     assert len(calls(worlds)) == 3
     assert (worlds / "proof.json").read_bytes() == first
     prove(worlds, "--retry")
-    assert calls(worlds)[3:] == [world_id(2, 0)]
+    assert calls(worlds)[3:] == [world(worlds, 2)]
 
 
 def test_an_interrupted_run_keeps_what_is_finished_and_opens_the_seal_again(worlds, monkeypatch):
@@ -172,7 +176,7 @@ def test_fewer_worlds_can_be_scored_of_more_that_are_sealed(worlds):
 
 def test_a_proof_where_it_is_by_default_is_opened_whole(worlds, monkeypatch):
     monkeypatch.chdir(worlds.parent)
-    prove(Path("proofs") / "seed_0")
+    prove(Path("proofs") / "worlds")
     assert run_prove.run(build_parser().parse_args(["prove", "--open"]), command=fake) == 0
 
 
@@ -195,7 +199,7 @@ def test_a_broken_seal_is_refused(worlds, monkeypatch):
 
     def tamper(*arguments):
         run_tasks(*arguments)
-        file = worlds / "sealed" / f"{world_id(1, 0)}.json"
+        file = worlds / "sealed" / f"{world(worlds, 1)}.json"
         (worlds / "sealed").chmod(0o755)
         file.write_text(file.read_text().replace("viscous_drag", "table_tilt"))
 
@@ -214,6 +218,7 @@ def test_there_is_nothing_to_open_before_worlds_are_sealed_and_diagnosed(worlds,
     assert not (tmp_path / "empty").exists()
     for name in ("sealed/", "recordings/", "seal.txt", "seal.sha256"):
         RunFolder.begin(worlds, "prove").own(name)
+    keep_secret(worlds, 0)
     run_prove._make(build_parser().parse_args(["prove"]), 3, worlds, None)
     with pytest.raises(ProofError, match="none of the 3 sealed worlds"):
         prove(worlds, "--open")

@@ -140,7 +140,8 @@ def proof():
 def test_the_json_has_fixed_keys_and_seconds_stand_alone(proof):
     content = json.loads(proof_json(proof))
     assert set(content) == {
-        "format", "seed", "kind", "seal_sha256", "sealed", "versions", "figures", "faults", "outcomes", "seconds",
+        "format", "seed", "kind", "seal_sha256", "sealed", "hidden_by", "versions", "figures", "faults", "outcomes",
+        "seconds",
     }  # fmt: skip
     assert content["figures"]["not_catalogued"]["abstained"]["share"] == 0.5
     assert content["seconds"] == {"median": 80.0, "max": 100.0, "worlds": {"04": 60.0, "05": 100.0}}
