@@ -22,9 +22,10 @@ from physid_drake.identify.frames import unseen_motion
 from physid_drake.identify.noise import Noise
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
 from physid_drake.identify.problem import PushProblem, problems_of, spec_of
+from physid_drake.identify.refusals import refuse
 from physid_drake.identify.rollouts import RolloutPool
 from physid_drake.identify.theta import ThetaMap, friction_names, theta_map
-from physid_drake.recording import Recording, thinned
+from physid_drake.recording import Push, Recording, rest_segments, thinned
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -157,10 +158,11 @@ def case_of(
         most: pushes to look at; of more, so many are taken at equal distances.
 
     Raises:
-        RecordingError: if the object never moves, or there is no push.
+        RecordingError: if the object never moves, there is no push, or one cannot be compared with a simulation.
     """
     if not recording.pushes:
         raise RecordingError(f"recording '{recording.name}': there is no push to diagnose; record at least three.")
+    refuse(recording)
     recording = thinned(recording)
     noise, sensors = tracker_noise(recording)
     orders = np.unique(
@@ -168,12 +170,12 @@ def case_of(
     )
     count = len(recording.pushes)
     recording = recording.subset(orders.tolist())
+    _refuse_still(recording, noise)
     solid = solid_of(recording.object.shape)
     problems = tuple(
         dc.replace(_paced(_floored(p), config), order=int(order))
         for p, order in zip(problems_of(recording, sensors, solid.height), orders, strict=True)
     )
-    _refuse_still(recording, problems, noise)
     grid = (config.friction_cells[0], config.friction_cells[1])
     thetas = theta_map(recording.object, solid, grid, theta, config.default_density_kgpm3)
     pushes = recording.pushes
@@ -235,13 +237,20 @@ def _paced(problem: PushProblem, config: CellConfig) -> PushProblem:
     return dc.replace(problem, pace=max(p for p in PACES if p <= max(1.0, min(longest, limit))))
 
 
-def _refuse_still(recording: Recording, problems: Sequence[PushProblem], noise: TrackerNoise) -> None:
-    moved = max(float((np.abs(p.poses - np.array(p.start.pose)) / noise.sigmas).max(initial=0.0)) for p in problems)
+def _refuse_still(recording: Recording, noise: TrackerNoise) -> None:
+    moved = max(_way(push, noise) for push in recording.pushes)
     if moved < LEAST_MOTION:
         raise RecordingError(
             f"recording '{recording.name}': the object never moves by more than the tracker's noise"
             f" ({1e3 * noise.position:.2g} mm); there is nothing to diagnose."
         )
+
+
+def _way(push: Push, noise: TrackerNoise) -> float:
+    """How far an object comes from where it rests at first, at most, in standard deviations of the tracker."""
+    planar, rests = push.object.planar, rest_segments(push)
+    start = planar[rests[0]].mean(axis=0) if rests and rests[0].start == 0 else planar[0]
+    return float((np.abs(planar - start) / noise.sigmas).max())
 
 
 def _surroundings(recording: Recording, problems: Sequence[PushProblem], thetas: ThetaMap) -> Surroundings:

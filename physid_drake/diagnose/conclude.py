@@ -40,6 +40,7 @@ from physid_drake.diagnose.values import (
 from physid_drake.diagnose.verdict import FEWEST_PUSHES, is_own_error, p_value_of, verdict_of
 from physid_drake.identify.identify import MOST_SCATTER
 from physid_drake.identify.misfit import diverged
+from physid_drake.identify.stated import quieter_by
 
 Array = NDArray[np.float64]
 
@@ -66,6 +67,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
             partly,
             evidence.foil,
             known=case.noise.known,
+            quieter=quieter_by(plain.reduced_chi2, plain.degrees),
             fewest=FEWEST_PUSHES if len(case.problems) < FEWEST_PUSHES else None,
         ),
         p_value=p_value,

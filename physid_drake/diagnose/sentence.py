@@ -8,7 +8,7 @@ from physid_drake.diagnose.foils import Foil
 from physid_drake.diagnose.values import EffectFinding, Partly
 
 
-def _nothing_found(verdict: str, *, fewest: int | None, known: bool) -> str:
+def _nothing_found(verdict: str, *, fewest: int | None, known: bool, quieter: float | None) -> str:
     if verdict == "underpowered" and fewest is not None:
         return f"These pushes cannot tell: it takes at least {fewest} to say what is missing."
     if verdict == "underpowered":
@@ -17,6 +17,11 @@ def _nothing_found(verdict: str, *, fewest: int | None, known: bool) -> str:
         return (
             "The plain cell explains these pushes as far as they tell: their noise, which nobody states and no rest"
             " shows, is taken to be as large as what it leaves."
+        )
+    if quieter is not None:
+        return (
+            "The plain cell explains these pushes as far as they tell: the noise that counts, stated or seen, is"
+            f" {quieter:.2g} times what is left, and nothing smaller than it can be seen."
         )
     return "The plain cell explains these pushes: nothing is missing that they could show."
 
@@ -29,6 +34,7 @@ def sentence(
     *,
     fewest: int | None = None,
     known: bool = True,
+    quieter: float | None = None,
 ) -> str:
     """The verdict in words.
 
@@ -39,10 +45,11 @@ def sentence(
         foil: a law beside the catalogue that does better, if there is one.
         fewest: pushes that it takes to say anything; None where there are as many.
         known: whether the noise was stated or seen.
+        quieter: how many times the noise is larger than what the plain cell leaves, where it is far larger.
     """
     match verdict:
         case "consistent" | "underpowered":
-            return _nothing_found(verdict, fewest=fewest, known=known)
+            return _nothing_found(verdict, fewest=fewest, known=known, quieter=quieter)
         case "unexplained" if partly is not None:
             return (
                 "Simulation and recording differ, and nothing in the catalogue accounts for all of it:"

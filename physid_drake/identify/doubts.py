@@ -9,6 +9,8 @@ from physid_drake.cell.solid import solid_of
 from physid_drake.identify.force_windows import WINDOW, too_seldom
 from physid_drake.identify.frames import AT_A_TIME, SELDOM, UNSEEN_WAY, depths_at_touch
 from physid_drake.identify.hand_stream import touching_radius
+from physid_drake.identify.plausible import implausible, some_names
+from physid_drake.identify.stated import too_loud
 from physid_drake.recording import Cylinder, Push, Recording
 
 LEANS = 8.0  # degrees by which an object's lean changes: on a table it stands on its face
@@ -24,6 +26,8 @@ def doubts(recording: Recording) -> tuple[str, ...]:
         *_beside_the_tip(recording),
         *_sparse_forces(recording),
         *_hand_seldom_seen(recording),
+        *implausible(recording),
+        *too_loud(recording),
     )
 
 
@@ -37,7 +41,7 @@ def _leaning(recording: Recording) -> tuple[str, ...]:
         return ()
     return (
         f"the object's lean changes by more than {LEANS:.0f} degrees while it is on the table; are its quaternions in"
-        f" the order w, x, y, z? {', '.join(names)}",
+        f" the order w, x, y, z? {some_names(names)}",
     )
 
 
@@ -48,7 +52,7 @@ def _rising(recording: Recording) -> tuple[str, ...]:
         return ()
     return (
         f"the object's height changes by more than {1e3 * RISES:.0f} mm; is it on the table all the time, and is z of"
-        f" W the table's normal? {', '.join(names)}",
+        f" W the table's normal? {some_names(names)}",
     )
 
 
@@ -63,7 +67,7 @@ def _sparse_forces(recording: Recording) -> tuple[str, ...]:
     if not names:
         return ()
     return (
-        f"forces are compared as means over {WINDOW:g} s, and in none of these are two samples: {', '.join(names)};"
+        f"forces are compared as means over {WINDOW:g} s, and in none of these are two samples: {some_names(names)};"
         " they are not used",
     )
 
@@ -75,7 +79,7 @@ def _hand_seldom_seen(recording: Recording) -> tuple[str, ...]:
         return ()
     return (
         f"the hand is seen less often than every {SELDOM:g} s and goes more than {1e3 * UNSEEN_WAY:.0f} mm in"
-        f" between: {', '.join(names)}; when it touches the object and when it brakes is hardly known; record it at"
+        f" between: {some_names(names)}; when it touches the object and when it brakes is hardly known; record it at"
         " 100 Hz",
     )
 

@@ -51,7 +51,7 @@ def force_windows(push: Push, path: HandPath | None, sensor_std: float, start_st
     if push.force is None:
         return ForceWindows(middles=np.zeros(0), means=np.zeros((0, 2)), stds=np.zeros(0))
     times, forces = push.force.times, push.force.forces[:, :2]
-    parts = _windows(times)
+    parts = windows_of(times)
     middles = np.array([times[part].mean() for part in parts])
     means = np.array([forces[part].mean(axis=0) for part in parts]).reshape(-1, 2)
     white = sensor_std / np.sqrt([len(part) for part in parts])
@@ -65,13 +65,14 @@ def force_windows(push: Push, path: HandPath | None, sensor_std: float, start_st
 
 def too_seldom(push: Push) -> bool:
     """Whether forces are recorded, but none of their windows has two samples."""
-    return push.force is not None and not _windows(push.force.times)
+    return push.force is not None and not windows_of(push.force.times)
 
 
-def _windows(times: Array) -> list[NDArray[np.intp]]:
+def windows_of(times: Array) -> list[NDArray[np.intp]]:
     """Indices of the samples of each window; of one sample none is made."""
-    index = np.floor((times - times[0]) / WINDOW + 1e-6).astype(np.intp)
-    return [np.flatnonzero(index == k) for k in np.unique(index) if np.count_nonzero(index == k) >= 2]
+    index = np.floor((times - times[0]) / WINDOW + 1e-6)
+    windows = np.split(np.arange(len(times)), np.flatnonzero(np.diff(index)) + 1)
+    return [window for window in windows if len(window) >= 2]
 
 
 def _struck(samples: Sequence[Array], means: Array, white: Array) -> Mask:

@@ -24,6 +24,7 @@ from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
 from physid_drake.identify.polish import Polished, Polisher
 from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.problem import PushProblem, problems_of, spec_of
+from physid_drake.identify.refusals import refuse
 from physid_drake.identify.rollouts import RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, cell_error, range_of, theta_map
 from physid_drake.progress import Progress
@@ -164,7 +165,11 @@ class Identifier:
             held_out_share: of the pushes that are not fitted.
             seed: of everything random.
             state: a file in which the search's belief is kept, to go on from.
+
+        Raises:
+            RecordingError: if the recording cannot be identified from; ``identify/refusals.py`` has all reasons.
         """
+        refuse(recording)
         solid = solid_of(recording.object.shape)
         self.recording = recording
         short = thinned(recording)

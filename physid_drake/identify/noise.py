@@ -86,7 +86,7 @@ def noise_of(recording: Recording) -> Noise:
     """The recording's noise: what its sensors state, else what is seen at rest, else an assumption."""
     seen: NoiseEstimate = estimate_noise(recording)
     stated = recording.sensors
-    hand_std, hand_memory = _hand_noise(recording)
+    hand_std, hand_memory = hand_noise(recording)
     often = _hand_interval(recording) < SLOW_HAND
     source: dict[str, str] = {}
 
@@ -132,7 +132,7 @@ def _hand_interval(recording: Recording) -> float:
     return float(np.median(np.concatenate(gaps))) if gaps else 0.0
 
 
-def _hand_noise(recording: Recording) -> tuple[float | None, float]:
+def hand_noise(recording: Recording) -> tuple[float | None, float]:
     """Standard deviation [m] and correlation time [s] of the hand's noise.
 
     Taken for white, as it shows where a hand creeps so slowly that it looks at rest, unless rests clearly tell more.

@@ -13,7 +13,6 @@ from physid_drake.cell import CellConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.identify.cells import cells_told, tied_cells
 from physid_drake.identify.config import SearchConfig, ThetaConfig
-from physid_drake.identify.frames import checks_of
 from physid_drake.identify.identify import Accuracy, Identification, accuracy_of, estimates_of, pooled
 from physid_drake.identify.linearise import PushTerm, linearised, prior_slope
 from physid_drake.identify.misfit import whitened_residual
@@ -29,6 +28,7 @@ from physid_drake.identify.polish import (
 )
 from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.problem import PushProblem, problems_of, spec_of
+from physid_drake.identify.refusals import refuse
 from physid_drake.identify.rollouts import RolloutPool, Task
 from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.progress import Progress
@@ -122,8 +122,8 @@ class OnlineIdentifier:
         """Prepare.
 
         Args:
-            recording: says what is pushed, by what and how it is measured; of its pushes, if it has any, only whether
-                hand and object can meet in them.
+            recording: says what is pushed, by what and how it is measured; its pushes, if it has any, are asked only
+                whether one could learn from them.
             cell: how pushes are simulated.
             theta: what is unknown.
             search: its method and number of processes; the other numbers are those of the batch search.
@@ -133,10 +133,9 @@ class OnlineIdentifier:
             progress: told stage, steps done, steps in all.
 
         Raises:
-            RecordingError: if the mass is impossible, or no hand is where its object is.
+            RecordingError: if the recording cannot be learned from; ``identify/refusals.py`` has all reasons.
         """
-        for check in checks_of(recording):
-            check()
+        refuse(recording)
         solid = solid_of(recording.object.shape)
         grid = (cell.friction_cells[0], cell.friction_cells[1])
         free = theta_map(recording.object, solid, grid, theta, cell.default_density_kgpm3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from physid_drake.cell.hand_fit import fit_uncertain_paths
 from physid_drake.cell.hand_path import PathError
 from physid_drake.cell.solid import solid_of
 from physid_drake.identify.force_windows import force_windows
-from physid_drake.identify.frames import FEWEST_FREE, checks_of, hand_seen_until, push_checks_of
+from physid_drake.identify.frames import FEWEST_FREE, check_clocks, checks_of, hand_seen_until, push_checks_of
 from physid_drake.identify.hand_stream import beside_object, touching_radius, vertical_reach, while_pushing
 from physid_drake.identify.noise import Noise
 from physid_drake.recording import Cylinder as CylinderShape
@@ -117,7 +118,10 @@ def problems_of(recording: Recording, noise: Noise, height: float, *, whole: boo
         RecordingError: if the hand passes above the object, never comes near it or is far inside it, or if an object
             stands beside the table, tips, has an impossible mass, or cannot be compared.
     """
-    for check in checks_of(recording) if whole else ():
+    checks = list(checks_of(recording)) if whole else []
+    for push in recording.pushes:
+        checks += [partial(check_clocks, push), *push_checks_of(recording, push)]
+    for check in checks:
         check()
     hands = {k: beside_object(recording, push, height, noise.position) for k, push in enumerate(recording.pushes)}
     hands = {k: hand and while_pushing(recording.pushes[k], hand) for k, hand in hands.items()}
@@ -142,8 +146,6 @@ def _problem(
     begin = float(push.object.times[0])
     path = None if fitted[0] is None else fitted[0].with_run_up(begin)
     path_errors = tuple(replace(error, path=error.path.with_run_up(begin)) for error in fitted[1])
-    for check in push_checks_of(recording, push):
-        check()
     planar = push.object.planar
     start, start_std, first = _start_of(push, planar, noise, free=path is None)
     forces = force_windows(push, path, noise.force, float(start_std[0]))

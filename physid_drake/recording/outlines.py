@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from physid_drake.errors import RecordingError
+from physid_drake.recording.limits import check_lengths
 
 CENTROID_TOLERANCE: Final = 1e-4
 """A prism's centroid may be this far from the origin of B, in m."""
@@ -35,6 +36,8 @@ def check_polygon(polygon: Sequence[Sequence[float]]) -> None:
     vertices = np.asarray(polygon, dtype=np.float64)
     if vertices.ndim != 2 or vertices.shape[1] != 2 or len(vertices) < 3 or not np.isfinite(vertices).all():
         raise RecordingError(f"polygon_m must be at least three finite [x, y] pairs, but got {len(polygon)} rows.")
+    for name, across in zip("xy", np.ptp(np.clip(vertices, -1e9, 1e9), axis=0).tolist(), strict=True):
+        check_lengths(f"polygon_m's extent along {name}", across)
     edges = np.roll(vertices, -1, axis=0) - vertices
     following = np.roll(edges, -1, axis=0)
     turns = edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0]

@@ -216,7 +216,9 @@ def _check_seconds(table: _PushTable, times: Array, what: str) -> None:
         raise RecordingError(f"{table.file}: column {TIME}: {error}") from error
 
 
-def _check_near(table: _PushTable, rows: npt.NDArray[np.intp], columns: Sequence[str], most: float, unit: str) -> None:
+def _check_near(
+    table: _PushTable, rows: npt.NDArray[np.intp], columns: Sequence[str], most: float, unit: str
+) -> None:
     """Refuse what is out of all proportion, which overflows in whatever is made of it."""
     values = table.group(columns)[rows]
     k = first_beyond(values, most)

@@ -19,6 +19,7 @@ LONGEST = 60  # samples of a rest that are looked at together
 CLOSEST = 0.5  # intervals: samples that are stamped closer together come from bursts, or from two clocks
 UNCORRELATED = 0.02  # from sample to sample
 FEWEST = 10  # samples of a rest that tells a noise, if with much doubt
+MOST_RESTS = 2000  # more tell nothing more
 SILENT = 0.1  # of the finest: a rest that is quieter than that tells no noise
 
 
@@ -52,6 +53,7 @@ def seen_noise(pieces: Sequence[tuple[Array, Array]], finest: float) -> SeenNois
         None where the rests are too few, or silent: a coarse or filtered stream that stands still tells no noise.
     """
     rests = [(t[:LONGEST], v[:LONGEST]) for t, v in pieces if len(t) >= FEWEST]
+    rests = rests[:: max(1, -(-len(rests) // MOST_RESTS))]
     if not rests:
         return None
     interval = float(np.median([usual_interval(t) for t, _ in rests]))

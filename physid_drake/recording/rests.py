@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 from scipy import stats
-from scipy.linalg import toeplitz
 
+from physid_drake.recording.clocks import samples_within
 from physid_drake.recording.values import Array, PoseStream
 
 Flags = npt.NDArray[np.bool_]
@@ -39,6 +39,12 @@ QUIET_SHARE: Final = 0.35
 
 GROWTH: Final = 1.3
 """From one length to the next at which a rest is asked whether it still is one."""
+
+MOST_BLOCKS: Final = 1000
+"""Of a rest are looked at: their median tells what scatters, and no log of hours takes longer."""
+
+FEWEST_IN_BLOCK: Final = 3
+"""Samples, of which fewer show no scatter; so seldom seen, a block is longer than ``LONG``."""
 
 _LIMITS: Final = np.array([REST_SPEED, REST_SPEED, REST_TURN_RATE])
 
@@ -73,10 +79,9 @@ def _rests(times: Array, planar: Array, *, slow: bool) -> list[slice]:
 def _still(times: Array, planar: Array, *, slow: bool) -> list[slice]:
     """Slices whose windows show no motion."""
     interval = float(np.median(np.diff(times)))
-    half = min(max(3, round(0.5 * REST_WINDOW / interval)), len(times) // 3)
+    half = min(max(3, samples_within(0.5 * REST_WINDOW, interval, len(times))), len(times) // 3)
     still = np.ones(len(times) - 2 * half + 1, dtype=np.bool_)
-    averages = np.apply_along_axis(lambda c: np.convolve(c, np.full(half, 1.0 / half), "valid"), 0, planar)
-    centres = np.convolve(times, np.full(half, 1.0 / half), "valid")
+    averages, centres = _means(planar, half), _means(times[:, None], half)[:, 0]
     spans = centres[half:] - centres[:-half]
     changes = np.abs(averages[half:] - averages[:-half])
     for columns, limit in (([0, 1], REST_SPEED), ([2], REST_TURN_RATE)):
@@ -85,6 +90,13 @@ def _still(times: Array, planar: Array, *, slow: bool) -> list[slice]:
         allowed = limit * spans + 4.0 * noise
         still &= (changes[:, columns] <= allowed[:, None]).all(axis=1)
     return _runs(still, half, len(times))
+
+
+def _means(values: Array, count: int) -> Array:
+    """Means of so many neighbours (n - count + 1, k) of values (n, k), less the first value."""
+    sums = np.cumsum(np.vstack([np.zeros(values.shape[1]), values - values[0]]), axis=0)
+    means: Array = (sums[count:] - sums[:-count]) / count
+    return means
 
 
 def _white_noise(values: Array, half: int) -> float:
@@ -99,7 +111,7 @@ def _slow_noise(values: Array, half: int, interval: float) -> float:
 
     At lag L they have the variance 2 (1 - r) (3 - r), with r the correlation over L samples, times that of the noise.
     """
-    lag = min(max(2, round(BEND / interval)), (len(values) - 1) // 4)
+    lag = min(max(2, samples_within(BEND, interval, len(values))), (len(values) - 1) // 4)
     near, far = (
         np.quantile(np.abs(values[2 * k :] - 2.0 * values[k:-k] + values[: -2 * k]), QUIET_SHARE) for k in (1, lag)
     )
@@ -113,9 +125,11 @@ def _slow_noise(values: Array, half: int, interval: float) -> float:
     ratios = variance(correlations**lag) / variance(correlations)
     best = int(np.argmin(np.abs(ratios - (far / near) ** 2)))
     sigma = near / stats.norm.ppf(0.5 + 0.5 * QUIET_SHARE) / np.sqrt(variance(correlations[best]))
-    weights = np.repeat([-1.0, 1.0], half) / half
-    spread = weights @ toeplitz(correlations[best] ** np.arange(2 * half)) @ weights
-    return float(sigma * np.sqrt(spread))
+    # How often each lag is between a sample of one window and one of the other, or of the same.
+    lags = np.arange(1, 2 * half)
+    weights = np.where(lags <= half, 2 * half - 3 * lags, lags - 2 * half)
+    spread = 2.0 * (half + float(weights @ correlations[best] ** lags)) / half**2
+    return float(sigma * math.sqrt(max(spread, 0.0)))
 
 
 def _runs(still: Flags, half: int, count: int) -> list[slice]:
@@ -164,9 +178,19 @@ def _creeps(times: Array, planar: Array) -> bool:
         return False
     design = np.column_stack([np.ones(len(times)), (times - times[0]) / span])
     line, *_ = np.linalg.lstsq(design, planar, rcond=None)
-    blocks = np.array_split(planar, max(3, int(span / LONG)))
-    scatter = np.median([block.std(axis=0) for block in blocks], axis=0) * min(1.0, math.sqrt(4.0 * LONG / span))
+    count = max(3, min(int(span / LONG), len(planar) // FEWEST_IN_BLOCK))
+    scatter = _block_scatter(planar, count) * min(1.0, math.sqrt(4.0 * LONG / span))
     return bool((np.abs(line[1]) > CREEP * scatter + _LIMITS * min(span, LONG)).any())
+
+
+def _block_scatter(planar: Array, count: int) -> Array:
+    """Median of the standard deviations (3,) of poses (n, 3) within so many blocks of about equal size."""
+    size, longer = divmod(len(planar), count)
+    looked_at = np.arange(0, count, -(-count // MOST_BLOCKS))
+    starts = looked_at * size + np.minimum(looked_at, longer)
+    stops = starts + size + (looked_at < longer)
+    spreads = [planar[a:b].std(axis=0) for a, b in zip(starts.tolist(), stops.tolist(), strict=True)]
+    return np.asarray(np.median(spreads, axis=0))
 
 
 def _stays(times: Array, planar: Array) -> bool:

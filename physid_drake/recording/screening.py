@@ -8,7 +8,7 @@ a table does. Kept and reported: gaps, stalls that the tracker caught up from, o
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -60,6 +60,9 @@ NOTABLE_TURN: Final = 5.0
 
 PUSHED: Final = 0.2
 """Of the furthest way of an object between such leaps: where it goes less far, it rests."""
+
+MOST_SAID: Final = 20
+"""Lines for one stream of one kind: a stream with more is broken, and its reader need not be told where each time."""
 
 _ARM: Final = 0.05
 _SMALLEST_LEAP: Final = 1e-5
@@ -130,7 +133,8 @@ def screen_poses(
     times, positions, quaternions = times[tracked], positions[tracked], quaternions[tracked]
     leaps, lone = _find_leaps(times, positions, quaternions)
     stalls = _find_stalls(positions, quaternions)
-    lone = [k for k in lone if k not in {last for _, last in stalls}]
+    caught_up = {last for _, last in stalls}
+    lone = [k for k in lone if k not in caught_up]
     swaps = _find_swaps(times, positions, quaternions, lone) if what == "object" else []
     part = _part_that_moves(positions, quaternions, swaps)
     keep = np.zeros(len(lost), dtype=np.bool_)
@@ -138,13 +142,24 @@ def screen_poses(
     for first, last in leaps:
         keep[tracked[first : last + 1]] = False
     numbers = [rows[k] for k in tracked.tolist()]
-    found = [(first, _leap_words(positions, quaternions, numbers, first, last)) for first, last in leaps]
-    found += [(first, _stall_words(numbers, first, last)) for first, last in stalls]
-    found += [(k, _lone_words(positions, quaternions, numbers, k, part, swaps)) for k in lone]
     # Of what lies beyond the part that is kept, only its edges are said.
-    warnings += [f"{what}: {words}" for k, words in found if part.start - 1 <= k < part.stop]
+    said = range(part.start - 1, part.stop)
+    leap_words = [_leap_words(positions, quaternions, numbers, *leap) for leap in leaps if leap[0] in said]
+    stall_words = [_stall_words(numbers, *stall) for stall in stalls if stall[0] in said]
+    lone_words = [_lone_words(positions, quaternions, numbers, k, part, set(swaps)) for k in lone if k in said]
+    for words in (leap_words, stall_words, lone_words):
+        warnings += _few(f"{what}: {word}" for word in words)
     warnings += gap_warnings(times[part], numbers[part], what)
     return Screened(keep=keep, warnings=tuple(warnings))
+
+
+def _few(lines: Iterable[str]) -> list[str]:
+    """The first of lines that are alike, and how many more there are."""
+    every = list(lines)
+    more = len(every) - MOST_SAID
+    return (
+        every if more <= 0 else [*every[:MOST_SAID], f"{every[0].partition(':')[0]}: {more} more of the same kind."]
+    )
 
 
 def _leap_words(positions: Array, quaternions: Array, rows: Sequence[int], first: int, last: int) -> str:
@@ -157,7 +172,7 @@ def _stall_words(rows: Sequence[int], first: int, last: int) -> str:
 
 
 def _lone_words(
-    positions: Array, quaternions: Array, rows: Sequence[int], k: int, part: slice, swaps: Sequence[int]
+    positions: Array, quaternions: Array, rows: Sequence[int], k: int, part: slice, swaps: Collection[int]
 ) -> str:
     beyond = "before" if k < part.start else "after"
     fate = f"; what comes {beyond} is left out" if k in swaps else ", kept"
@@ -167,7 +182,7 @@ def _lone_words(
 def gap_warnings(times: Array, rows: Sequence[int], what: str) -> list[str]:
     """One line for each gap in times (n,) in s, whose samples stand at ``rows``."""
     gaps: list[int] = find_gaps(times).tolist()
-    return [f"{what}: rows {rows[k]}-{rows[k + 1]}: gap of {times[k + 1] - times[k]:.3g} s, kept." for k in gaps]
+    return _few(f"{what}: rows {rows[k]}-{rows[k + 1]}: gap of {times[k + 1] - times[k]:.3g} s, kept." for k in gaps)
 
 
 def _distances(positions: Array, quaternions: Array, first: slice, second: slice) -> Array:
@@ -196,17 +211,23 @@ def _find_leaps(times: Array, positions: Array, quaternions: Array) -> tuple[lis
     steps = steps / np.maximum(1.0, np.diff(times) / np.median(np.diff(times)))
     floor = max(LEAP_FACTOR * float(np.quantile(steps, 0.9)), _SMALLEST_LEAP)
     padded = np.concatenate([[0.0], steps, [0.0]])
+    far = np.flatnonzero(steps > floor).tolist()
     leaps: list[tuple[int, int]] = []
-    for first in (np.flatnonzero(steps[:-1] > floor) + 1).tolist():
+    for i, before in enumerate(far):
+        first = before + 1
         if leaps and first <= leaps[-1][1] + 1:  # the way back of the one before
             continue
-        for last in range(first, len(times) - 1):
+        largest = 0.0  # step of what is lost meanwhile
+        for j in range(i + 1, len(far)):
+            last, between = far[j], far[j - 1] if j > i + 1 else first
             if last > first and times[last + 1] - times[first - 1] > LONGEST_LEAP:
                 break
-            both = min(steps[first - 1], steps[last])
-            sudden = both > max(floor, LEAP_FACTOR * max(padded[first - 1], padded[last + 2]))
+            largest = max(largest, float(steps[between:last].max(initial=0.0)))
             # Lost, it is somewhere else meanwhile; a tap goes there and back, fastest in between.
-            sudden = sudden and both > PLATEAU * float(steps[first:last].max(initial=0.0))
+            if steps[before] <= PLATEAU * largest:
+                break
+            both = min(steps[before], steps[last])
+            sudden = both > max(floor, LEAP_FACTOR * max(padded[before], padded[last + 2]), PLATEAU * largest)
             ends = slice(first - 1, first), slice(last + 1, last + 2)
             if sudden and float(_distances(positions, quaternions, *ends)[0]) < 0.3 * both:
                 leaps.append((first, last))
@@ -214,8 +235,10 @@ def _find_leaps(times: Array, positions: Array, quaternions: Array) -> tuple[lis
     beside = {k for first, last in leaps for k in range(first - 1, last + 1)}
     lone = [
         k
-        for k in range(1, len(steps) - 1)
-        if k not in beside and steps[k] > 2.0 * max(floor, LEAP_FACTOR * max(steps[k - 1], steps[k + 1]))
+        for k in far
+        if 0 < k < len(steps) - 1
+        and k not in beside
+        and steps[k] > 2.0 * max(floor, LEAP_FACTOR * max(steps[k - 1], steps[k + 1]))
     ]
     return leaps, lone
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from physid_drake.recording.clocks import samples_within
 from physid_drake.recording.rests import SHORTEST_REST, TO_STD, rests_of
 from physid_drake.recording.screening import find_gaps
 from physid_drake.recording.values import Array, PoseStream, Push, Recording
@@ -149,7 +150,7 @@ def _largest_speed(stream: PoseStream) -> float | None:
         return None
     # Speeds over less than a tenth of a second would be mostly the tracker's noise.
     interval = float(np.median(np.diff(stream.times)))
-    stride = min(max(1, round(0.1 / interval)), len(stream) - 1)
+    stride = min(max(1, samples_within(0.1, interval, len(stream))), len(stream) - 1)
     spans = stream.times[stride:] - stream.times[:-stride]
     travel = np.linalg.norm(stream.positions[stride:] - stream.positions[:-stride], axis=1)
     return float(np.max(travel / spans))

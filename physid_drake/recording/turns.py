@@ -28,7 +28,7 @@ def unwrapped(times: Array, angles: Array) -> Array:
     """
     result: Array = np.unwrap(angles)
     gaps = find_gaps(times).tolist()
-    edges = [0, *(k + 1 for k in gaps), len(times)]
+    edges, turns = [0, *(k + 1 for k in gaps), len(times)], np.zeros(len(times))
     for i, k in enumerate(gaps):
         gap = float(times[k + 1] - times[k])
         before = slice(max(edges[i], k - RATED), k + 1)
@@ -38,8 +38,8 @@ def unwrapped(times: Array, angles: Array) -> Array:
         # An object that is hit or stops meanwhile turns by something in between.
         if rates and gap <= BRIDGED and not min(rates) * gap <= step <= max(rates) * gap:
             missed = float(np.mean(rates)) * gap - step
-            result[k + 1 :] += 2.0 * np.pi * np.round(missed / (2.0 * np.pi))
-    return result
+            turns[k + 1] = np.round(missed / (2.0 * np.pi))
+    return result + 2.0 * np.pi * np.cumsum(turns) if turns.any() else result
 
 
 def _rate(times: Array, angles: Array) -> float:

@@ -16,6 +16,17 @@ import numpy.typing as npt
 
 from physid_drake.errors import RecordingError
 from physid_drake.recording.checks import check_choice, check_not_negative, check_positive, check_times, frozen
+from physid_drake.recording.limits import (
+    LOUDEST_FORCE,
+    LOUDEST_POSITION,
+    LOUDEST_ROTATION,
+    check_forces,
+    check_lengths,
+    check_loudness,
+    check_places,
+    check_table,
+    check_text,
+)
 from physid_drake.recording.outlines import check_polygon
 from physid_drake.recording.turns import unwrapped
 
@@ -56,7 +67,9 @@ class PoseStream:
         if not len(self.times) == len(self.positions) == len(self.quaternions):
             lengths = f"{len(self.times)}, {len(self.positions)} and {len(self.quaternions)}"
             raise RecordingError(f"times, positions and quaternions must be equally long, but got {lengths} rows.")
-        norms = np.linalg.norm(self.quaternions, axis=1)
+        check_places(self.positions)
+        with np.errstate(over="ignore"):
+            norms = np.linalg.norm(self.quaternions, axis=1)
         worst = int(np.argmax(np.abs(norms - 1.0)))
         if abs(norms[worst] - 1.0) > QUATERNION_TOLERANCE:
             raise RecordingError(
@@ -109,6 +122,7 @@ class ForceStream:
             raise RecordingError(
                 f"times and forces must be equally long, but got {len(self.times)} and {len(self.forces)} rows."
             )
+        check_forces(self.forces)
 
     def __len__(self) -> int:
         return len(self.times)
@@ -142,6 +156,8 @@ class Push:
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
+        check_text("a push's name", self.name)
+        check_text(f"push {self.name!r}: note", self.note, lines=True)
         if len(self.object) < 2:
             raise RecordingError(
                 f"push {self.name!r}: at least two object poses are needed, but got {len(self.object)}; "
@@ -187,6 +203,7 @@ class Box:
 
     def __post_init__(self) -> None:
         check_positive("size_m", "m", *self.size)
+        check_lengths("size_m", *self.size)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,6 +217,8 @@ class Cylinder:
     def __post_init__(self) -> None:
         check_positive("radius_m", "m", self.radius)
         check_positive("length_m", "m", self.length)
+        check_lengths("radius_m", self.radius)
+        check_lengths("length_m", self.length)
         check_choice("axis", self.axis, get_args(CylinderAxis))
 
 
@@ -212,6 +231,7 @@ class Prism:
 
     def __post_init__(self) -> None:
         check_positive("height_m", "m", self.height)
+        check_lengths("height_m", self.height)
         check_polygon(self.polygon)
 
 
@@ -265,6 +285,7 @@ class Table:
 
     def __post_init__(self) -> None:
         check_positive("size_m", "m", *self.size)
+        check_table(self.size, self.centre)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -281,6 +302,8 @@ class Hand:
         check_choice("stream", self.stream, get_args(HandStream))
         check_positive("radius_m", "m", self.radius)
         check_positive("length_m", "m", self.length)
+        check_lengths("radius_m", self.radius)
+        check_lengths("length_m", self.length)
         long = self.tip in ("cylinder", "capsule")
         if long and self.length is None:
             raise RecordingError(f"a {self.tip} tip needs length_m, but there is none; add it.")
@@ -302,6 +325,10 @@ class Sensors:
         check_not_negative("object_rotation_std_rad", "rad", self.object_rotation_std)
         check_not_negative("hand_position_std_m", "m", self.hand_position_std)
         check_not_negative("force_std_n", "N", self.force_std)
+        check_loudness("object_position_std_m", "m", self.object_position_std, LOUDEST_POSITION)
+        check_loudness("object_rotation_std_rad", "rad", self.object_rotation_std, LOUDEST_ROTATION)
+        check_loudness("hand_position_std_m", "m", self.hand_position_std, LOUDEST_POSITION)
+        check_loudness("force_std_n", "N", self.force_std, LOUDEST_FORCE)
 
     @property
     def object_std(self) -> Array:
@@ -327,6 +354,8 @@ class Recording:
     folder: Path | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
+        check_text("name", self.name)
+        check_text("description", self.description, lines=True)
         if not self.pushes:
             raise RecordingError(f"recording {self.name!r}: pushes must not be empty; add at least one push.")
         names = [push.name for push in self.pushes]

@@ -8,6 +8,7 @@ from rich.table import Table
 
 from physid_drake.identify import Accuracy, Identification
 from physid_drake.identify.identify import EXPLAINED
+from physid_drake.identify.stated import FAR_BELOW, quieter_by
 
 
 def estimates_table(result: Identification, title: str) -> Table:
@@ -67,6 +68,13 @@ def accuracy_cells(accuracy: Accuracy) -> list[str]:
 def verdict(result: Identification) -> str:
     """In one sentence, how well the plain cell explains the pushes."""
     chi2 = result.reduced_chi2
+    quieter = quieter_by(chi2, result.polished.degrees) if chi2 < FAR_BELOW else None
+    if quieter is not None:
+        return (
+            f"The plain cell leaves far less than the noise that counts (reduced chi-square {chi2:.2g}, 1 expected):"
+            f" that is {quieter:.2g} times what is left, and nothing smaller than it can be seen. Is it stated too"
+            " large (sensors of recording.yaml)?"
+        )
     if result.explains:
         return f"The plain cell explains these pushes to their noise (reduced chi-square {chi2:.2f})."
     if result.reduced_chi2 < EXPLAINED:

@@ -150,4 +150,4 @@ def test_windows_with_a_strike_are_left_out(recording, rate):
 
 def test_one_sample_in_a_tenth_of_a_second_is_no_mean_however_its_stamp_is_rounded():
     times = np.array([round(0.1 * k, 9) for k in range(40)])
-    assert force_windows._windows(times) == []
+    assert force_windows.windows_of(times) == []

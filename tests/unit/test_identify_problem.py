@@ -192,7 +192,7 @@ def test_times_in_milliseconds_are_refused(recording):
         streams = (replace(stream, times=1e3 * stream.times) for stream in (push.object, push.hand))
         return replace(push, **dict(zip(("object", "hand"), streams, strict=True)))
 
-    with pytest.raises(RecordingError, match="are their times in seconds"):
+    with pytest.raises(RecordingError, match="look to be in milliseconds; give seconds"):
         first(with_pushes(recording, slower))
 
 

@@ -90,11 +90,11 @@ def test_a_recording_without_hand_and_sensors_is_read_back(tmp_path):
 def test_a_mesh_travels_with_the_recording(tmp_path):
     (tmp_path / "a").mkdir()
     mesh = tmp_path / "a/bunny.obj"
-    mesh.write_text("v 0 0 0\n")
+    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n")
     recording = replace(random_recording(), object=ObjectModel(shape=MeshShape(file=mesh, scale=0.5)))
     write_recording(recording, tmp_path / "b")
     shape = read_recording(tmp_path / "b").object.shape
-    assert shape.file.is_relative_to(tmp_path / "b") and shape.file.read_text() == "v 0 0 0\n"
+    assert shape.file.is_relative_to(tmp_path / "b") and shape.file.read_text() == mesh.read_text()
 
 
 def test_a_bare_push_name_becomes_a_file(tmp_path):
@@ -111,7 +111,7 @@ def test_a_folder_that_holds_something_is_not_touched(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["keep.txt"]
 
 
-@pytest.mark.parametrize("name", ["../out.csv", "/out.csv", "a\0.csv"])
+@pytest.mark.parametrize("name", ["../out.csv", "/out.csv"])
 def test_a_push_cannot_be_written_outside_the_folder(tmp_path, name):
     full = random_recording()
     with pytest.raises(OutputError):
