@@ -17,11 +17,32 @@ NO_YAML = (yaml.YAMLError, ValueError, TypeError, AttributeError, LookupError, R
 WHOLE = re.compile(r"[-+]?(0|[1-9][0-9_]*|0x[0-9a-fA-F_]+)")
 MOST_BYTES: Final = 4_000_000  # of a text: what people write has thousands
 MOST_NODES: Final = 10_000  # of a text whose aliases are written out
+MOST_PLAIN: Final = 200_000  # of a text without aliases: a thousand pushes with notes have four thousand
 MOST_LETTERS: Final = 1000  # of a number
+DEEPEST: Final = 100  # brackets in brackets; the scanner takes longer with every one that is open
 
 
 class Loader(yaml.SafeLoader):
     """YAML in which nothing is there twice, and no number is another than it looks."""
+
+    most_nodes = MOST_NODES
+    nodes = 0
+
+    def fetch_flow_collection_start(self, TokenClass: Any) -> None:
+        """An opening bracket, of which only so many may be open."""
+        if self.flow_level >= DEEPEST:
+            message = f"more than {DEEPEST} brackets are open"
+            raise yaml.scanner.ScannerError(None, None, message, self.get_mark())
+        super().fetch_flow_collection_start(TokenClass)
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        """A node, of which there may only be so many."""
+        self.nodes += 1
+        if self.nodes > self.most_nodes:
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.composer.ComposerError(None, None, f"it holds more than {self.most_nodes} values", mark)
+        node: yaml.Node | None = super().compose_node(parent, index)
+        return node
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         """A mapping, in which no key stands twice."""
@@ -47,14 +68,15 @@ class Loader(yaml.SafeLoader):
 class PlainLoader(Loader):
     """The same without aliases, for what programs write: nothing in it stands for something elsewhere."""
 
+    most_nodes = MOST_PLAIN
+
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         """A node, which is neither named nor the name of another."""
         event = self.peek_event()  # type: ignore[no-untyped-call]
         if getattr(event, "anchor", None) is not None:
             message = f"the anchor or alias '{named(event.anchor)}' is not read here; write its value out"
             raise yaml.composer.ComposerError(None, None, message, event.start_mark)
-        node: yaml.Node | None = super().compose_node(parent, index)
-        return node
+        return super().compose_node(parent, index)
 
 
 for _loader in (Loader, PlainLoader):
@@ -81,7 +103,7 @@ def parsed(text: str, where: str, *, aliases: bool = True) -> Any:
             check_size(node)
         return loader.construct_document(node)
     except NO_YAML as error:
-        raise ConfigError(f"{where}: is no YAML: {one_line(error)}.") from error
+        raise ConfigError(f"{where}: is no YAML: {_cause(error)}.") from error
 
 
 def read_yaml(path: Path, where: str, *, aliases: bool = True) -> Any:
@@ -100,6 +122,15 @@ def read_yaml(path: Path, where: str, *, aliases: bool = True) -> Any:
     except FileError as error:
         raise ConfigError(f"{where}: {error}.") from error
     return parsed(text, where, aliases=aliases)
+
+
+def _cause(error: Exception) -> str:
+    """What is wrong, and on which line where that is known."""
+    if not isinstance(error, yaml.MarkedYAMLError):
+        return one_line(error)
+    mark = error.problem_mark or error.context_mark
+    problem = named(error.problem or error.context)
+    return problem if mark is None else f"{problem} (line {mark.line + 1})"
 
 
 def check_size(root: yaml.Node) -> None:

@@ -64,7 +64,7 @@ def _solver_rules(config: CellConfig) -> list[Rule]:
     return [
         ("solver.scheme", solver.scheme, solver.scheme in SCHEMES, f"one of {', '.join(SCHEMES)}"),
         ("solver.time_step_s", tick, _in(tick, ticks), f"from {SHORTEST_TICK:g} to {LONGEST_TICK:g} s"),
-        ("solver.slide_time_step_s", slide, _in(slide, ticks) and tick <= slide,
+        ("solver.slide_time_step_s", slide, _in(slide, ticks) and (not _in(tick, ticks) or tick <= slide),
          f"between time_step_s and {LONGEST_TICK:g} s"),
         *((f"solver.{key}", value, isinstance(value, bool), "true or false") for key, value in switches.items()),
     ]  # fmt: skip

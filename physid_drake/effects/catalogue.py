@@ -20,6 +20,7 @@ from physid_drake.effects.hand import ActuatorLag, HandCompliance, HandOffset
 from physid_drake.effects.liquid import Sloshing
 from physid_drake.effects.tracker import TrackerBias, TrackerLatency, TrackerScale
 from physid_drake.errors import ConfigError
+from physid_drake.wording import named
 
 CATALOGUE: tuple[type[Effect], ...] = (
     StribeckFriction, ViscousDrag, QuadraticDrag, AnisotropicTable, AnisotropicObject, FrictionPatch,
@@ -38,7 +39,7 @@ def effect_named(name: str) -> type[Effect]:
     for kind in CATALOGUE:
         if kind.name == name:
             return kind
-    raise ConfigError(f"effect '{name}' is unknown; known are {', '.join(kind.name for kind in CATALOGUE)}.")
+    raise ConfigError(f"effect '{named(name)}' is unknown; known are {', '.join(kind.name for kind in CATALOGUE)}.")
 
 
 def applicable(around: Surroundings, names: Sequence[str] | None = None) -> tuple[type[Effect], ...]:

@@ -18,6 +18,7 @@ from physid_drake.identify.theta import RANGES, friction_names
 from physid_drake.model import Model
 from physid_drake.plan.trajectory import Situation
 from physid_drake.ranges import POSITIVE, Range
+from physid_drake.wording import shown
 
 Array = NDArray[np.float64]
 
@@ -105,15 +106,17 @@ def _root(correlation: Array) -> Array:
 
 def _interval(name: str, interval: Any) -> tuple[float, float] | None:
     if not isinstance(interval, list | tuple) or not interval:
-        raise ConfigError(f"model: the interval of '{name}' must be two numbers, but is {interval!r}.")
+        raise ConfigError(f"model: the interval of '{name}' must be two numbers, but is {shown(interval)}.")
     if isinstance(interval[0], list | tuple):
         return None
     try:
         low, high = (float(v) for v in interval)
     except (TypeError, ValueError) as error:
-        raise ConfigError(f"model: the interval of '{name}' must be two numbers, but is {interval!r}.") from error
+        raise ConfigError(
+            f"model: the interval of '{name}' must be two numbers, but is {shown(interval)}."
+        ) from error
     if not (math.isfinite(low) and math.isfinite(high) and low <= high):
-        raise ConfigError(f"model: the interval of '{name}' must be finite and ordered, but is {interval!r}.")
+        raise ConfigError(f"model: the interval of '{name}' must be finite and ordered, but is {shown(interval)}.")
     return low, high
 
 
