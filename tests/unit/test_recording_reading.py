@@ -1,3 +1,4 @@
+import os
 from functools import partial
 
 import pytest
@@ -203,7 +204,7 @@ def test_a_mesh_is_found_within_the_folder_only(written):
     yaml = YAML.replace("shape: box\n  size_m: [0.1, 0.05, 0.03]", "shape: mesh\n  file: bunny.obj")
     folder = written(yaml=yaml)
     assert "'bunny.obj' is missing" in refusal(folder)
-    (folder / "bunny.obj").write_text("v 0 0 0\n")
+    (folder / "bunny.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n")
     shape = read_recording(folder).object.shape
     assert isinstance(shape, MeshShape) and shape.file.is_absolute() and shape.scale == 1.0
     written(yaml=yaml.replace("bunny.obj", "../bunny.obj"))
@@ -219,3 +220,78 @@ def test_quaternions_are_normalised_and_keep_their_sign(written):
     rows = [*ROWS[:2], "0.2,,,,0.12,0,0.015,-1.0005,0,0,0"]
     quaternions = read_recording(written(rows=rows)).pushes[0].object.quaternions
     assert quaternions.tolist() == [[1, 0, 0, 0], [1, 0, 0, 0]]
+
+
+MESHED = YAML.replace("shape: box\n  size_m: [0.1, 0.05, 0.03]", "shape: mesh\n  file: object.obj")
+SOLID = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nv 0 0 0.1\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("f 1 2 999999999\n", "line 5: a face's corner"),
+        ("f 1 2 9\n", "a face is of vertex 9"),
+        ("mtllib /etc/passwd\nusemtl a\nf 1 2 3\n", "line 5: mtllib must name a file beside the mesh"),
+        ("v 1e9 0 0\n", "must be at most 10 m long"),
+    ],
+)
+def test_a_mesh_is_refused_when_its_recording_is_read(written, text, said):
+    folder = written(yaml=MESHED)
+    (folder / "object.obj").write_text(SOLID + text)
+    message = refusal(folder)
+    assert said in message and "object.obj" in message and "recording.yaml: line 4: object" in message
+
+
+@pytest.mark.parametrize("where", ["recording.yaml", "pushes/001.csv", "object.obj"])
+def test_a_named_pipe_is_never_opened(written, where):
+    folder = written(yaml=MESHED)
+    (folder / "object.obj").write_text(SOLID)
+    (folder / where).unlink()
+    os.mkfifo(folder / where)
+    message = refusal(folder)
+    assert where in message and "it is a named pipe" in message
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("free text", "&a free text"),
+        ("free text", "*a"),
+        ("[0, 0]", "&a [*a]"),
+        ("name: eraser", "name: eraser\nlol: &a [1]\nmore: [*a, *a]"),
+    ],
+)
+def test_a_description_has_no_aliases(written, old, new):
+    assert "the anchor or alias 'a' is not read here" in refusal(written(YAML.replace(old, new)))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("shape: box", f"shape: {'x' * 70_000}"),
+        ("mass_kg: 0.05", f"mass_kg: {'x' * 70_000}"),
+        ("mass_kg: 0.05", f"mass_kg: {'1' * 70_000}"),
+        ("mass_kg: 0.05", f"mass_kg: 0x{'f' * 70_000}"),
+        ("mass_kg: 0.05", f"{'x' * 70_000}: 0.05"),
+        ("mass_kg: 0.05", f"mass_kg: 0.05\n  {'x' * 7_000}: 1\n  {'x' * 7_000}: 1"),
+        ("pushes/001.csv", "x" * 70_000),
+        ("pushes/001.csv", "../" + "x" * 200),
+        ("name: eraser", f"name: [{'[' * 70_000}"),
+        ("name: eraser", f"name: !{'x' * 70_000} 1"),
+        ("physid-recording/1", "x" * 70_000),
+    ],
+    ids=range(11),
+)
+def test_a_value_of_many_letters_is_cut(written, old, new):
+    folder = written(YAML.replace(old, new))
+    assert len(refusal(folder)) < 500 + 2 * len(str(folder))
+
+
+@pytest.mark.parametrize(("old", "new"), [("object_x_m", "x" * 70_000), ("0.1,0.01", "0.1," + "x" * 70_000)])
+def test_a_field_of_many_letters_is_cut(written, old, new):
+    folder = written(header=HEADER.replace(old, new), rows=[row.replace(old, new) for row in ROWS])
+    assert len(refusal(folder)) < 300 + len(str(folder))
+
+
+def test_a_folder_whose_name_cannot_be_is_refused(tmp_path):
+    assert "is not a folder" in refusal(tmp_path / ("x" * 70_000))
