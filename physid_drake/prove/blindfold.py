@@ -30,7 +30,12 @@ LOOKS: Final = frozenset({
     "pathlib.Path.rglob", "shutil.copyfile", "shutil.copymode", "shutil.copystat", "shutil.copytree", "shutil.move",
     "shutil.rmtree", "shutil.make_archive", "shutil.unpack_archive", "shutil.chown", "mmap.__new__",
 })  # fmt: skip
-"""Audit events whose first argument (or the first two) is a path, or an open file, that is looked at or moved."""
+"""Audit events whose first argument is a path, or an open file, that is looked at or moved."""
+PAIRS: Final = frozenset({
+    "os.rename", "os.link", "os.symlink", "shutil.copyfile", "shutil.copymode", "shutil.copystat", "shutil.copytree",
+    "shutil.move",
+})  # fmt: skip
+"""Of these, those whose second argument is a path, too."""
 MOVES: Final = frozenset({"os.rename", "shutil.move"})
 """Of these, what may give a folder another path by moving one above it."""
 PROGRAMS: Final = frozenset({
@@ -44,7 +49,6 @@ CALLS: Final = frozenset({
     "posix_spawn", "posix_spawnp", "mount", "umount", "umount2", "unshare", "setns",
 })  # fmt: skip
 """Functions of the C library that ``ctypes`` may not look up."""
-_TWO_PATHS: Final = 2
 _OPEN_FILES: Final = "/proc/self/fd"
 
 
@@ -70,7 +74,7 @@ def blind_to(*folders: str) -> None:
             return
         within.looking = True  # to find out what a relative path means takes looks, too
         try:
-            seen = _sealed_among(arguments[:_TWO_PATHS], hidden, above=event in MOVES)
+            seen = _sealed_among(arguments[: 2 if event in PAIRS else 1], hidden, above=event in MOVES)
         finally:
             within.looking = False
         if seen is not None:
