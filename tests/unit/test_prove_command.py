@@ -296,3 +296,141 @@ def test_the_command_is_given_the_recording_and_no_truth(tmp_path):
     assert words[1:at] == ("-m", "physid_drake.prove.blindfold", json.dumps([str(tmp_path / "sealed")]))
     assert not any("sealed" in word for word in words[at:])
     assert words[words.index("--jobs") + 1] == "1"
+
+
+def test_the_child_is_asked_what_hides_the_truth_and_the_proof_counts_it(worlds, monkeypatch):
+    said = "print('the truth is hidden by: mount namespace', flush=True)\n"
+    monkeypatch.setattr(sys.modules[__name__], "FAKE", said + FAKE)
+    prove(worlds)
+    attempts = [json.loads(file.read_text()) for file in worlds.glob("diagnoses/*/attempt.json")]
+    assert [attempt["hidden_by"] for attempt in attempts] == ["mount namespace"] * 3
+    assert {attempt["error"] for attempt in attempts} == {None, "error: the cell fell apart."}
+    assert json.loads((worlds / "proof.json").read_text())["hidden_by"] == {"mount namespace": 3}
+    assert "What hid the truth from the diagnoses: mount namespace, 3 of 3." in (worlds / "proof.md").read_text()
+
+
+def test_nothing_outside_of_the_sealed_folder_tells_seed_or_kind_before_it_is_opened(worlds, monkeypatch):
+    def stop(*arguments):
+        raise KeyboardInterrupt
+
+    words = ("--seed", "271828182", "--kind", "effect")
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(run_prove, "_tell", stop)
+        prove(worlds, *words)
+    told = {file for file in worlds.rglob("*") if file.is_file() and b"271828182" in file.read_bytes()}
+    assert told == {worlds / "sealed" / "secret.json"}
+    assert json.loads((worlds / "settings.json").read_text()) == {"command": "prove"}
+    names = read_secret(worlds).names(3)
+    assert prove(worlds, "--kind", "effect") == 0  # the seed that was kept
+    content = json.loads((worlds / "proof.json").read_text())
+    assert (content["seed"], content["kind"]) == (271828182, "effect")
+    assert sorted(one["id"] for one in content["outcomes"]) == sorted(names)
+    for other in (("--seed", "5", "--kind", "effect"), ("--seed", "271828182")):
+        with pytest.raises(run_prove.ConfigError, match="holds another proof"):
+            prove(worlds, *other)
+
+
+def test_what_was_scored_is_dropped_before_more_is_diagnosed(worlds, monkeypatch):
+    """It says from which seed all worlds are, also those that are sealed."""
+    there = []
+
+    def look(*arguments):
+        there.append([name for name in run_prove.WRITTEN if (worlds / name).exists()])
+
+    prove(worlds, "--worlds", "2")
+    monkeypatch.setattr(run_prove, "run_tasks", look)
+    prove(worlds, "--worlds", "2")
+    prove(worlds)
+    assert there == [list(run_prove.WRITTEN), []]
+
+
+def test_without_a_seed_one_is_drawn_and_the_command_goes_on_with_it(worlds):
+    prove(worlds)
+    seed = read_secret(worlds).seed
+    prove(worlds)
+    assert read_secret(worlds).seed == seed == json.loads((worlds / "proof.json").read_text())["seed"]
+    prove(worlds.parent / "other")
+    assert read_secret(worlds.parent / "other").seed != seed
+
+
+@pytest.mark.parametrize(
+    ("content", "rule"),
+    [
+        ("", "it is no JSON"),
+        ("{", "it is no JSON"),
+        ("null", "it must be a JSON object, but is None"),
+        ("[]", "it must be a JSON object, but is []"),
+        ('"x"', "it must be a JSON object, but is 'x'"),
+        ('{"seconds": "x"}', "'seconds' must be a number, but is 'x'"),
+        ('{"seconds": true}', "'seconds' must be a number"),
+        ('{"seconds": 1, "error": 5}', "'error' must be a text or null, but is 5"),
+        ('{"seconds": 1, "hidden_by": []}', "'hidden_by' must be a text or null"),
+        (b"\xff", "is not UTF-8 text"),
+    ],
+)
+@pytest.mark.parametrize("words", [(), ("--open",)])
+def test_an_attempt_that_somebody_changed_is_one_line(worlds, capsys, words, content, rule):
+    prove(worlds, "--worlds", "1")
+    file = worlds / "diagnoses" / world(worlds, 0) / "attempt.json"
+    file.write_bytes(content.encode() if isinstance(content, str) else content)
+    with pytest.raises(ProofError) as caught:
+        prove(worlds, "--worlds", "1", *words)
+    said = str(caught.value)
+    assert str(file) in said and rule in said and "\n" not in said
+    assert said.endswith("; delete it to diagnose this world again.")
+
+
+@pytest.mark.parametrize("answer", ["", "[]", "{}", '{"verdict": 3}', "{"])
+def test_a_diagnosis_that_writes_no_answer_has_failed(tmp_path, answer):
+    one = task(tmp_path, "a", f"open({str(tmp_path / 'a' / 'diagnosis.json')!r}, 'w').write({answer!r})")
+    diagnose_all([one], jobs=1, timeout=30.0, ended=lambda t, a: None)
+    assert "diagnosis.json' cannot be read: " in attempt_of(one.folder).error
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"verdict": 3}, {"effects": None}, {"effects": [1]}, {"effects": [{}]}, {"fit": 5}, {"theta": [1]},
+        {"reduced_chi2_after": "x"}, {"effects": [{"name": 1, "indistinguishable_from": [], "probability": 0.9,
+                                                   "parameters": {}}]},
+        {"effects": [{"name": "tether", "indistinguishable_from": [], "probability": "x", "parameters": {}}]},
+        {"effects": [{"name": "viscous_drag", "indistinguishable_from": 3, "probability": 1, "parameters": {}}]},
+    ],
+)  # fmt: skip
+def test_an_answer_that_somebody_changed_is_one_line(worlds, change):
+    prove(worlds)
+    file = worlds / "diagnoses" / world(worlds, 1) / "diagnosis.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | change))
+    with pytest.raises(ProofError) as caught:
+        prove(worlds, "--open")
+    assert str(caught.value).startswith(f"'{file}' cannot be read: ") and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "rule"),
+    [
+        ({"kind": None}, "'kind' must be one of none, effect, pair, other"),
+        ({"kind": "odd"}, "'kind' must be one of"),
+        ({"effects": 3}, "'effects' must be a list of names"),
+        ({"effects": [{"parameters": {}}]}, "'effects' must be a list of names"),
+        ({"size_sigma": "x"}, "'size_sigma' must be a number"),
+        ({"id": 3}, "'id' must be a text"),
+        ({"theta": {"mass": "x"}}, "'theta' must be numbers"),
+        ({"held_out_floor": []}, "'held_out_floor' must be numbers"),
+    ],
+)
+def test_a_truth_that_is_none_is_one_line(worlds, monkeypatch, change, rule):
+    make = run_prove._make
+
+    def other(arguments, count, out, console):
+        make(arguments, count, out, console)
+        file = out / "sealed" / f"{world(out, 1)}.json"
+        file.write_text(json.dumps(json.loads(file.read_text()) | change))
+        (out / "seal.txt").unlink()
+        return write_seal(out, read_secret(out).names(count))
+
+    monkeypatch.setattr(run_prove, "_make", other)
+    with pytest.raises(ProofError) as caught:
+        prove(worlds)
+    file = worlds / "sealed" / f"{world(worlds, 1)}.json"
+    assert str(caught.value).startswith(f"'{file}' cannot be read: {rule}")

@@ -18,7 +18,7 @@ from physid_drake.prove.effects.effect import parameters_of
 from physid_drake.prove.knobs import draw_knob
 from physid_drake.prove.mujoco_world import PushWorld
 from physid_drake.prove.scene import draw_scene
-from physid_drake.prove.secret import name_by_seed
+from physid_drake.prove.secret import name_by_seed, read_secret
 from physid_drake.prove.world_plan import Plan
 from physid_drake.recording import Box, read_recording
 
@@ -94,6 +94,71 @@ def test_a_world_is_made_again_bit_for_bit_and_tells_nothing(tmp_path, short_sce
             error = push_.object.planar - exact
             assert np.abs(error[:, :2]).max() < 6 * truth["noise"]["position"]
             assert len(exact) == len(push_.object)
+
+
+@pytest.fixture
+def no_worlds(monkeypatch):
+    """Worlds that cost nothing: a recording of one file, and a truth."""
+
+    def made(index, seed, kind, effect, name):
+        return name, {"id": name, "index": index, "seed": seed}
+
+    def written(name, folder):
+        folder.mkdir(parents=True)
+        (folder / "recording.yaml").write_text(f"name: {name}\n")
+
+    monkeypatch.setattr(make, "make_world", made)
+    monkeypatch.setattr(make, "write_recording", written)
+
+
+def test_a_folder_keeps_its_worlds_names_and_another_has_others(tmp_path, no_worlds):
+    make.make(tmp_path / "a", 2, 3)
+    first = {path.name for path in (tmp_path / "a" / "recordings").iterdir()}
+    make.make(tmp_path / "a", 3)
+    make.make(tmp_path / "b", 3, 3)
+    more, others = ({path.name for path in (tmp_path / f / "recordings").iterdir()} for f in ("a", "b"))
+    assert first < more and len(more) == 3 and not more & others
+    truths = [json.loads(file.read_text()) for file in (tmp_path / "a" / "sealed").glob("????????.json")]
+    assert sorted((truth["index"], truth["seed"]) for truth in truths) == [(0, 3), (1, 3), (2, 3)]
+
+
+def test_names_by_seed_are_those_of_the_answers_in_docs(tmp_path, no_worlds):
+    make.make(tmp_path, 14, 42042, names_by_seed=True)
+    assert (tmp_path / "recordings" / "a3d441d5").is_dir()
+
+
+def test_what_an_interrupted_making_began_is_made_again_and_nothing_else_is_removed(tmp_path, no_worlds):
+    make.make(tmp_path, 2, 3)
+    done, begun = (path for path in sorted((tmp_path / "recordings").iterdir()))
+    (tmp_path / "sealed" / f"{begun.name}.json").unlink()
+    (tmp_path / "seal.txt").unlink()
+    for folder in (done, begun):
+        (folder / "own.txt").write_text("mine")
+    make._write_world(tmp_path, next(k for k in range(2) if read_secret(tmp_path).name_of(k) == begun.name),
+                      read_secret(tmp_path))  # fmt: skip
+    assert (done / "own.txt").exists() and not (begun / "own.txt").exists()
+    for kind in ("link", "file"):
+        (tmp_path / "sealed" / f"{begun.name}.json").unlink(missing_ok=True)
+        make.shutil.rmtree(begun) if begun.is_dir() and not begun.is_symlink() else begun.unlink()
+        begun.symlink_to(done) if kind == "link" else begun.write_text("mine")
+        with pytest.raises(ProofError, match=f"recordings/{begun.name}': must be a folder, or nothing yet"):
+            make.make(tmp_path, 2, 3)
+    assert (done / "own.txt").exists() and begun.read_text() == "mine"
+
+
+@pytest.mark.parametrize("other", ["somebody's", "seed", "kind"])
+def test_by_hand_a_folder_that_holds_something_else_is_refused(tmp_path, no_worlds, capsys, other):
+    if other == "somebody's":
+        (tmp_path / "recordings" / "mine").mkdir(parents=True)
+    else:
+        make.make(tmp_path, 1, 3, "none" if other == "kind" else None)
+    before = sorted(tmp_path.rglob("*"))
+    capsys.readouterr()
+    words = ["--worlds", "1", "--out", str(tmp_path), "--seed", "4" if other == "seed" else "3"]
+    assert make.main(words) == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and said.startswith("error: ") and "choose another --out" in said
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_tethers_are_springs_and_cables_and_some_cables_are_slack_in_the_middle():

@@ -10,9 +10,10 @@ import pytest
 
 from physid_drake import run_prove_real
 from physid_drake.cli import build_parser
-from physid_drake.errors import RecordingError
+from physid_drake.errors import ProofError, RecordingError
 from physid_drake.prove.real import chosen_cases, prepare, slides_of_squares
 from physid_drake.prove.real_score import (
+    _fresh,
     balanced_pressure,
     mean_arm,
     points_of_support,
@@ -217,3 +218,11 @@ def test_the_command_writes_a_table_and_goes_on(published, tmp_path, monkeypatch
     assert {case["name"] for case in json.loads((tmp_path / "out" / "real.json").read_text())["cases"]} == {
         "mit_rect1_v20", "square_drops",
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"position_m": "x", "rotation_rad": 1}', '{"position_m": 1}'])
+def test_errors_that_somebody_changed_are_one_line(tmp_path, content):
+    (tmp_path / "fresh.json").write_text(content)
+    with pytest.raises(ProofError, match=r"fresh\.json' cannot be read: .*; delete it, and it is written again\.$"):
+        _fresh(tmp_path / "fresh.json")
+    assert all(map(math.isnan, _fresh(tmp_path / "none")))
