@@ -1,5 +1,12 @@
 """Identify an object by pushing it, and find the physics that a simulation leaves out. Built on Drake."""
 
+import sys
+
+if sys.argv[:1] == ["-m"]:  # so it is while Python looks for the module that it was told to run
+    from physid_drake.starting import begin
+
+    begin()
+
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
-from physid_drake.errors import ConfigError, OutputError, PhysidError
+from physid_drake.door import Parser, enter, path
+from physid_drake.errors import ConfigError
 from physid_drake.recording import read_recording
 
 if TYPE_CHECKING:
-    Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
+    Subparsers = argparse._SubParsersAction[Parser]
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -27,27 +26,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit status: 0 done, 1 an error of the input or output, 130 interrupted.
     """
+    return enter(lambda: _run(argv))
+
+
+def _run(argv: Sequence[str] | None) -> int:
     arguments = build_parser().parse_args(argv)
-    try:
-        with _warnings_on_stderr():
-            status = int(arguments.run(arguments))
-        sys.stdout.flush()
-    except PhysidError as error:
-        print("error: " + " ".join(str(error).split()), file=sys.stderr)
-        return 1
-    except BrokenPipeError:
-        # The reader of the output is gone (`| head`); Python would complain again when it flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return 130
-    return status
+    return int(arguments.run(arguments))
 
 
 def build_parser() -> argparse.ArgumentParser:
     """The parser with every command of ``COMMANDS``."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="physid_drake",
         description="Identify an object's mass and friction from recorded pushes, and find the physics "
         "that a simulation leaves out.",
@@ -60,8 +49,8 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _register_inspect(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser("inspect", help="check a recording and show what is in it")
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the recording")
-    parser.add_argument("--out", type=Path, metavar="FILE.png", help="also draw all pushes from above into this file")
+    parser.add_argument("folder", type=path, metavar="FOLDER", help="the recording")
+    parser.add_argument("--out", type=path, metavar="FILE.png", help="also draw all pushes from above into this file")
     parser.set_defaults(run=_run_inspect)
 
 
@@ -70,30 +59,28 @@ def _run_inspect(arguments: argparse.Namespace) -> int:
     from physid_drake.identify.doubts import doubts  # noqa: PLC0415
     from physid_drake.identify.refusals import refusals  # noqa: PLC0415
     from physid_drake.report.inspection import draw_pushes, inspection_table, warning_lines  # noqa: PLC0415
+    from physid_drake.report.picture import check_picture, write_picture  # noqa: PLC0415
     from physid_drake.report.terminal import terminal  # noqa: PLC0415
 
-    if arguments.out is not None and not arguments.out.suffix:
-        raise ConfigError(f"--out must name a picture, such as pushes.png, but is '{arguments.out}'.")
+    picture: Path | None = arguments.out
+    if picture is not None:
+        check_picture(picture)
     recording = read_recording(arguments.folder)
     terminal().print(inspection_table(recording))
     refused = (f"would be refused: {said}" for said in refusals(recording))
     for line in (*warning_lines(recording), *doubts(recording), *refused):
         warnings.warn(line, UserWarning, stacklevel=1)
-    if arguments.out is not None:
-        out: Path = arguments.out
-        try:
-            draw_pushes(recording).savefig(out, dpi=150)
-        except (OSError, ValueError) as error:
-            raise OutputError(f"{out}: cannot be written: {error}.") from error
-        print(f"drawn: {out}")
+    if picture is not None:
+        write_picture(draw_pushes(recording), picture)
+        print(f"drawn: {picture}")
     return 0
 
 
 def _register_convert(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser("convert", help="turn a published data set into a recording")
     parser.add_argument("layout", choices=["cmu", "mit", "cube"], help="whose layout SOURCE is in")
-    parser.add_argument("source", type=Path, metavar="SOURCE", help="a published file, or a folder of them")
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="where the recording goes; new or empty")
+    parser.add_argument("source", type=path, metavar="SOURCE", help="a published file, or a folder of them")
+    parser.add_argument("folder", type=path, metavar="FOLDER", help="where the recording goes; new or empty")
     parser.add_argument("--limit", type=int, metavar="N", help="draw N pushes at random")
     parser.add_argument("--seed", type=int, metavar="N", default=0, help="seed of that draw (default 0)")
     parser.set_defaults(run=_run_convert)
@@ -113,7 +100,7 @@ def _run_convert(arguments: argparse.Namespace) -> int:
 def _register_diagnose(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser("diagnose", help="say what physics a recording has that the simulation leaves out")
     parser.add_argument("recording", metavar="RECORDING", help="a FOLDER, or the name of a recording that ships")
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where results go (default: diagnoses/FOLDER)")
+    parser.add_argument("--out", type=path, metavar="FOLDER", help="where results go (default: diagnoses/FOLDER)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (default 0)")
     parser.add_argument("--alpha", type=float, default=0.01, metavar="P", help="false-alarm rate (default 0.01)")
     parser.add_argument("--effects", nargs="+", metavar="NAME", help="look at these effects only")
@@ -138,12 +125,13 @@ def _register_prove(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser("prove", help="measure the diagnosis on sealed worlds of another simulator")
     parser.add_argument("--worlds", type=int, metavar="N", help="how many (default 200)")
     parser.add_argument("--quick", action="store_true", help="ten worlds")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all worlds (default 0)")
+    parser.add_argument("--seed", type=int, metavar="N",
+                        help="of all worlds (default: drawn, and sealed with them; of --real: 0)")  # fmt: skip
     parser.add_argument(
         "--out",
-        type=Path,
+        type=path,
         metavar="FOLDER",
-        help="where all goes (default: proofs/seed_N, proofs/seed_N_KIND or proofs/real)",
+        help="where all goes (default: proofs/worlds or proofs/real)",
     )
     parser.add_argument(
         "--kind", choices=["none", "effect", "other", "pair"], help="only such worlds (default: a mix)"
@@ -155,7 +143,7 @@ def _register_prove(subparsers: Subparsers) -> None:
     parser.add_argument("--retry", action="store_true", help="diagnose again what failed before")
     parser.add_argument("--open", action="store_true",
                         help="score what has been diagnosed so far, and diagnose no more")  # fmt: skip
-    parser.add_argument("--real", type=Path, metavar="FOLDER",
+    parser.add_argument("--real", type=path, metavar="FOLDER",
                         help="instead of worlds, recordings of robots that others published")  # fmt: skip
     parser.add_argument("--only", nargs="+", metavar="NAME", help="of --real: only cases whose names begin so")
     parser.add_argument("--pushes", type=int, metavar="N",
@@ -186,14 +174,14 @@ def _register_plan(subparsers: Subparsers) -> None:
         "plan", help="find the push that brings the object to a goal, with a model's physics"
     )
     parser.add_argument(
-        "run_folder", nargs="?", type=Path, metavar="RUN", help="folder of a run_cell run or diagnosis"
+        "run_folder", nargs="?", type=path, metavar="RUN", help="folder of a run_cell run or diagnosis"
     )
     parser.add_argument("--goal", nargs=2, type=float, required=True, metavar=("X", "Y"), help="on the table, in m")
     parser.add_argument("--start", nargs=3, type=float, metavar=("X", "Y", "DEG"),
                         help="of the object, in m and degrees (default: the middle of the table)")  # fmt: skip
     parser.add_argument("--policy", default="push_speed", metavar="NAME",
                         help="push_speed (default), push_direction, push or two_pushes")  # fmt: skip
-    parser.add_argument("--model", type=Path, metavar="FILE", help="plan with this model instead of RUN's model.yaml")
+    parser.add_argument("--model", type=path, metavar="FILE", help="plan with this model instead of RUN's model.yaml")
     parser.add_argument("--plain", action="store_true", help="plan without the effects found, to compare")
     parser.add_argument("--speed", type=float, metavar="M/S", help="of push_direction (default 0.05)")
     parser.add_argument("--direction", type=float, metavar="DEG",
@@ -210,7 +198,7 @@ def _register_plan(subparsers: Subparsers) -> None:
     parser.add_argument("--draws", type=int, default=20, metavar="N", help="of theta, for the spread (default 20)")
     parser.add_argument("--risk", action="store_true", help="make the mean cost over the draws small")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (default 0)")
-    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where results go (default: plans/RECORDING)")
+    parser.add_argument("--out", type=path, metavar="FOLDER", help="where results go (default: plans/RECORDING)")
     parser.set_defaults(run=_run_plan)
 
 
@@ -227,12 +215,12 @@ def _register_experiment(subparsers: Subparsers) -> None:
         "name", metavar="NAME", help="motion_prediction, mit_pushes, push_direction, push_speed or next_push"
     )
     parser.add_argument("--quick", action="store_true", help="small sizes: two or three minutes")
-    parser.add_argument("--data", type=Path, metavar="FOLDER", help="of mit_pushes: the published end points")
+    parser.add_argument("--data", type=path, metavar="FOLDER", help="of mit_pushes: the published end points")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="repetitions at a time (default 1)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (default 0)")
     parser.add_argument(
         "--out",
-        type=Path,
+        type=path,
         metavar="FOLDER",
         help="where results go (default: experiments/NAME, with --quick NAME_quick)",
     )
@@ -255,31 +243,3 @@ COMMANDS: list[Callable[[Subparsers], None]] = [
     _register_experiment,
 ]
 """One function for each command; it adds its parser, which sets ``run``: arguments -> exit status."""
-
-
-@contextmanager
-def _warnings_on_stderr() -> Iterator[None]:
-    """Shows a warning meant for a person as one line, without the line of code that raised it."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("always", category=UserWarning, module=r"physid_drake\.")
-        earlier = warnings.showwarning
-
-        def show(
-            message: Warning | str,
-            category: type[Warning],
-            filename: str,
-            lineno: int,
-            file: TextIO | None = None,
-            line: str | None = None,
-        ) -> None:
-            if category is UserWarning and "physid_drake" in filename:
-                print("warning: " + " ".join(str(message).split()), file=sys.stderr)
-            else:
-                earlier(message, category, filename, lineno, file, line)
-
-        warnings.showwarning = show
-        yield
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -29,6 +29,10 @@ class RobotError(PhysidError, RuntimeError):
     """A robot cannot push: the object is lost, or its world broke down."""
 
 
+class WorkerError(PhysidError, RuntimeError):
+    """A process that was to work on a part was ended from outside."""
+
+
 class OutputError(PhysidError, OSError):
     """A folder or file of results cannot be written."""
 

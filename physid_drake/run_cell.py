@@ -14,7 +14,8 @@ from pydrake.systems.framework import DiagramBuilder
 from rich.console import Console
 
 from physid_drake.diagnose import Diagnosis, case_of, model_of
-from physid_drake.errors import ConfigError, PhysidError
+from physid_drake.door import DONE, Parser, enter, path
+from physid_drake.errors import ConfigError
 from physid_drake.identify import Identification, Identifier, OnlineIdentifier
 from physid_drake.identify.doubts import doubts
 from physid_drake.identify.kept_rollouts import KeptRollouts
@@ -55,28 +56,23 @@ SHOWN = 12  # pushes in the animation, held-out ones first
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the main job; returns the exit status: 0 done, 1 an error of the input or output, 130 interrupted."""
-    arguments = _parser().parse_args(argv)
-    console = terminal()
-    try:
-        run(arguments, console)
-    except PhysidError as error:
-        print("error: " + " ".join(str(error).split()), file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("interrupted; the same command goes on from what is kept, if anything is", file=sys.stderr)
-        return 130
-    return 0
+
+    def begin() -> int:
+        run(_parser().parse_args(argv), terminal())
+        return DONE
+
+    return enter(begin, interrupted="interrupted; the same command goes on from what is kept, if anything is")
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m physid_drake.run_cell", description=__doc__)
+    parser = Parser(prog="python -m physid_drake.run_cell", description=__doc__)
     parser.add_argument(
         "config", nargs="?", metavar="CONFIG",
         help="FILE or FILE:SCENARIO (default: sealed, which ships with the project; with --recording, the defaults)",
     )  # fmt: skip
     parser.add_argument("--recording", metavar="FOLDER", help="the pushes, instead of the scenario's")
     parser.add_argument(
-        "--out", type=Path, metavar="FOLDER",
+        "--out", type=path, metavar="FOLDER",
         help="where results go (default: runs/<scenario>; with --recording and no CONFIG, runs/<recording>)",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, metavar="N", help="of everything random, instead of the scenario's")

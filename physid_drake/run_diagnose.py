@@ -28,6 +28,7 @@ from physid_drake.report.stage import MOST_ARROW, ShownMotion, Stage
 from physid_drake.report.terminal import terminal
 from physid_drake.resources import shipped
 from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text, versions
+from physid_drake.wording import shown
 
 COMMAND = "diagnose"
 STATE = "rollouts.bin"
@@ -106,10 +107,17 @@ def run_case(
 
 
 def recording_folder(text: str) -> Path:
-    """A folder, or a recording that ships with the project."""
+    """A folder, or a recording that ships with the project.
+
+    Raises:
+        ConfigError: if no folder can have such a name.
+    """
     path = Path(text)
-    if not path.exists() and path.parent == Path() and (shipped("recordings") / text).is_dir():
-        return shipped("recordings") / text
+    try:
+        if not path.exists() and path.parent == Path() and (shipped("recordings") / text).is_dir():
+            return shipped("recordings") / text
+    except (OSError, ValueError) as error:  # too long a name, a NUL in it
+        raise ConfigError(f"recording {shown(text)}: nothing can have such a name.") from error
     return path
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 MOST = 60  # characters of a value
+MOST_LINE = 1500  # characters of a message
 MOST_CAUSE = 200  # characters of another library's words
 
 
@@ -24,6 +25,14 @@ def one_line(error: BaseException) -> str:
     """What another library says of an error, in one line without its full stop; its kind if that is nothing."""
     text = " ".join(str(error)[: 20 * MOST_CAUSE].split()).rstrip(".")
     return _cut(_printable(text), MOST_CAUSE) or type(error).__name__
+
+
+def in_one_line(message: str) -> str:
+    """A whole message for a terminal: one line, not longer than can be read, without control characters."""
+    if len(message) > 20 * MOST_LINE:
+        message = f"{message[: 10 * MOST_LINE]} {message[-10 * MOST_LINE :]}"
+    text = _printable(" ".join(message.split()))
+    return text if len(text) <= MOST_LINE else f"{text[: MOST_LINE - 203]}...{text[-200:]}"
 
 
 def _printable(text: str) -> str:

@@ -6,25 +6,27 @@ import dataclasses as dc
 import os
 import signal
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing import parent_process
 from threading import current_thread, main_thread
 
 import numpy as np
 from joblib import Parallel, delayed
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 from numpy.typing import NDArray
 
 from physid_drake.cell import Cell, Motion, Outcome
 from physid_drake.effects import Effect
 from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
-from physid_drake.errors import TippedError
+from physid_drake.errors import TippedError, WorkerError
 from physid_drake.identify.force_windows import WINDOW
 from physid_drake.identify.kept_rollouts import KeptRollouts, key_of
 from physid_drake.identify.nuisance import Nuisance, apply_nuisance
 from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.problem import CellSpec, PushProblem
 from physid_drake.identify.theta import ThetaMap
+from physid_drake.processes import ENDED, end_with_parent
 
 Array = NDArray[np.float64]
 
@@ -183,8 +185,19 @@ class RolloutPool:
         if self.jobs == 1 or len(tasks) == 1:
             return ([predict(self.spec, self.thetas, task)] for task in tasks)
         size = max(1, min(8, len(tasks) // (2 * self.jobs)))
-        pieces = [tasks[k : k + size] for k in range(0, len(tasks), size)]
-        chunks: Iterable[list[Prediction | None]] = Parallel(n_jobs=self.jobs, return_as="generator")(
-            delayed(_predict_many)(self.spec, self.thetas, piece) for piece in pieces
-        )
-        return chunks
+        return self._in_processes([tasks[k : k + size] for k in range(0, len(tasks), size)])
+
+    def _in_processes(self, pieces: Sequence[Sequence[Task]]) -> Iterator[list[Prediction | None]]:
+        """Each piece's predictions; a process that the system ends is replaced, once where nothing was done since."""
+        left, lost = list(pieces), False
+        while left:
+            try:
+                for chunk in Parallel(n_jobs=self.jobs, return_as="generator", initializer=end_with_parent)(
+                    delayed(_predict_many)(self.spec, self.thetas, piece) for piece in left
+                ):
+                    left, lost = left[1:], False
+                    yield chunk
+            except TerminatedWorkerError as error:
+                if lost:
+                    raise WorkerError(ENDED) from error
+                lost = True
