@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.files import FileError, read_bytes
-from physid_drake.wording import named, one_line
+from physid_drake.wording import named, one_line, shown
 
 MOST_UNPACKED: Final = 1_000_000_000  # bytes of all arrays together
 _KINDS: Final = "biufU"  # truth values, whole and real numbers, text: no pickles, no records
@@ -67,6 +67,6 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
     for size in shape:  # Python's whole numbers do not overflow
         count *= size
     if min(shape, default=0) < 0 or count * dtype.itemsize != len(rest):
-        raise FileError(f"cannot be read: {where} claims {count} numbers, but holds {len(rest)} bytes")
+        raise FileError(f"cannot be read: {where} claims {shown(shape)} numbers, but holds {len(rest)} bytes")
     flat = np.frombuffer(rest, dtype=dtype) if rest else np.zeros(count, dtype=dtype)
     return flat.reshape(shape, order="F" if by_columns else "C").copy()

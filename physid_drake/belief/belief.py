@@ -11,10 +11,11 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from physid_drake.belief.gaussian_process import GaussianProcess, Hyperparameters, fit
-from physid_drake.belief.npz import read_npz
+from physid_drake.belief.npz import check_trials, check_whole, read_npz
 from physid_drake.belief.p_min import entropy, estimate_p_min, weigh_p_min
 from physid_drake.errors import OutputError, ParameterError
 from physid_drake.space import Array, Parameter, ParameterSpace, read_only
+from physid_drake.wording import named, one_line
 
 _FORMAT = "physid-belief/1"
 _SAME_POINT = 1e-12
@@ -292,12 +293,18 @@ class Belief:
         arrays, header = read_npz(path, _FORMAT)
         try:
             return cls._restored(arrays, header)
-        except (KeyError, ValueError, TypeError) as error:
-            raise ParameterError(f"belief '{path}': cannot be read ({error}); delete it to begin anew.") from error
+        except (LookupError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
+            raise ParameterError(
+                f"belief '{named(path)}': cannot be read ({one_line(error)}); delete it to begin anew."
+            ) from error
 
     @classmethod
     def _restored(cls, arrays: dict[str, Array], header: dict[str, Any]) -> "Belief":
         """From the arrays and the header of a file."""
+        check_trials(arrays, len(header["parameters"]))
+        for name in ("n_samples", "exact_limit", "sample_limit", "n_restarts"):
+            check_whole(name, header["settings"][name])
+        check_whole("n_at_fit", header["n_at_fit"])
         saved: dict[str, Any] = {name: arrays[name] for name in _SAVED}
         amplitude, noise = (float(v) for v in arrays["variances"])
         hyper = Hyperparameters(amplitude=amplitude, lengths=arrays["lengths"], noise=noise)
@@ -314,7 +321,7 @@ class Belief:
             space=space,
             settings=BeliefSettings(**header["settings"]),
             gaussian_process=process,
-            prior_power=header["prior_power"],
+            prior_power=float(header["prior_power"]),
             candidates_u=space.to_unit(saved["candidates"]),
             **saved,
         )

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from physid_drake.files import MissingFileError, read_bytes
 from physid_drake.identify.prediction import Prediction
 
 KEY = 16  # bytes
@@ -50,13 +51,15 @@ class KeptRollouts:
         """Read what the file holds; of one that was cut off, what is whole; of one that cannot be read, nothing."""
         self._path, self._most, self._size = path, most, 0
         self._kept: dict[bytes, Prediction | None] = {}
-        if path is None or not path.is_file():
+        if path is None:
             return
         try:
-            content = path.read_bytes()
+            content = read_bytes(path, most=most + len(magic()))
             whole = self._read(content) if content.startswith(magic()) else 0
             if whole < len(content):
                 os.truncate(path, whole)
+        except MissingFileError:
+            return
         except OSError as error:
             self._give_up(error)
 

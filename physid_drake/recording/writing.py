@@ -10,6 +10,7 @@ from pathlib import Path, PurePosixPath
 import yaml
 
 from physid_drake.errors import OutputError
+from physid_drake.files import read_bytes
 from physid_drake.recording.description import DESCRIPTION_FILE, FORMAT, Dumper
 from physid_drake.recording.reading import (
     FORCE,
@@ -161,7 +162,7 @@ def _copy_mesh(shape: MeshShape, folder: Path | None, staging: Path) -> str:
     relative = shape.file.relative_to(root) if within and root is not None else Path("meshes") / shape.file.name
     target = staging / relative
     target.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(shape.file, target)
+    target.write_bytes(read_bytes(shape.file))
     return relative.as_posix()
 
 

@@ -1,3 +1,5 @@
+import json
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -266,5 +268,72 @@ def test_a_file_that_is_not_a_belief_is_refused(tmp_path):
     np.savez(tmp_path / "half.npz", header=np.array('{"format": "physid-belief/1"}'))
     np.savez(tmp_path / "torn.npz", header=np.array('{"format": "physid-be'))
     for name in ("half", "torn"):
-        with pytest.raises(ParameterError, match=r"cannot be read .* delete it"):
+        with pytest.raises(ParameterError, match=r"cannot be read.* delete it"):
             Belief.from_npz(tmp_path / f"{name}.npz")
+
+
+def saved(tmp_path):
+    """The arrays and the header of a belief with three trials."""
+    space = unit_space(2)
+    candidates = space.sample(np.random.default_rng(3), 20, from_prior=False)
+    belief = Belief.start(space, candidates, np.random.default_rng(0))
+    belief.update(candidates[:3], [1.0, 2.0, 3.0], np.random.default_rng(1)).to_npz(tmp_path / "belief.npz")
+    with np.load(tmp_path / "belief.npz") as file:
+        arrays = dict(file)
+    return arrays, json.loads(str(arrays.pop("header")))
+
+
+def loading(tmp_path, arrays, header):
+    text = header if isinstance(header, str) else json.dumps(header)
+    np.savez(tmp_path / "other.npz", header=np.array(text), **arrays)
+    return Belief.from_npz(tmp_path / "other.npz")
+
+
+def refusal(tmp_path, arrays, header):
+    with pytest.raises(ParameterError, match=r"other\.npz") as caught:
+        loading(tmp_path, arrays, header)
+    message = str(caught.value)
+    assert message.isprintable() and len(message) < 600 + len(str(tmp_path))
+
+
+WRONG = {
+    "null": None, "list": [], "number": 3, "text": "x" * 70_000, "truth": True, "nan": float("nan"), "many": 10**30,
+    "lists": [[1.0]], "mapping": {"a": 1}, "negative": -1,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("value", WRONG.values(), ids=WRONG)
+def test_a_header_with_anything_in_the_place_of_a_value_is_one_line(tmp_path, value):
+    arrays, header = saved(tmp_path)
+    assert loading(tmp_path, arrays, header).n_trials == 3
+    refusal(tmp_path, arrays, value)
+    for key in ("format", "parameters", "settings", "n_at_fit"):
+        if not (key == "n_at_fit" and value == 3):
+            refusal(tmp_path, arrays, {**header, key: value})
+            refusal(tmp_path, arrays, {k: v for k, v in header.items() if k != key})
+    for key in ("n_samples", "n_restarts"):
+        if value != 3:
+            refusal(tmp_path, arrays, {**header, "settings": {**header["settings"], key: value}})
+    if value is not True and value != 3:
+        refusal(tmp_path, arrays, {**header, "parameters": [{**header["parameters"][0], "lower": value}] * 2})
+
+
+@pytest.mark.parametrize(
+    "header", ["", "{", "[" * 100_000, "1" * 70_000, "null", '{"format": "physid-belief/1"}', "\ud800"]
+)
+def test_a_header_that_is_no_json_of_a_belief_is_one_line(tmp_path, header):
+    refusal(tmp_path, saved(tmp_path)[0], header)
+
+
+@pytest.mark.parametrize(
+    "name", ["candidates", "log_weights", "tried", "thetas", "errors", "p_min", "lengths", "variances"]
+)
+def test_an_array_that_does_not_fit_the_others_is_one_line(tmp_path, name):
+    arrays, header = saved(tmp_path)
+    array = arrays[name]
+    refusal(tmp_path, {k: v for k, v in arrays.items() if k != name}, header)
+    for other in (array[:-1], array[None], array.astype(str), np.zeros(()), np.zeros((0, 3)), np.array("x")):
+        if name != "tried" or other.dtype.kind != "U":
+            refusal(tmp_path, {**arrays, name: other}, header)
+    if name not in ("errors", "tried"):
+        refusal(tmp_path, {**arrays, name: np.full(array.shape, np.nan)}, header)

@@ -37,6 +37,7 @@ from typing import Final
 import numpy as np
 
 from physid_drake.errors import RecordingError
+from physid_drake.files import FileError, read_text
 from physid_drake.recording.adapters.sources import drawn, source_files
 from physid_drake.recording.outlines import outline_distance
 from physid_drake.recording.planar import planar_poses, turned
@@ -53,6 +54,7 @@ from physid_drake.recording.values import (
     Table,
 )
 from physid_drake.recording.writing import write_recording
+from physid_drake.wording import named
 
 LEG: Final = 0.150
 HEIGHT: Final = 0.050
@@ -169,9 +171,9 @@ def _convert_logs(files: list[Path]) -> list[Push]:
 
 def _read_log(file: Path) -> Iterator[_RawPush]:
     try:
-        lines = [line.split() for line in file.read_text(encoding="utf-8").splitlines() if line.strip()]
-    except (OSError, UnicodeDecodeError) as error:
-        raise RecordingError(f"{file}: cannot be read as text: {error}.") from error
+        lines = [line.split() for line in read_text(file).splitlines() if line.strip()]
+    except FileError as error:
+        raise RecordingError(f"{named(file)}: {error}.") from error
     # The oldest log starts with the first pose, without the number of pushes.
     at = 1 if lines and len(lines[0]) == 1 else 0
     number = 0

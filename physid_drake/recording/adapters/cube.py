@@ -21,21 +21,24 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
-from zipfile import BadZipFile
 
 import numpy as np
 
 from physid_drake.errors import RecordingError
+from physid_drake.files import FileError
+from physid_drake.npz import read_arrays
 from physid_drake.recording.adapters.sources import drawn
 from physid_drake.recording.planar import planar_poses
 from physid_drake.recording.reading import read_recording
 from physid_drake.recording.statistics import estimate_noise
 from physid_drake.recording.values import Array, Box, ObjectModel, PoseStream, Push, Recording, Sensors, Table
 from physid_drake.recording.writing import write_recording
+from physid_drake.wording import named
 
 SIDE: Final = 0.1048
 MASS: Final = 0.37
 RATE: Final = 148.0
+MOST: Final = 1e6
 SHORTEST: Final = 25
 """Samples that a slide must have."""
 LEAST_WAY: Final = 0.03
@@ -98,15 +101,26 @@ def _read(source: Path) -> list[Array]:
     """The tosses (n, 13)."""
     file = source / "contactnets_all.npz" if source.is_dir() else source
     try:
-        with np.load(file, allow_pickle=False) as content:
-            rows, lengths = np.asarray(content["traj"], dtype=np.float64), np.asarray(content["length"], dtype=int)
-    except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
-        raise RecordingError(f"{file}: is no table of tosses: {error}.") from error
-    if rows.ndim != 2 or rows.shape[1] != _COLUMNS or lengths.ndim != 1 or lengths.sum() != len(rows):
-        raise RecordingError(f"{file}: must hold rows of 13 numbers and their lengths, but got {rows.shape}.")
-    if not len(lengths) or (lengths < 1).any() or not (np.linalg.norm(rows[:, 3:7], axis=1) > 0.5).all():
+        content = read_arrays(file)
+    except FileError as error:
+        raise RecordingError(f"{named(file)}: is no table of tosses: {error}.") from error
+    traj, length = content.get("traj"), content.get("length")
+    if traj is None or length is None or traj.dtype.kind not in "iuf" or length.dtype.kind not in "iu":
         raise RecordingError(
-            f"{file}: there must be tosses, every toss needs a row, and every row a quaternion of length 1."
+            f"{named(file)}: is no table of tosses: it must hold numbers 'traj' and whole numbers 'length', but holds"
+            f" {named(', '.join(content)) or 'nothing'}."
+        )
+    rows, lengths = np.asarray(traj, dtype=np.float64), length
+    if lengths.size and not (int(lengths.min()) >= 1 and int(lengths.max()) <= len(np.atleast_1d(rows))):
+        raise RecordingError(f"{named(file)}: every toss must have from 1 to {len(np.atleast_1d(rows))} rows.")
+    lengths = lengths.astype(int)
+    if rows.ndim != 2 or rows.shape[1] != _COLUMNS or lengths.ndim != 1 or lengths.sum() != len(rows):
+        raise RecordingError(f"{named(file)}: must hold rows of 13 numbers and their lengths, but got {rows.shape}.")
+    if not np.isfinite(rows).all() or np.abs(rows).max(initial=0.0) > MOST:
+        raise RecordingError(f"{named(file)}: numbers must be finite and at most {MOST:g}; leave that toss out.")
+    if not len(lengths) or not (np.linalg.norm(rows[:, 3:7], axis=1) > 0.5).all():
+        raise RecordingError(
+            f"{named(file)}: there must be tosses, every toss needs a row, and every row a quaternion of length 1."
         )
     return np.split(rows, np.cumsum(lengths)[:-1])
 

@@ -34,6 +34,7 @@ from physid_drake.recording.planar import planar_poses, turned
 from physid_drake.recording.reading import read_recording
 from physid_drake.recording.values import Hand, HandStream, ObjectModel, Push, Recording, Sensors, Table
 from physid_drake.recording.writing import write_recording
+from physid_drake.wording import one_line, shown
 
 TIP_LENGTH: Final = 0.010
 END_POINT_RATE: Final = 50.0
@@ -175,10 +176,14 @@ def _end_point_pushes(
     file: Path, published: PublishedObject, speed: float, limit: int | None, rng: np.random.Generator
 ) -> list[Push]:
     reader = csv.DictReader(io.StringIO(read_text(file), newline=""))
+    _header(file, reader)
     missing = [column for column in _END_POINT_COLUMNS if column not in (reader.fieldnames or ())]
     if missing:
         raise RecordingError(f"{file}: row 1: column {missing[0]}: is missing; is it a table of end points?")
-    rows = [[_number(file, reader.line_num, c, row[c]) for c in _END_POINT_COLUMNS] for row in reader]
+    try:
+        rows = [[_number(file, reader.line_num, c, row[c]) for c in _END_POINT_COLUMNS] for row in reader]
+    except csv.Error as error:
+        raise RecordingError(f"{file}: row {reader.line_num}: not a readable table: {one_line(error)}.") from error
     if not rows:
         raise RecordingError(f"{file}: row 1: there are no pushes under a header; give a full table.")
     return [
@@ -187,13 +192,20 @@ def _end_point_pushes(
     ]
 
 
+def _header(file: Path, reader: csv.DictReader[str]) -> None:
+    try:
+        _ = reader.fieldnames
+    except csv.Error as error:
+        raise RecordingError(f"{file}: row 1: not a readable table: {one_line(error)}.") from error
+
+
 def _number(file: Path, line: int, column: str, text: str | None) -> float:
     try:
         value = float(text or "")
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise RecordingError(f"{file}: row {line}: column {column}: must be a finite number, but got {text!r}.")
+        raise RecordingError(f"{file}: row {line}: column {column}: must be a finite number, but got {shown(text)}.")
     return value
 
 

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import importlib
+import io
 import json
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from physid_drake.errors import RecordingError
+from physid_drake.files import FileError, read_bytes
 from physid_drake.recording.adapters.mit_shapes import THICKNESS, TIP_RADIUS, PublishedObject
 from physid_drake.recording.outlines import outline_distance
 from physid_drake.recording.planar import planar_poses, turned
 from physid_drake.recording.screening import describe_rows, gap_warnings
 from physid_drake.recording.values import Array, ForceStream, Push
+from physid_drake.wording import named, one_line, shown
 
 KEYS: Final = ("tip_pose", "object_pose", "ft_wrench")
 CLEARANCE: Final = 0.002
 """The force sensor's offset is read while the tip is this far from the object, in m."""
 
+COLUMNS: Final = 4
+MOST_ROWS: Final = 1_000_000
 _OFFSET_SAMPLES: Final = 5
 
 
@@ -55,29 +60,63 @@ def _read_hdf5(file: Path) -> dict[str, Array]:
         raise RecordingError(
             f"{file}: reading HDF5 needs h5py, which is not installed; run `pip install physid_drake[mit]`."
         ) from error
+    content = _content(file)
     try:
-        with h5py.File(file, "r") as opened:
-            return {key: np.asarray(opened[key], dtype=np.float64) for key in KEYS}
+        # From memory: what took the file's place since then could be a pipe, which hangs.
+        with h5py.File(io.BytesIO(content), "r") as opened:
+            return {key: _stream(h5py, opened, file, key) for key in KEYS}
+    except RecordingError:
+        raise
     except KeyError as error:
         raise _missing(file) from error
-    except (OSError, ValueError, TypeError) as error:
-        cause = " ".join(str(error).split())
-        raise RecordingError(f"{file}: not a readable HDF5 file of the MIT pushes: {cause}.") from error
+    except (OSError, ValueError, TypeError, RuntimeError, MemoryError, OverflowError, AttributeError) as error:
+        cause = one_line(error)
+        raise RecordingError(f"{named(file)}: not a readable HDF5 file of the MIT pushes: {cause}.") from error
+
+
+def _content(file: Path) -> bytes:
+    try:
+        return read_bytes(file)
+    except FileError as error:
+        raise RecordingError(f"{named(file)}: {error}.") from error
+
+
+def _stream(h5py: Any, opened: Any, file: Path, key: str) -> Array:
+    """One stream, which is what it claims to be, and in this very file."""
+    link = opened.get(key, getlink=True)
+    if link is None:
+        raise _missing(file)
+    problem = "is a link, and not the numbers themselves"
+    if isinstance(link, h5py.HardLink):
+        found = opened[key]
+        if not isinstance(found, h5py.Dataset) or found.dtype.kind not in "iuf":
+            problem = "must be a table of numbers"
+        elif found.shape is None or len(found.shape) != 2 or found.shape[1] != COLUMNS or found.shape[0] > MOST_ROWS:
+            problem = f"must have shape (n, {COLUMNS}) with at most {MOST_ROWS} rows, but claims {shown(found.shape)}"
+        elif found.external is not None or found.is_virtual:
+            problem = "has its numbers in another file"
+        else:
+            return np.asarray(found, dtype=np.float64)
+    raise RecordingError(f"{named(file)}: {key}: {problem}; is it a raw push?")
 
 
 def _read_json(file: Path) -> dict[str, Array]:
     try:
-        loaded = json.loads(file.read_text(encoding="utf-8"))
+        loaded = json.loads(_content(file).decode("utf-8-sig"))
         return {key: np.asarray(loaded[key], dtype=np.float64) for key in KEYS}
+    except RecordingError:
+        raise
     except KeyError as error:
         raise _missing(file) from error
-    except (OSError, ValueError, TypeError, RecursionError) as error:
-        cause = " ".join(str(error).split())
-        raise RecordingError(f"{file}: not a readable JSON file of the MIT pushes: {cause}.") from error
+    except (ValueError, TypeError, RecursionError, OverflowError, LookupError) as error:
+        cause = one_line(error)
+        raise RecordingError(f"{named(file)}: not a readable JSON file of the MIT pushes: {cause}.") from error
 
 
 def _missing(file: Path) -> RecordingError:
-    return RecordingError(f"{file}: must hold {', '.join(KEYS)}, but one of them is missing; is it a raw push?")
+    return RecordingError(
+        f"{named(file)}: must hold {', '.join(KEYS)}, but one of them is missing; is it a raw push?"
+    )
 
 
 def _cleaned(file: Path, key: str, rows: Array, warnings: list[str]) -> Array:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from physid_drake.errors import RecordingError
+from physid_drake.wording import named, one_line
 
 
 def source_files(source: Path, *suffixes: str) -> list[Path]:
@@ -16,11 +17,16 @@ def source_files(source: Path, *suffixes: str) -> list[Path]:
         RecordingError: if there is none.
     """
     source = Path(source)
-    if source.is_file():
-        return [source]
-    files = sorted(f for f in source.iterdir() if f.suffix.lower() in suffixes) if source.is_dir() else []
+    try:
+        if source.exists() and not source.is_dir():
+            return [source]
+        files = sorted(f for f in source.iterdir() if f.suffix.lower() in suffixes) if source.is_dir() else []
+    except OSError as error:
+        raise RecordingError(f"{named(source)}: cannot be read: {one_line(error)}.") from error
     if not files:
-        raise RecordingError(f"{source}: no {' or '.join(suffixes)} file here; give one, or the folder with them.")
+        raise RecordingError(
+            f"{named(source)}: no {' or '.join(suffixes)} file here; give one, or the folder with them."
+        )
     return files
 
 
