@@ -6,10 +6,11 @@ is open.
 
 from __future__ import annotations
 
+import json
 import os
 import stat
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 MOST_BYTES: Final = 64_000_000
 _KINDS: Final = (
@@ -87,6 +88,26 @@ def read_text(path: Path | str, *, most: int = MOST_BYTES) -> str:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise NotTextError(content[: error.start].count(b"\n") + 1) from error
+
+
+def read_json(path: Path | str, *, most: int = MOST_BYTES) -> Any:
+    """What a file of JSON says.
+
+    Args:
+        path: of the file; links are followed.
+        most: bytes that it may have.
+
+    Raises:
+        MissingFileError: if it is not there.
+        FileError: if it cannot be read as text, or is no JSON.
+    """
+    text = read_text(path, most=most)
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        raise FileError(f"cannot be read: no JSON (line {error.lineno}: {error.msg})") from error
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits; brackets in brackets
+        raise FileError("cannot be read: no JSON that a program wrote") from error
 
 
 def _check(found: os.stat_result, most: int) -> None:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from physid_drake.errors import ConfigError, OutputError
+from physid_drake.files import NotTextError, read_json, read_text
 
 MANIFEST: Final = "manifest.json"
 FORMAT: Final = "physid-folder/1"
@@ -183,8 +184,8 @@ class RunFolder:
             OutputError: if it cannot be read.
         """
         try:
-            return (self.path / name).read_text(encoding="utf-8") if self.holds(name) else None
-        except UnicodeDecodeError:
+            return read_text(self.path / name) if self.holds(name) else None
+        except NotTextError:
             return ""  # somebody changed it: it is no text of ours
         except OSError as error:
             raise OutputError(f"'{self.path / name}': cannot be read: {_cause(error)}.") from error
@@ -302,7 +303,7 @@ def _manifest(path: Path) -> tuple[str | None, tuple[str, ...]]:
     if not file.exists():
         return None, ()
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = read_json(file)
         command, names = content["command"], content["files"]
         if content["format"] != FORMAT or not all(isinstance(word, str) for word in (command, *names)):
             raise ValueError("not of this format")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses as dc
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from physid_drake.errors import ConfigError
+from physid_drake.files import FileError, read_json
 from physid_drake.identify.polish import scatter_freedom
 from physid_drake.model import Model
 from physid_drake.model_reading import load_model
@@ -26,10 +26,12 @@ from physid_drake.report.plan_page import plan_page, plan_png
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.terminal import terminal
 from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text
+from physid_drake.wording import shown
 
 COMMAND = "plan"
 FILES = ("plan.json", "push.csv", "push_1.csv", "push_2.csv")
 FEWEST_TRIALS, TRIALS_PER_SETTING = 24, 16  # of a search
+MOST_PUSHES = 1_000_000  # of a recording
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -156,25 +158,58 @@ def _learnt(folder: Path) -> Learnt:
         if not file.exists():
             continue
         try:
-            content: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-            scatter, caveat = float(content["friction_scatter"]), ""
-            if name == "diagnosis.json":
-                fitted = len(content["fit"]["per_push"])
-                pushes = int(content.get("pushes", fitted))
-                alike = {e["name"]: e["indistinguishable_from"] for e in content["effects"]}
-                caveat = caveat_of(content["verdict"], alike)
-            else:
-                fitted = len(content["training"]["pushes"])
-                pushes = fitted + len(content["held_out"]["pushes"])
-        except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError, OverflowError, AttributeError) as error:
-            text = " ".join(str(error).split())
-            raise ConfigError(f"'{file}': cannot be read: {type(error).__name__}: {text}.") from error
-        if not 0.0 <= scatter < 1.0:
-            raise ConfigError(f"'{file}': friction_scatter must be in [0, 1), but is {scatter:g}.")
-        if pushes < 0:
-            raise ConfigError(f"'{file}': pushes must be at least 0, but is {pushes}.")
-        return Learnt(caveat=caveat, friction_scatter=scatter, scatter_freedom=scatter_freedom(fitted), pushes=pushes)
+            return _learnt_from(read_json(file), of_diagnosis=name == "diagnosis.json")
+        except FileError as error:
+            raise ConfigError(f"'{file}': {error}.") from error
+        except ConfigError as error:
+            raise ConfigError(f"'{file}': {error}") from error
     return Learnt()
+
+
+def _learnt_from(content: Any, *, of_diagnosis: bool) -> Learnt:
+    """What a result says.
+
+    Raises:
+        ConfigError: naming the key and the rule.
+    """
+    scatter = _value(content, "friction_scatter", int, float)
+    if not 0.0 <= scatter < 1.0:
+        raise ConfigError(f"friction_scatter must be in [0, 1), but is {shown(scatter)}.")
+    if of_diagnosis:
+        fitted = len(_value(content, "fit.per_push", list, dict))
+        pushes = _value(content, "pushes", int) if "pushes" in content else fitted
+        found = _value(content, "effects", list)
+        rivals = [[str(rival) for rival in _value(e, "indistinguishable_from", list)] for e in found]
+        alike = {_value(e, "name", str): names for e, names in zip(found, rivals, strict=True)}
+        caveat = caveat_of(_value(content, "verdict", str), alike)
+    else:
+        fitted, caveat = len(_value(content, "training.pushes", list, dict)), ""
+        pushes = fitted + len(_value(content, "held_out.pushes", list, dict))
+    if not 0 <= pushes <= MOST_PUSHES:
+        raise ConfigError(f"pushes must be from 0 to {MOST_PUSHES}, but is {shown(pushes)}.")
+    return Learnt(
+        caveat=caveat, friction_scatter=float(scatter), scatter_freedom=scatter_freedom(fitted), pushes=pushes
+    )
+
+
+def _value(content: Any, path: str, *kinds: type) -> Any:
+    """The value at a dotted path, of one of these kinds.
+
+    Raises:
+        ConfigError: if it is missing, or of another kind.
+    """
+    value = content
+    for key in path.split("."):
+        if not isinstance(value, dict) or key not in value:
+            raise ConfigError(f"key '{path}' is missing; run its command again.")
+        value = value[key]
+    if not isinstance(value, kinds) or isinstance(value, bool):
+        words = " or ".join(_WORDS[kind] for kind in kinds)
+        raise ConfigError(f"key '{path}' must be {words}, but is {shown(value)}; run its command again.")
+    return value
+
+
+_WORDS = {int: "a whole number", float: "a number", str: "text", list: "a list", dict: "a mapping"}
 
 
 def _places(arguments: argparse.Namespace, model: Model) -> tuple[tuple[float, float, float], tuple[float, float]]:

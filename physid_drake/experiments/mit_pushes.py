@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses as dc
+import io
 import math
 import re
 import tempfile
@@ -37,6 +38,7 @@ from physid_drake.experiments.learning import (
     search_trials,
 )
 from physid_drake.experiments.values import Entry, Panel, Record, Result, Table, mean_and_deviation, series_of
+from physid_drake.files import read_text
 from physid_drake.identify import ThetaConfig
 from physid_drake.identify.problem import PushProblem
 from physid_drake.identify.rollouts import predict
@@ -342,8 +344,7 @@ def _table(folder: Path, name: str) -> Path:
 
 def _published(source: Path, recording: Recording) -> dict[str, Array]:
     """Errors (n, 3) of the published predictions of a recording's pushes; each note says which row it was."""
-    with source.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = list(csv.DictReader(io.StringIO(read_text(source), newline="")))
     chosen = []
     for push in recording.pushes:
         found = re.search(r"row (\d+)", push.note)

@@ -12,6 +12,7 @@ from typing import Any
 
 from physid_drake.errors import OutputError
 from physid_drake.experiments.values import Experiment, Record
+from physid_drake.files import FileError, read_json
 from physid_drake.processes import in_processes
 from physid_drake.progress import Progress
 from physid_drake.run_folder import SETTINGS, RunFolder, settings_text
@@ -72,9 +73,9 @@ def _kept(folder: RunFolder, index: int) -> Record | None:
     if not file.exists():
         return None
     try:
-        record: Record = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise OutputError(f"'{file}': cannot be read: {error}; delete it to make it again.") from error
+        record: Record = read_json(file)
+    except FileError as error:
+        raise OutputError(f"'{file}': {error}; delete it to make it again.") from error
     return record
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 import re
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from physid_drake.files import read_text
 from physid_drake.prove.diagnosing import FRESH_ERRORS, RESULT, attempt_of, verdict_of
 from physid_drake.prove.real import RealCase
 from physid_drake.prove.score import NOT_AS_WRITTEN, described, number
@@ -140,8 +142,7 @@ def published_errors(file: Path, notes: list[str]) -> dict[str, tuple[float, flo
         file: table of end points.
         notes: of the pushes, which end with ``row <number>``, the header being row 1.
     """
-    with file.open(encoding="utf-8", newline="") as stream:
-        rows = list(csv.DictReader(stream))
+    rows = list(csv.DictReader(io.StringIO(read_text(file), newline="")))
     numbers = [int(match[1]) - 2 for note in notes if (match := re.search(r"row (\d+)$", note))]
     found = {}
     for model in PUBLISHED:

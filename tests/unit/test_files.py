@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from physid_drake.files import FileError, MissingFileError, NotTextError, read_bytes, read_text
+from physid_drake.files import FileError, MissingFileError, NotTextError, read_bytes, read_json, read_text
 
 
 def refusal(path, **options):
@@ -71,3 +71,19 @@ def test_what_is_missing_and_what_is_no_text_say_so(tmp_path):
     with pytest.raises(NotTextError, match="line 2 is not UTF-8") as caught:
         read_text(tmp_path / "noise")
     assert caught.value.line == 2
+
+
+@pytest.mark.parametrize(
+    "text", ["", "{", "[" * 100_000, "1" * 70_000, "{1:", "\ud800", "nope", "\x00"], ids=range(8)
+)
+def test_what_is_no_json_is_one_line(tmp_path, text):
+    file = tmp_path / "a.json"
+    file.write_bytes(text.encode("utf-8", "surrogatepass"))
+    with pytest.raises(FileError, match="cannot be read") as caught:
+        read_json(file)
+    assert str(caught.value).isprintable() and len(str(caught.value)) < 120
+
+
+def test_json_is_read(tmp_path):
+    (tmp_path / "a.json").write_text('{"a": [1, null]}')
+    assert read_json(tmp_path / "a.json") == {"a": [1, None]}
