@@ -1,4 +1,4 @@
-"""How often a diagnosis is right, in one proof or several together: diagnose.py [PROOF ...] [--worlds 20] [--seed 1].
+"""How often a diagnosis is right, in one proof or several together: diagnose.py [PROOF ...] [--worlds 20] [--seed N].
 
 PROOF is a folder of ``prove`` in which worlds have been diagnosed, or an archive of one in ``docs/answers``, scored
 when it was opened. Without one, ``prove`` makes and diagnoses as many worlds as are asked for (``pip install
@@ -29,7 +29,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("proofs", type=Path, nargs="*", metavar="PROOF")
     parser.add_argument("--worlds", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seed", type=int)
     given = parser.parse_args()
     try:
         folders = given.proofs or [made(given.worlds, given.seed)]
@@ -52,8 +52,8 @@ def main():
 
 def made(worlds, seed):
     """The folder of a proof that has been made and diagnosed."""
-    folder = Path("proofs") / f"seed_{seed}"
-    words = ["prove", "--worlds", str(worlds), "--seed", str(seed), "--out", str(folder)]
+    folder = Path("proofs") / "worlds"
+    words = ["prove", "--worlds", str(worlds), *([] if seed is None else ["--seed", str(seed)]), "--out", str(folder)]
     status = subprocess.run([sys.executable, "-m", "physid_drake", *words], check=False).returncode
     if status != 0:
         sys.exit(status)  # it has said why

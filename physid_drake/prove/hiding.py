@@ -43,18 +43,31 @@ def hide(folders: Sequence[str]) -> str:
     there = [real for folder in folders if os.path.isdir(real := os.path.realpath(folder))]  # noqa: PTH112
     if not there or not sys.platform.startswith("linux"):
         return PERMISSIONS
+    # Tried by another process first: one that gets half of it has no name for its user, or no /proc.
+    return MOUNTS if _works(there) and _hidden(there) else PERMISSIONS
+
+
+def _works(folders: Sequence[str]) -> bool:
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if _hidden(folders) else 1)
+    return os.waitpid(child, 0)[1] == 0
+
+
+def _hidden(folders: Sequence[str]) -> bool:
+    """Hide folders, and say whether that has worked."""
     try:
         users = _own_mounts()
         _mount(None, "/", None, _WITH_ALL_BELOW | _PRIVATE)  # nothing of what follows is seen outside
-        _hide_processes(there[0])
-        for folder in there:
+        _hide_processes(folders[0])
+        for folder in folders:
             if Path(folder).is_dir():  # it may lie in one before it
                 _mount("none", folder, "tmpfs", _READ_ONLY | _INERT, "mode=000,size=4k")
         _leave_hidden_folder()
         _give_up_rights(0 if users else 1 << _WRITE_ANYWHERE)
     except (OSError, AttributeError):  # AttributeError: a C library without such calls
-        return PERMISSIONS
-    return MOUNTS
+        return False
+    return True
 
 
 def _own_mounts() -> bool:

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import shutil
 import sys
 
 import numpy as np
@@ -123,7 +124,10 @@ def test_a_recording_gets_a_neutral_name_and_fresh_pushes_stay_apart(published, 
     assert given.name == case.id and "rect1" not in given.name
     notes = [{push.note for push in part.pushes} for part in (given, held)]
     assert not notes[0] & notes[1]
+    assert [path.name for path in (out / "held_out").iterdir()] == [case.id]
     before = {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
+    assert prepare(case, published, out, pushes=16, seed=1) is None
+    shutil.rmtree(out / "held_out" / case.id)  # as where it was interrupted between the two
     assert prepare(case, published, out, pushes=16, seed=1) is None
     assert before == {file: file.read_bytes() for file in out.rglob("*") if file.is_file()}
 
