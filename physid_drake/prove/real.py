@@ -17,6 +17,7 @@ from typing import Final
 import numpy as np
 
 from physid_drake.errors import PhysidError
+from physid_drake.npz import read_arrays
 from physid_drake.recording import Recording, read_recording, write_recording
 from physid_drake.recording.adapters import convert_cmu, convert_cube, convert_mit
 
@@ -109,17 +110,22 @@ def prepare(case: RealCase, published: Path, out: Path, *, pushes: int = PUSHES,
     if case.convert is None:
         return slides_of_squares(source)
     full = out / "held_out" / f"{case.id}_all"
-    for stale in (given, held, full):
+    parts = full.with_name(f"{case.id}_given"), full.with_name(f"{case.id}_fresh")
+    for stale in (given, held, full, *parts):
         shutil.rmtree(stale, ignore_errors=True)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # pushes that cannot be used: the command `convert` says so
             case.convert(source, full, limit=pushes + FRESH, seed=seed)
-        _split(read_recording(full), case, given, held, pushes, seed)
+        _split(read_recording(full), case, *parts, pushes, seed)
+        given.parent.mkdir(parents=True, exist_ok=True)
+        for part, folder in zip(parts, (given, held), strict=True):
+            part.rename(folder)  # whole or not at all: both are there, or both are made again
     except PhysidError as error:
         return str(error)
     finally:
-        shutil.rmtree(full, ignore_errors=True)
+        for part in (full, *parts):
+            shutil.rmtree(part, ignore_errors=True)
     return None
 
 
@@ -136,8 +142,7 @@ def _split(drawn: Recording, case: RealCase, given: Path, held: Path, pushes: in
 
 def slides_of_squares(file: Path) -> str:
     """Why drops of a square between two plates are not diagnosed, with the figures that show it."""
-    with np.load(file, allow_pickle=False) as content:
-        drops = np.asarray(content["traj"], dtype=np.float64)
+    drops = np.asarray(read_arrays(file)["traj"], dtype=np.float64)
     ways = []
     for drop in drops:
         moves = (np.abs(drop[:, 2] - drop[-1, 2]) > _LEAN) | (np.abs(drop[:, 1] - drop[-1, 1]) > _CLIMB)
