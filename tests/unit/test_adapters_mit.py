@@ -224,3 +224,63 @@ def test_the_published_pusher_ends_one_radius_from_the_outline(tmp_path, shape):
         gaps.append(outline_distance(outline, [local])[0])
     # Some pushes slide past the object; half of them end in contact.
     assert np.quantile(gaps, 0.35) == pytest.approx(TIP_RADIUS, abs=0.7e-3)
+
+
+def hostile(path, make):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        for key, rows in raw_push().items():
+            if key != "tip_pose":
+                file[key] = rows
+        make(h5py, file)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (
+            lambda h5py, file: file.create_dataset("tip_pose", shape=(10**9, 4), chunks=(1000, 4)),
+            "at most 1000000 rows",
+        ),
+        (lambda h5py, file: file.create_dataset("tip_pose", shape=(10, 10**8), chunks=(1, 1000)), r"shape \(n, 4\)"),
+        (lambda h5py, file: file.create_dataset("tip_pose", data=h5py.Empty("f8")), r"shape \(n, 4\)"),
+        (lambda h5py, file: file.create_dataset("tip_pose", data=[[b"x"] * 4] * 4), "a table of numbers"),
+        (lambda h5py, file: file.create_group("tip_pose"), "a table of numbers"),
+        (
+            lambda h5py, file: file.create_dataset(
+                "tip_pose", shape=(10, 4), dtype="f8", external=[("/etc/passwd", 0, 320)]
+            ),
+            "in another file",
+        ),
+        (lambda h5py, file: file.__setitem__("tip_pose", h5py.ExternalLink("/etc/passwd", "/a")), "is a link"),
+        (lambda h5py, file: file.__setitem__("tip_pose", h5py.SoftLink("/ft_wrench")), "is a link"),
+    ],
+    ids=range(8),
+)
+@pytest.mark.filterwarnings("ignore:.*left out:UserWarning")
+def test_a_stream_is_as_large_as_it_says_and_in_its_own_file(tmp_path, make, said):
+    with pytest.raises(RecordingError, match=said):
+        convert_mit(hostile(tmp_path / f"{raw_name()}.h5", make), tmp_path / "r")
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".json"])
+@pytest.mark.filterwarnings("ignore:.*left out:UserWarning")
+def test_a_pipe_is_no_push(tmp_path, suffix):
+    path = tmp_path / f"{raw_name()}{suffix}"
+    os.mkfifo(path)
+    with pytest.raises(RecordingError, match="it is a named pipe"):
+        convert_mit(path, tmp_path / "r")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["[" * 100_000, "[]", "3", '{"tip_pose": 3}', '{"tip_pose": [[1e999]]}', "1" * 70_000, '{"tip_pose": {"a": 1}}'],
+)
+@pytest.mark.filterwarnings("ignore:.*left out:UserWarning")
+def test_what_is_no_push_in_json_is_one_line(tmp_path, text):
+    path = tmp_path / f"{raw_name()}.json"
+    path.write_text(text)
+    with pytest.raises(RecordingError) as caught:
+        convert_mit(path, tmp_path / "r")
+    assert str(caught.value).isprintable() and len(str(caught.value)) < 400 + len(str(tmp_path))

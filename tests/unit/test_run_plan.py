@@ -93,6 +93,25 @@ def test_the_results_beside_a_model_give_scatter_and_order(folder, tmp_path, few
             run_plan._learnt(folder)
 
 
+@pytest.mark.parametrize("odd", [None, [], {}, "x" * 70_000, True, -1, 1e308, float("nan"), 10**400], ids=range(9))
+def test_a_result_with_anything_in_the_place_of_a_value_is_one_line(tmp_path, odd):
+    diagnosis = {
+        "friction_scatter": 0.02, "fit": {"per_push": [1]}, "pushes": 30, "verdict": "explained",
+        "effects": [{"name": "table_tilt", "indistinguishable_from": []}],
+    }  # fmt: skip
+    changes = [{**diagnosis, key: odd} for key in diagnosis]
+    changes += [{**diagnosis, "fit": {"per_push": odd}}, {**diagnosis, "effects": [odd]}, odd]
+    changes += [{**diagnosis, "effects": [{"name": odd, "indistinguishable_from": odd}]}]
+    for content in changes:
+        (tmp_path / "diagnosis.json").write_text(json.dumps(content))
+        try:
+            run_plan._learnt(tmp_path)
+        except ConfigError as error:
+            message = str(error)
+            assert "diagnosis.json" in message and message.isprintable() and len(message) < 250 + len(str(tmp_path))
+            assert "Error" not in message
+
+
 @pytest.mark.parametrize(
     ("verdict", "alike", "said"),
     [

@@ -202,3 +202,38 @@ def test_a_mesh_of_noise_is_refused(tmp_path):
     file.write_bytes(bytes(range(128, 256)) * 4)
     with pytest.raises(CellError, match=r"noise\.obj"):
         solid_of(MeshShape(file=file, scale=1.0))
+
+
+def test_drake_gets_a_mesh_from_memory_and_follows_nothing_that_it_names(box_mesh):
+    secret = box_mesh.file.parent / "secret.png"
+    secret.write_bytes(b"what nobody is to see")
+    (box_mesh.file.parent / "own.mtl").write_text(f"newmtl red\nmap_Kd {secret}\n", encoding="utf-8")
+    box_mesh.file.write_text("mtllib own.mtl\nusemtl red\n" + BOX_OBJ, encoding="utf-8")
+    ((shape, _),) = solid_of(box_mesh).visual
+    source = shape.source()
+    assert source.is_in_memory() and not source.in_memory().supporting_files
+    assert b"mtl" not in source.in_memory().mesh_file.contents()
+
+
+@pytest.mark.parametrize(
+    "line", ["f 1 2 999999999", "f 1 2 9", "f -1 -2 -100000000", "f 0 0 0", "v nan 0 0", "mtllib /etc/passwd"]
+)
+def test_a_mesh_that_would_break_drake_never_gets_there(box_mesh, line):
+    box_mesh.file.write_text(f"{BOX_OBJ}{line}\n", encoding="utf-8")
+    with pytest.raises(CellError, match=r"box\.obj"):
+        solid_of(box_mesh)
+
+
+@pytest.mark.parametrize("scale", [1e-12, 1e-308, 1e6, 1e308])
+def test_a_mesh_of_no_size_is_refused(box_mesh, scale):
+    with pytest.raises(CellError, match=r"box\.obj.* scale"):
+        solid_of(MeshShape(file=box_mesh.file, scale=scale))
+
+
+def test_faces_that_enclose_nothing_leave_the_hull(box_mesh):
+    want = solid_of(box_mesh)
+    vertices, _, faces = BOX_OBJ.partition("\nf ")
+    for other in ("", "f 1 1 1", "f 1 2 3", "f 1 2 3\nf 1 3 2", "f " + faces.replace("1", "2")):
+        box_mesh.file.write_text(f"{vertices}\n{other}\n", encoding="utf-8")
+        assert solid_of(box_mesh).gyration == pytest.approx(want.gyration, rel=0.5)
+        Cell(box_mesh, hand_radius=None)
