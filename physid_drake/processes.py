@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import os
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -14,6 +16,8 @@ from typing import Final, TypeVar
 from physid_drake.errors import WorkerError
 
 T = TypeVar("T")
+_LIBC: Final = ctypes.CDLL(None)
+_PR_SET_PDEATHSIG: Final = 1
 LOOK: Final = 0.5  # s between looks at whether the parent lives
 ENDED: Final = (
     "a process was ended by the system, perhaps for want of memory; the same command with fewer jobs goes on from"
@@ -26,6 +30,11 @@ def end_with_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_watch, args=[parent.pid], daemon=True).start()
+
+
+def killed_with_parent() -> None:
+    """From now on the system kills this process when the one that started it is gone, even if it is busy."""
+    _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _watch(parent: int | None) -> None:

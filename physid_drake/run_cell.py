@@ -175,7 +175,7 @@ def _show(result: Identification, identifier: Identifier, recording: Recording, 
     for line in odd[:MOST_WARNINGS]:
         console.print(f"Note: {line}", markup=False)
     if len(odd) > MOST_WARNINGS:
-        console.print(f"and {len(odd) - MOST_WARNINGS} more: python -m physid_drake inspect")
+        console.print(f"and {len(odd) - MOST_WARNINGS} more: physid_drake inspect")
     if identifier.pool.diverged:
         console.print(f"{identifier.pool.diverged} of {identifier.pool.count} rollouts diverged and count as failed.")
 

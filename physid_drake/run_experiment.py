@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def command_of(arguments: argparse.Namespace) -> str:
     """The command that makes the same numbers again; a folder of pushes by its name alone."""
-    words = ["python", "-m", "physid_drake", "experiment", arguments.name]
+    words = ["physid_drake", "experiment", arguments.name]
     words += ["--quick"] if arguments.quick else []
     words += ["--seed", str(arguments.seed)]
     words += ["--data", arguments.data.name or "FOLDER"] if arguments.data is not None else []

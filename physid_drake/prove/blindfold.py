@@ -19,6 +19,7 @@ import threading
 from collections.abc import Iterator
 from typing import Final
 
+from physid_drake.processes import killed_with_parent
 from physid_drake.prove.hiding import hide
 
 HIDDEN_BY: Final = "the truth is hidden by: "
@@ -139,6 +140,7 @@ def main() -> None:
     folders, *words = sys.argv[1:]
     hidden = json.loads(folders)
     print(HIDDEN_BY + hide(hidden), flush=True)
+    killed_with_parent()
     blind_to(*hidden)
     sys.argv = ["physid_drake", *words]
     runpy.run_module("physid_drake", run_name="__main__", alter_sys=True)

@@ -22,6 +22,7 @@ from physid_drake.errors import ConfigError
 from physid_drake.model import AS_W, Correlation, Model
 from physid_drake.recording import Prism
 from physid_drake.resources import shipped
+from physid_drake.run_folder import RunFolder
 
 DRAG = "viscous_drag.coefficient"
 
@@ -62,7 +63,7 @@ def test_results_go_to_a_folder_named_after_the_recordings(tmp_path, monkeypatch
     shutil.copytree(shipped("recordings") / "eraser_reference", tmp_path / "mine")
     assert main(["diagnose", "mine"]) == 130
     assert "the same command goes on from there" in capsys.readouterr().out
-    (tmp_path / "diagnoses" / "mine" / "diagnosis.json").write_text("{}")
+    RunFolder(path=tmp_path / "diagnoses" / "mine", command="diagnose").write("diagnosis.json", "{}")
     assert main(["diagnose", "mine"]) == 130
     shown = capsys.readouterr().out
     assert "going on with what was kept, rollouts: 1" in shown and "it is gone" not in shown
