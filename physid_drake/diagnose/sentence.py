@@ -21,7 +21,7 @@ def _nothing_found(verdict: str, *, fewest: int | None, known: bool, quieter: fl
     if quieter is not None:
         return (
             "The plain cell explains these pushes as far as they tell: the noise that counts, stated or seen, is"
-            f" {quieter:.2g} times what is left, and nothing smaller than it can be seen."
+            f" {quieter:,.0f} times what is left, and nothing smaller than it can be seen."
         )
     return "The plain cell explains these pushes: nothing is missing that they could show."
 

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.identify.force_windows import windows_of
-from physid_drake.identify.frames import MOVED
+from physid_drake.identify.frames import HEAVIEST, LIGHTEST, MOVED
 from physid_drake.recording import Push, Recording
+from physid_drake.recording.clocks import FEWEST
 
 Array = NDArray[np.float64]
 
@@ -24,6 +25,7 @@ WEAKEST, STRONGEST = 0.01, 20.0
 LIGHTEST_GUESS, HEAVIEST_GUESS = 20.0, 8000.0  # kg/m^3, between which a mass is sought that nobody stated
 HOVERS = 0.01  # m above or below the table: beyond a frame's errors
 HOVERS_SHARE = 0.25  # of its height: half of it is an origin at the object's foot
+HASTY = 4e-4  # s between samples of the object: no tracker is as fast, and one of 40 Hz seems so in minutes
 LAST = 4  # quarters of a push, in the last of which the object has come down
 
 
@@ -34,6 +36,7 @@ def implausible(recording: Recording) -> tuple[str, ...]:
         *_table(recording, solid),
         *_density(recording, solid),
         *_forces(recording, solid),
+        *_hasty(recording),
         *_hovering(recording, solid),
         *_never_turning(recording),
         *_repeated(recording),
@@ -61,8 +64,8 @@ def _table(recording: Recording, solid: Solid) -> tuple[str, ...]:
 def _density(recording: Recording, solid: Solid) -> tuple[str, ...]:
     mass = recording.object.mass
     density = None if mass is None else mass / _volume(solid)
-    if density is None or LIGHT <= density <= HEAVY:
-        return ()
+    if density is None or LIGHT <= density <= HEAVY or not LIGHTEST < density < HEAVIEST:
+        return ()  # what is not between the latter two is refused
     what = "lighter than foam" if density < LIGHT else "heavier than lead"
     return (f"with {mass:g} kg the object would be {what} ({density:.3g} kg/m^3); is its mass in kg?",)
 
@@ -100,6 +103,19 @@ def _pushing_force(push: Push) -> float:
 
 def _moves(push: Push) -> bool:
     return float(np.linalg.norm(np.ptp(push.object.positions[:, :2], axis=0))) > MOVED
+
+
+def _hasty(recording: Recording) -> tuple[str, ...]:
+    """Times in minutes, which are sixty times as dense."""
+    streams = [push.object.times for push in recording.pushes if len(push.object) >= FEWEST]
+    intervals = [float(np.median(np.diff(times))) for times in streams]
+    usual = float(np.median(intervals)) if intervals else HASTY
+    if usual >= HASTY:
+        return ()
+    return (
+        f"the object's samples are {1e3 * usual:.2g} ms apart (median); are times in seconds, and those of the"
+        " measurement?",
+    )
 
 
 def _hovering(recording: Recording, solid: Solid) -> tuple[str, ...]:

@@ -35,8 +35,8 @@ HAND_QUATERNION: Final = ("hand_qw", "hand_qx", "hand_qy", "hand_qz")
 OBJECT_POSITION: Final = ("object_x_m", "object_y_m", "object_z_m")
 OBJECT_QUATERNION: Final = ("object_qw", "object_qx", "object_qy", "object_qz")
 FORCE: Final = ("force_x_n", "force_y_n", "force_z_n")
-MOST_ROWS: Final = 300_000
-"""Of one table: five minutes at 1 kHz. A push takes seconds, and each of its rows some 20 us to read."""
+MOST_ROWS: Final = 200_000
+"""Of one table: three minutes at 1 kHz. A push takes seconds, and each of its rows some 20 us to read."""
 
 COLUMNS: Final = (TIME, *HAND_POSITION, *HAND_QUATERNION, *OBJECT_POSITION, *OBJECT_QUATERNION, *FORCE)
 

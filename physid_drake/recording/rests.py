@@ -40,12 +40,13 @@ QUIET_SHARE: Final = 0.35
 GROWTH: Final = 1.3
 """From one length to the next at which a rest is asked whether it still is one."""
 
-MOST_BLOCKS: Final = 1000
+MOST_BLOCKS: Final = 300
 """Of a rest are looked at: their median tells what scatters, and no log of hours takes longer."""
 
 FEWEST_IN_BLOCK: Final = 3
 """Samples, of which fewer show no scatter; so seldom seen, a block is longer than ``LONG``."""
 
+_KEPT: Final = "_rests"
 _LIMITS: Final = np.array([REST_SPEED, REST_SPEED, REST_TURN_RATE])
 
 
@@ -58,6 +59,13 @@ def rests_of(stream: PoseStream) -> list[slice]:
     does not seem to rest at both of its ends is looked at again, with as much of it as its bends show. A slide that
     ends would pass for such noise, but does not stay where it was.
     """
+    # A stream is frozen, and asked for its rests by all that looks at it.
+    if _KEPT not in vars(stream):
+        vars(stream)[_KEPT] = tuple(_find_rests(stream))
+    return list(vars(stream)[_KEPT])
+
+
+def _find_rests(stream: PoseStream) -> list[slice]:
     count = len(stream)
     if count < 2 * SHORTEST_REST:
         return []

@@ -52,6 +52,9 @@ MOST_BRAKE: Final = 40.0
 LEAST_SWAP: Final = 5e-3
 """A leap of the object that stays and is shorter [m] may be its tracker's noise."""
 
+LONG_STEP: Final = 10.0
+"""In s between samples: with that brake an object comes 2 km meanwhile, which is no leap of any."""
+
 FEW: Final = 11
 """Poses at either end of what lies between such leaps, whose median tells where the object was."""
 
@@ -254,7 +257,8 @@ def _find_swaps(times: Array, positions: Array, quaternions: Array, lone: Sequen
     def stands_out(k: int) -> bool:
         i = int(np.searchsorted(moves, k))
         beside = [float(far[moves[j]]) for j in (i - 1, i + 1) if 0 <= j < len(moves)]
-        least = max(LEAST_SWAP, 0.5 * MOST_BRAKE * float(times[k + 1] - times[k]) ** 2)
+        interval = min(float(times[k + 1] - times[k]), LONG_STEP)
+        least = max(LEAST_SWAP, 0.5 * MOST_BRAKE * interval**2)
         return float(far[k]) > max(least, LEAP_FACTOR * max(beside, default=0.0))
 
     return [k for k in lone if stands_out(k)]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Final, Literal, TypeAlias, get_args
 
@@ -91,15 +92,17 @@ class PoseStream:
 
     __hash__ = None  # type: ignore[assignment]
 
-    @property
+    @cached_property
     def planar(self) -> Array:
-        """(n, 3): x and y in m, and the yaw in rad, unwrapped so that it has no steps of a full turn.
+        """(n, 3), read-only: x and y in m, and the yaw in rad, unwrapped so that it has no steps of a full turn.
 
         Yaw is the heading of the object's y axis, which a cylinder that rolls about it keeps.
         """
         w, x, y, z = self.quaternions.T
         yaw = np.arctan2(2.0 * (w * z - x * y), 1.0 - 2.0 * (x * x + z * z))
-        return np.column_stack([self.positions[:, :2], unwrapped(self.times, yaw)])
+        planar = np.column_stack([self.positions[:, :2], unwrapped(self.times, yaw)])
+        planar.setflags(write=False)
+        return planar
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -72,7 +72,7 @@ def verdict(result: Identification) -> str:
     if quieter is not None:
         return (
             f"The plain cell leaves far less than the noise that counts (reduced chi-square {chi2:.2g}, 1 expected):"
-            f" that is {quieter:.2g} times what is left, and nothing smaller than it can be seen. Is it stated too"
+            f" that is {quieter:,.0f} times what is left, and nothing smaller than it can be seen. Is it stated too"
             " large (sensors of recording.yaml)?"
         )
     if result.explains:
