@@ -15,7 +15,7 @@ from physid_drake.wording import named, one_line
 # A date of no calendar, a tag that does not fit its value, and a thousand brackets are no YAMLError.
 NO_YAML = (yaml.YAMLError, ValueError, TypeError, AttributeError, LookupError, RecursionError, OverflowError)
 WHOLE = re.compile(r"[-+]?(0|[1-9][0-9_]*|0x[0-9a-fA-F_]+)")
-MOST_BYTES: Final = 4_000_000  # of a text: what people write has thousands
+MOST_BYTES: Final = 2_000_000  # of a text: what people write has thousands
 MOST_NODES: Final = 10_000  # of a text whose aliases are written out
 MOST_PLAIN: Final = 200_000  # of a text without aliases: a thousand pushes with notes have four thousand
 MOST_LETTERS: Final = 1000  # of a number

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from physid_drake.wording import named, shown
 MOST_BYTES: Final = 64_000_000
 MOST_VERTICES: Final = 500_000
 MOST_TRIANGLES: Final = 1_000_000
+LONGEST_LINE: Final = 100_000
 LARGEST: Final = 1e9
 """A coordinate, in the file's unit."""
 THINNEST: Final = 1e-4
@@ -118,11 +120,14 @@ def check_solid(mesh: ObjMesh, scale: float, file: Path) -> None:
 
 
 def _statements(text: str) -> Iterator[tuple[int, list[str]]]:
-    """Number of the first line and words of every statement that is not empty."""
+    """Number of the first line and words of every statement that is not empty; no words of one that is too long."""
     begun, first = "", 0
-    for number, raw in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1):
+    for number, raw in enumerate(io.StringIO(text, newline=None), 1):
         first = first if begun else number
-        line = begun + raw.partition("#")[0]
+        line = begun + raw.rstrip("\n").partition("#")[0]
+        if len(line) > LONGEST_LINE:
+            yield first, []
+            return
         if line.endswith("\\"):
             begun = line[:-1] + " "
             continue
@@ -136,6 +141,8 @@ def _statements(text: str) -> Iterator[tuple[int, list[str]]]:
 
 def _take(words: list[str], vertices: list[list[float]], triangles: list[list[int]]) -> None:
     """Take up one statement; those that say nothing of the shape are passed over."""
+    if not words:
+        raise RecordingError(f"a statement must have at most {LONGEST_LINE} characters; make the mesh coarser.")
     match words[0]:
         case "v":
             vertices.append(_point(words[1:]))

@@ -80,6 +80,8 @@ def test_what_was_parsed_is_written_and_parsed_again(obj):
         ("f 1 2", "at least 3 corners, but has 2"),
         ("f", "at least 3 corners"),
         ("f 1 2 x", "must be whole numbers"),
+        ("f" + " 1" * 60_000, "at most 100000 characters"),
+        ("f 1 2 3 \\\n" * 20_000, "at most 100000 characters"),
         ("f 1 2 3.0", "must be whole numbers"),
         ("f 1/2/3/4 2 3", "must be whole numbers"),
         ("f 1/x 2 3", "must be whole numbers"),
@@ -95,6 +97,7 @@ def test_what_was_parsed_is_written_and_parsed_again(obj):
         ("v 1_0 2 3", "a coordinate must be a number"),
         (f"v {'x' * 400} 2 3", "a coordinate must be a number"),
     ],
+    ids=lambda value: value[:20],
 )
 def test_a_line_that_breaks_a_rule_is_refused_with_its_number(obj, line, said):
     message = refusal(obj(f"{TETRAHEDRON}{line}\n"))

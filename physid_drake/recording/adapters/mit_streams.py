@@ -103,6 +103,8 @@ def _stream(h5py: Any, opened: Any, file: Path, key: str) -> Array:
 def _read_json(file: Path) -> dict[str, Array]:
     try:
         loaded = json.loads(_content(file).decode("utf-8-sig"))
+        if not isinstance(loaded, dict):
+            raise _missing(file)
         return {key: np.asarray(loaded[key], dtype=np.float64) for key in KEYS}
     except RecordingError:
         raise
