@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from physid_drake.errors import RecordingError
+from physid_drake.wording import shown
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -60,7 +61,7 @@ def check_positive(name: str, unit: str, *values: float | None) -> None:
     """
     for value in values:
         if value is not None and not (np.isfinite(value) and value > 0.0):
-            raise RecordingError(f"{name} must be positive, but got {value!r} {unit}; correct it.")
+            raise RecordingError(f"{name} must be positive, but got {shown(value)} {unit}; correct it.")
 
 
 def check_not_negative(name: str, unit: str, value: float | None) -> None:
@@ -70,7 +71,7 @@ def check_not_negative(name: str, unit: str, value: float | None) -> None:
         RecordingError: if it is.
     """
     if value is not None and not (np.isfinite(value) and value >= 0.0):
-        raise RecordingError(f"{name} must not be negative, but got {value!r} {unit}; correct it.")
+        raise RecordingError(f"{name} must not be negative, but got {shown(value)} {unit}; correct it.")
 
 
 def check_choice(name: str, got: str, choices: tuple[str, ...]) -> None:
@@ -80,4 +81,4 @@ def check_choice(name: str, got: str, choices: tuple[str, ...]) -> None:
         RecordingError: if it is not.
     """
     if got not in choices:
-        raise RecordingError(f"{name} must be one of {', '.join(choices)}, but got {got!r}; choose one of them.")
+        raise RecordingError(f"{name} must be one of {', '.join(choices)}, but got {shown(got)}; choose one of them.")

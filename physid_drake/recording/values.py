@@ -30,6 +30,7 @@ from physid_drake.recording.limits import (
 )
 from physid_drake.recording.outlines import check_polygon
 from physid_drake.recording.turns import unwrapped
+from physid_drake.wording import shown
 
 Array: TypeAlias = npt.NDArray[np.float64]
 TipShape = Literal["cylinder", "sphere", "capsule", "reflex_sf"]
@@ -160,19 +161,19 @@ class Push:
 
     def __post_init__(self) -> None:
         check_text("a push's name", self.name)
-        check_text(f"push {self.name!r}: note", self.note, lines=True)
+        check_text(f"push {shown(self.name)}: note", self.note, lines=True)
         if len(self.object) < 2:
             raise RecordingError(
-                f"push {self.name!r}: at least two object poses are needed, but got {len(self.object)}; "
+                f"push {shown(self.name)}: at least two object poses are needed, but got {len(self.object)}; "
                 "record the pose before and after the push."
             )
         if self.hand is not None and len(self.hand) < 2:
             raise RecordingError(
-                f"push {self.name!r}: a hand's path needs at least two samples, but there is {len(self.hand)}; "
+                f"push {shown(self.name)}: a hand's path needs at least two samples, but there is {len(self.hand)}; "
                 "record where it was before and after the push."
             )
         if self.force is not None and self.hand is None:
-            raise RecordingError(f"push {self.name!r}: a hand force needs a hand; add the hand's path.")
+            raise RecordingError(f"push {shown(self.name)}: a hand force needs a hand; add the hand's path.")
 
     def _streams(self) -> list[PoseStream | ForceStream]:
         return [stream for stream in (self.object, self.hand, self.force) if stream is not None]
@@ -248,7 +249,9 @@ class MeshShape:
     def __post_init__(self) -> None:
         check_positive("scale", "", self.scale)
         if not self.file.is_absolute():
-            raise RecordingError(f"a mesh's file must be an absolute path, but got {str(self.file)!r}; resolve it.")
+            raise RecordingError(
+                f"a mesh's file must be an absolute path, but is {shown(str(self.file))}; resolve it."
+            )
 
 
 Shape: TypeAlias = Box | Cylinder | Prism | MeshShape
@@ -311,7 +314,7 @@ class Hand:
         if long and self.length is None:
             raise RecordingError(f"a {self.tip} tip needs length_m, but there is none; add it.")
         if not long and self.length is not None:
-            raise RecordingError(f"a {self.tip} tip has no length_m, but got {self.length!r} m; remove it.")
+            raise RecordingError(f"a {self.tip} tip has no length_m, but got {shown(self.length)} m; remove it.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -360,17 +363,17 @@ class Recording:
         check_text("name", self.name)
         check_text("description", self.description, lines=True)
         if not self.pushes:
-            raise RecordingError(f"recording {self.name!r}: pushes must not be empty; add at least one push.")
+            raise RecordingError(f"recording {shown(self.name)}: pushes must not be empty; add at least one push.")
         names = [push.name for push in self.pushes]
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:
-            raise RecordingError(f"recording {self.name!r}: two pushes are named {twice!r}; rename one.")
+            raise RecordingError(f"recording {shown(self.name)}: two pushes are named {shown(twice)}; rename one.")
         for push in self.pushes:
             if (push.hand is None) != (self.hand is None):
                 what = "has no hand path" if push.hand is None else "has a hand path"
                 rule = "describes no hand" if self.hand is None else "describes one"
                 raise RecordingError(
-                    f"push {push.name!r} {what} but recording {self.name!r} {rule}; give both or neither."
+                    f"push {shown(push.name)} {what} but recording {shown(self.name)} {rule}; give both or neither."
                 )
 
     def subset(self, names_or_indices: Iterable[str | int]) -> Recording:
@@ -391,7 +394,7 @@ class Recording:
                 chosen.append(self.pushes[key])
             else:
                 raise RecordingError(
-                    f"recording {self.name!r} has no push {key!r}; it has {len(self.pushes)}, "
-                    f"from {self.pushes[0].name!r} to {self.pushes[-1].name!r}."
+                    f"recording {shown(self.name)} has no push {shown(key)}; it has {len(self.pushes)}, "
+                    f"from {shown(self.pushes[0].name)} to {shown(self.pushes[-1].name)}."
                 )
         return replace(self, pushes=tuple(chosen))

@@ -31,6 +31,7 @@ from physid_drake.recording.values import (
     Recording,
     Sensors,
 )
+from physid_drake.wording import shown
 
 
 def write_recording(recording: Recording, folder: Path) -> None:
@@ -85,7 +86,9 @@ def _push_files(recording: Recording) -> list[str]:
         name = push.name if push.name.endswith(".csv") else f"pushes/{push.name}.csv"
         path = PurePosixPath(name)
         if path.is_absolute() or ".." in path.parts or "\\" in name or "\0" in name or str(path) in files:
-            raise OutputError(f"push {push.name!r}: cannot be a file of its own within a folder; rename the push.")
+            raise OutputError(
+                f"push {shown(push.name)}: cannot be a file of its own within a folder; rename the push."
+            )
         files.append(str(path))
     return files
 

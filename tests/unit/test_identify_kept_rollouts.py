@@ -1,6 +1,7 @@
 """Rollouts that are kept are not made again, and a file of them that was cut off holds those that are whole."""
 
 import dataclasses as dc
+import os
 
 import numpy as np
 import pytest
@@ -137,3 +138,11 @@ def test_a_run_that_is_interrupted_keeps_what_was_made(monkeypatch, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         pool.run([Asked(np.array([value])) for value in (1.0, 2.0, 3.0, 4.0)])
     assert len(KeptRollouts(tmp_path / "rollouts.bin")) == 2
+
+
+def test_a_pipe_in_the_place_of_the_file_is_left_alone(tmp_path):
+    os.mkfifo(tmp_path / "rollouts.bin")
+    with pytest.warns(UserWarning, match="no longer kept"):
+        kept = KeptRollouts(tmp_path / "rollouts.bin")
+    kept.keep({b"0" * 16: None})
+    assert len(kept) == 1

@@ -1,10 +1,12 @@
 """A recording's digest: the same for the same recording, another one after any change."""
 
 import dataclasses as dc
+import os
 import shutil
 
 import pytest
 
+from physid_drake.errors import RecordingError
 from physid_drake.recording import MeshShape, digest_of, read_recording
 from physid_drake.resources import shipped
 
@@ -47,3 +49,13 @@ def test_a_mesh_counts_by_what_is_in_it_and_not_by_where_it_is(recording, tmp_pa
 
     first, copy, other = with_mesh("a", "v 0 0 0\n"), with_mesh("b", "v 0 0 0\n"), with_mesh("c", "v 0 0 1\n")
     assert digest_of(first) == digest_of(copy) != digest_of(other)
+
+
+def test_a_mesh_that_cannot_be_read_any_more_is_one_line(recording, tmp_path):
+    file = tmp_path / "object.obj"
+    meshed = dc.replace(recording, object=dc.replace(recording.object, shape=MeshShape(file=file)))
+    with pytest.raises(RecordingError, match=r"object\.obj.*no such file"):
+        digest_of(meshed)
+    os.mkfifo(file)
+    with pytest.raises(RecordingError, match="it is a named pipe"):
+        digest_of(meshed)

@@ -17,6 +17,7 @@ import numpy as np
 from physid_drake.errors import RecordingError
 from physid_drake.recording.outlines import polygon_centroid
 from physid_drake.recording.values import Array, Box, Prism, Shape
+from physid_drake.wording import shown
 
 THICKNESS: Final = 0.013
 TIP_RADIUS: Final = 0.00475
@@ -103,5 +104,5 @@ def published_object(name: str, place: str) -> PublishedObject:
             "convert another shape, or record it by hand with a mesh."
         )
     if name not in OBJECTS:
-        raise RecordingError(f"{place}: unknown shape {name!r}; the known ones are {', '.join(OBJECTS)}.")
+        raise RecordingError(f"{place}: unknown shape {shown(name)}; the known ones are {', '.join(OBJECTS)}.")
     return OBJECTS[name]
