@@ -103,7 +103,7 @@ def parsed(text: str, where: str, *, aliases: bool = True) -> Any:
             check_size(node)
         return loader.construct_document(node)
     except NO_YAML as error:
-        raise ConfigError(f"{where}: is no YAML: {_cause(error)}.") from error
+        raise ConfigError(f"{where}: is no YAML: {cause(error)}.") from error
 
 
 def read_yaml(path: Path, where: str, *, aliases: bool = True) -> Any:
@@ -124,8 +124,10 @@ def read_yaml(path: Path, where: str, *, aliases: bool = True) -> Any:
     return parsed(text, where, aliases=aliases)
 
 
-def _cause(error: Exception) -> str:
+def cause(error: Exception) -> str:
     """What is wrong, and on which line where that is known."""
+    if isinstance(error, yaml.reader.ReaderError):
+        return f"its character number {error.position + 1} is U+{error.character:04X}, which no YAML may hold"
     if not isinstance(error, yaml.MarkedYAMLError):
         return one_line(error)
     mark = error.problem_mark or error.context_mark

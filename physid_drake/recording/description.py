@@ -31,8 +31,8 @@ from physid_drake.recording.values import (
     Table,
     TipShape,
 )
-from physid_drake.wording import named, one_line, shown
-from physid_drake.yaml_text import MOST_BYTES, NO_YAML, PlainLoader
+from physid_drake.wording import named, shown
+from physid_drake.yaml_text import MOST_BYTES, NO_YAML, PlainLoader, cause
 
 FORMAT: Final = "physid-recording/1"
 DESCRIPTION_FILE: Final = "recording.yaml"
@@ -180,7 +180,7 @@ def load_description(folder: Path) -> Section:
     except NO_YAML as error:
         if isinstance(error, RecordingError):
             raise
-        raise RecordingError(f"{place}: line 1: not valid YAML: {one_line(error)}; correct it.") from error
+        raise RecordingError(f"{place}: line 1: not valid YAML: {cause(error)}; correct it.") from error
     if not isinstance(values, dict):
         raise RecordingError(f"{place}: line 1: must be a mapping of keys to values, but got {shown(values)}.")
     top = Section(file=file, path="", values=values, lines=lines)

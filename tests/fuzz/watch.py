@@ -104,7 +104,8 @@ class Watch:
         if event == "open":
             path, mode, flags = arguments
             changes = bool(flags & _CHANGING) if isinstance(flags, int) else any(c in "wax+" for c in mode or "")
-            self._note(path, "written" if changes else "read")
+            follows = not (isinstance(flags, int) and flags & os.O_NOFOLLOW)
+            self._note(path, "written" if changes else "read", follows=follows)
         elif event in _WRITES:
             self._note(arguments[0], "written")
         elif event in _PAIRS:
@@ -114,11 +115,12 @@ class Watch:
         elif event in _NEVER and not (event == "ctypes.dlopen" and arguments[0] is None):
             self._seen.append(f"{event}{tuple(map(str, arguments))!r:.200}")
 
-    def _note(self, path: Any, how: str) -> None:
+    def _note(self, path: Any, how: str, *, follows: bool = True) -> None:
         if path is None or isinstance(path, int):
             return
         try:
-            real = os.path.realpath(os.fsdecode(path))
+            folder, name = os.path.split(os.fsdecode(path))
+            real = os.path.realpath(os.fsdecode(path)) if follows else f"{os.path.realpath(folder or '.')}/{name}"
         except (ValueError, OSError):  # a NUL: nothing is opened
             return
         if f"{real}/".startswith(self._inside) or real == "/dev/null":

@@ -99,6 +99,21 @@ def test_a_tracker_error_is_left_out_by_name(tmp_path):
         assert len(convert_cmu(log, tmp_path / "r").pushes) == 1
 
 
+def test_numbers_out_of_all_proportion_are_left_out_by_name(tmp_path):
+    lines = synthetic_push()
+    lines[0] = lines[0].replace("600.0", "1e300")
+    with pytest.warns(UserWarning, match="push 1: a number that is not finite, or beyond"):
+        recording = convert_cmu(write_log(tmp_path / "exp.txt", lines, synthetic_push()), tmp_path / "r")
+    assert len(recording.pushes) == 1
+
+
+def test_a_last_sample_long_after_the_others_does_not_stop_the_hand(tmp_path):
+    lines = synthetic_push()
+    lines[-1] = " ".join([f"{START + 100.0}", *lines[-1].split()[1:]])
+    push = convert_cmu(write_log(tmp_path / "exp.txt", lines), tmp_path / "r").pushes[0]
+    assert np.isfinite(push.hand.positions).all()
+
+
 def test_the_name_of_the_logs_folder_does_not_enter_the_recording(tmp_path):
     source = tmp_path / "30_90_30_30_30_90"
     source.mkdir()

@@ -191,6 +191,16 @@ def test_end_points_become_a_straight_path_at_the_speed_in_the_name(tmp_path):
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
+        (
+            "abs_rect1_v10.csv",
+            f"{COLUMNS}\n0.3,0,3.1,1e300,0,0,0.2,0,0.25,0,9\n",
+            "from -1000 to 1000, but got '1e300'",
+        ),
+        (
+            "abs_rect1_v1.csv",
+            f"{COLUMNS}\n0.3,0,3.1,0,0,0,0.2,0,20,0,9\n",
+            "row 2: the tip .* within 600 s, .* 1.98e.04 s",
+        ),
         ("abs_rect1_v10.csv", f"{COLUMNS}\n0.3,0,3.1,x,0,0,0.2,0,0.25,0,9\n", "row 2: column end_object_x_m"),
         ("abs_rect1_v10.csv", f"{COLUMNS}\n0.3,0\n", "row 2: column start_object_yaw_rad"),
         ("abs_rect1_v10.csv", f"{COLUMNS}\n", "no pushes"),

@@ -102,6 +102,11 @@ def test_whatever_is_wrong_is_one_short_line(text, aliases):
     assert str(caught.value).isprintable() and len(str(caught.value)) < 300
 
 
+def test_a_character_that_no_yaml_may_hold_is_named():
+    with pytest.raises(ConfigError, match=r"its character number 4 is U\+0000, which no YAML may hold\.$"):
+        parsed("a: \0", "here")
+
+
 def test_a_named_pipe_is_no_yaml(tmp_path):
     os.mkfifo(tmp_path / "pipe.yaml")
     with pytest.raises(ConfigError, match="here: cannot be read: it is a named pipe"):

@@ -90,6 +90,7 @@ _EARLIER: Final = _Mounting(force=((1.0, 0.0), (0.0, -1.0)), tip=(-0.0010, -0.00
 _LARGEST_TILT: Final = np.deg2rad(8.0)
 _LARGEST_CLIMB: Final = 0.005
 _LARGEST_TIP_GAP: Final = 0.006
+_LARGEST: Final = 1e10  # of any number: the clock's seconds are since 1970
 _TARE_SAMPLES: Final = 5
 _SHORTEST_INTERVAL: Final = 1e-3
 
@@ -211,12 +212,11 @@ def _count(lines: list[list[str]], at: int) -> int:
 def _is_usable(raw: _RawPush) -> bool:
     problem = None
     stacked = np.vstack([raw.before, raw.after])
-    norms = np.linalg.norm(stacked[:, 3:], axis=1)
     if min(len(raw.force), len(raw.robot)) < 2 * _TARE_SAMPLES:
         problem = f"only {len(raw.force)} force and {len(raw.robot)} robot samples"
-    elif not all(np.isfinite(values).all() for values in (stacked, raw.force, raw.robot)):
-        problem = "a number that is not finite"
-    elif (np.abs(norms - 1.0) > 1e-3).any():
+    elif not all((np.abs(values) <= _LARGEST).all() for values in (stacked, raw.force, raw.robot)):
+        problem = f"a number that is not finite, or beyond {_LARGEST:g}"
+    elif (np.abs(np.linalg.norm(stacked[:, 3:], axis=1) - 1.0) > 1e-3).any():
         problem = "tracker error: a quaternion that is no rotation"
     else:
         tilt = 2.0 * np.arcsin(np.clip(np.hypot(stacked[:, 4], stacked[:, 5]), 0.0, 1.0)).max()
@@ -311,8 +311,8 @@ def _increasing(times: Array) -> list[int]:
 
 def _continued(times: Array, path: Array) -> tuple[Array, Array]:
     """The path (n, 2) at times (n,), continued at its last second's speed for the time the log leaves out."""
-    recent = np.flatnonzero(times >= times[-1] - 1.0)
-    velocity = (path[-1] - path[recent[0]]) / (times[-1] - times[recent[0]])
+    recent = min(int(np.flatnonzero(times >= times[-1] - 1.0)[0]), len(times) - 2)
+    velocity = (path[-1] - path[recent]) / (times[-1] - times[recent])
     steps = np.linspace(0.0, UNLOGGED_TIME, 12)[1:]
     return np.concatenate([times, times[-1] + steps]), np.vstack([path, path[-1] + steps[:, None] * velocity])
 

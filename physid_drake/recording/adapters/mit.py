@@ -30,6 +30,7 @@ from physid_drake.recording.adapters.mit_shapes import (
 from physid_drake.recording.adapters.mit_streams import read_push
 from physid_drake.recording.adapters.sources import drawn, source_files
 from physid_drake.recording.description import read_text
+from physid_drake.recording.limits import FURTHEST
 from physid_drake.recording.planar import planar_poses, turned
 from physid_drake.recording.reading import read_recording
 from physid_drake.recording.values import Hand, HandStream, ObjectModel, Push, Recording, Sensors, Table
@@ -39,6 +40,9 @@ from physid_drake.wording import one_line, shown
 TIP_LENGTH: Final = 0.010
 END_POINT_RATE: Final = 50.0
 """Hand samples per second on the straight path between two published end points."""
+
+MOST_SECONDS: Final = 600.0
+"""From one published end point to the other."""
 
 _RAW_NAME: Final = re.compile(r"motion_surface=(?P<surface>[^_]+)_shape=(?P<shape>[^_]+)_")
 _TABLE_NAME: Final = re.compile(r"(?P<surface>[a-z]+)_(?P<shape>[a-z]+\d?)_v(?P<speed>\d+)")
@@ -204,8 +208,11 @@ def _number(file: Path, line: int, column: str, text: str | None) -> float:
         value = float(text or "")
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
-        raise RecordingError(f"{file}: row {line}: column {column}: must be a finite number, but got {shown(text)}.")
+    if not abs(value) <= FURTHEST:
+        raise RecordingError(
+            f"{file}: row {line}: column {column}: must be a number from -{FURTHEST:g} to {FURTHEST:g}, but got"
+            f" {shown(text)}."
+        )
     return value
 
 
@@ -215,6 +222,11 @@ def _end_point_push(name: str, note: str, row: list[float], published: Published
     poses[:, :2] += turned(poses[:, 2], np.tile(published.centroid, (2, 1)))
     first, last = np.array(row[3:5]), np.array(row[8:10])
     duration = max(float(np.hypot(*(last - first))) / speed, 1.0 / END_POINT_RATE)
+    if duration > MOST_SECONDS:
+        raise RecordingError(
+            f"{note}: the tip must get from end to end within {MOST_SECONDS:g} s, but takes {duration:.3g} s at"
+            " the speed in the file's name; is it right, and is the table in m?"
+        )
     times = np.linspace(0.0, duration, max(2, math.ceil(duration * END_POINT_RATE) + 1))
     path = first + (times / duration)[:, None] * (last - first)
     return Push(
