@@ -51,6 +51,8 @@ def make(rng: Random, folder: Path) -> Case:
         tree["correlation"] = {"names": names, "matrix": [[1.0, 0.5], [0.5, 1.0]]}
         tree |= {"hand_axes": [[1.0, 0.0], [0.0, 1.0]], "tip_height_m": 0.015, "contact_height_m": 0.012,
                  "top_speed_mps": 0.2}  # fmt: skip
+    if rng.random() < 0.3:
+        tree["cell"] = {**tree["cell"], "contact": {**tree["cell"]["contact"], "model": "hydroelastic"}}
     what = rng.random()
     if what < 0.8:
         complete = tree.pop("complete")
@@ -66,7 +68,7 @@ def make(rng: Random, folder: Path) -> Case:
     os.mkfifo(folder / "run/pipe.obj")
     if rng.random() < 0.02:
         replaced(rng, folder / "run/model.yaml")
-    build = rng.random() < 0.06
+    build = rng.random() < 0.2
     # A model names its mesh where the recording has it, wherever that is.
     return Case(partial(_use, folder / "run", build), may_read=(folder.parent / "secret.obj",))
 

@@ -63,7 +63,7 @@ def _traps(root: Path, beside: Path) -> None:
 
 def _sized(rng: Random, tree: dict[str, Any]) -> dict[str, Any]:
     """Sizes from atoms to planets, of one thing or of all."""
-    factor = 10.0 ** rng.uniform(-12.0, 12.0)
+    factor = 10.0 ** (rng.uniform(-12.0, 12.0) if rng.random() < 0.5 else rng.gauss(0.0, 0.5))
     what = rng.choice(("object", "hand", "table", "sensors"))
 
     def grown(value: Any) -> Any:
