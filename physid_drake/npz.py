@@ -59,7 +59,10 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
     if version not in ((1, 0), (2, 0)):
         raise FileError(f"cannot be read: {where} is of another version of npy, {version}")
     header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, by_columns, dtype = header(stream)
+    try:
+        shape, by_columns, dtype = header(stream)
+    except _BROKEN as error:  # NumPy's words may name objects of Python's own grammar
+        raise FileError(f"cannot be read: {where} has no header as NumPy writes it") from error
     if dtype.kind not in _KINDS:
         raise FileError(f"cannot be read: {where} holds no numbers and no text")
     rest = stream.read()

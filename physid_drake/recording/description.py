@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -286,8 +287,13 @@ def push_entries(top: Section, folder: Path) -> list[tuple[str, Path, str]]:
             raise section.refuse("file", f"missing file {shown(name)}; add it or remove this push.")
         if any(path == other for _, other, _ in found):
             raise section.refuse("file", f"{shown(name)} is listed twice; remove one.")
-        found.append((name, path, section.text("note", "")))
+        found.append((_plain_name(name, path, folder), path, section.text("note", "")))
     return found
+
+
+def _plain_name(name: str, path: Path, folder: Path) -> str:
+    """A push's name as it is when the recording is written: within the folder, without ``./`` and ``//``."""
+    return os.path.relpath(path, folder.resolve()) if os.path.isabs(name) else os.path.normpath(name)  # noqa: PTH117
 
 
 def _is_there(path: Path) -> bool:

@@ -24,6 +24,7 @@ _WRITES: Final = ("os.mkdir", "os.remove", "os.rmdir", "os.truncate", "os.chmod"
                   "shutil.rmtree",
                   "os.setxattr")  # fmt: skip
 _PAIRS: Final = ("os.rename", "os.link", "os.symlink", "shutil.move", "shutil.copyfile")
+_FOLLOWING: Final = ("os.truncate", "os.chmod", "os.chown", "os.utime", "os.setxattr", "shutil.copyfile")
 _READS: Final = ("os.listdir", "os.scandir")
 _NEVER: Final = ("subprocess.Popen", "os.system", "os.exec", "os.fork", "os.forkpty", "os.posix_spawn",
                  "socket.connect",
@@ -107,9 +108,9 @@ class Watch:
             follows = not (isinstance(flags, int) and flags & os.O_NOFOLLOW)
             self._note(path, "written" if changes else "read", follows=follows)
         elif event in _WRITES:
-            self._note(arguments[0], "written")
+            self._note(arguments[0], "written", follows=event in _FOLLOWING)
         elif event in _PAIRS:
-            self._note(arguments[1], "written")
+            self._note(arguments[1], "written", follows=event in _FOLLOWING)
         elif event in _READS:
             self._note(arguments[0], "read")
         elif event in _NEVER and not (event == "ctypes.dlopen" and arguments[0] is None):

@@ -50,6 +50,11 @@ def test_a_header_that_claims_what_is_not_there_is_refused(tmp_path, shape):
     assert "claims" in refusal(archive(tmp_path / "a.npz", header_of(shape) + bytes(16)))
 
 
+def test_a_header_that_numpy_does_not_write_is_refused_in_words_of_ours(tmp_path):
+    header = header_of((10,)).replace(b"(10,)", b"2**40")
+    assert refusal(archive(tmp_path / "a.npz", header)).endswith("'traj.npy' has no header as NumPy writes it")
+
+
 @pytest.mark.parametrize("descr", ["|O", [("a", "<f8"), ("b", "|O")], "|V8", "<M8[s]", "<c16"])
 def test_only_numbers_and_text_are_read(tmp_path, descr):
     refusal(archive(tmp_path / "a.npz", header_of((1,), descr) + bytes(16)))

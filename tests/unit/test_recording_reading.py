@@ -5,7 +5,7 @@ import pytest
 from written import HEADER, ROWS, YAML, write
 
 from physid_drake.errors import RecordingError
-from physid_drake.recording import MeshShape, read_recording
+from physid_drake.recording import MeshShape, digest_of, read_recording, write_recording
 
 
 @pytest.fixture
@@ -29,6 +29,14 @@ def test_streams_with_different_clocks_share_one_table(written):
     assert push.object.times.tolist() == [0.0, 0.2]
     assert push.force is None and recording.hand.radius == 0.01
     assert recording.object.mass_std == pytest.approx(0.0005)
+
+
+@pytest.mark.parametrize("file", ["./pushes/001.csv", "pushes//001.csv", "pushes/../pushes/001.csv"])
+def test_a_push_has_the_name_that_it_has_when_it_is_written(written, tmp_path, file):
+    recording = read_recording(written(YAML.replace("pushes/001.csv", file)))
+    assert recording.pushes[0].name == "pushes/001.csv"
+    write_recording(recording, tmp_path / "again")
+    assert digest_of(read_recording(tmp_path / "again")) == digest_of(recording)
 
 
 def test_a_spreadsheets_byte_order_mark_and_line_ends_are_read(written):
