@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from physid_drake.identify.noise import Noise, finest_position, finest_rotation, noise_of
+from physid_drake.identify.stated import MANY_TIMES
 from physid_drake.recording import Push, Recording, rest_segments
 from physid_drake.recording.rest_noise import SeenNoise, apart, seen_noise, usual_interval
 
@@ -27,6 +28,7 @@ CHANCE = 0.05  # of pushes that agree on a jitter there is not; fewer than five 
 CONTRADICTS = 1.15
 SURELY = 3.0  # standard deviations of the logarithm of the variance seen
 FAR_QUIETER = 1.5  # stated over seen
+SAID = 1.5  # times as many: by then the recording's doubts say so
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -182,7 +184,7 @@ def _quieter(what: str, plain: Noise, seen: SeenNoise | None, unit: str, scale: 
     stated = getattr(plain, what)
     if seen is None or plain.source[what] != "stated" or FAR_QUIETER * seen.std > stated:
         return []
-    if 2.0 * math.log(stated / seen.std) < SURELY * seen.doubt:
+    if 2.0 * math.log(stated / seen.std) < SURELY * seen.doubt or stated > SAID * MANY_TIMES * seen.std:
         return []
     return [
         f"the {what} noise at rest is {scale * seen.std:.2g} {unit}, far less than the {scale * stated:.2g} {unit}"
