@@ -27,6 +27,7 @@ SURE = 10.0  # of the criterion, in all streams: smooth ramps must be that much 
 MOST = 20.0  # what one stream may say for or against them; one of a smooth robot that says more keeps straight ones
 VOTERS = 12  # about so many streams of a robot are asked
 FAST = 0.3  # of a stream's largest speed: samples that show whether time stamps are late or early
+STILL = 1e-9  # m/s: of a hand that does not move
 FEWEST_FAST = 40  # of them
 ROUNDS = 3  # of fits, until they show no jitter that is so much
 LARGER = 1.1  # times as large as the one that they were made with
@@ -106,7 +107,7 @@ def _jitter_of(fits: Sequence[StraightFit]) -> float:
     along, across = [np.empty(0)], [np.empty(0)]
     for fit in fits:
         velocities = fit.velocities()
-        fast = np.abs(velocities) > FAST * np.abs(velocities).max()
+        fast = np.abs(velocities) > max(FAST * np.abs(velocities).max(), STILL)
         turned = fit.residuals()[fast] * np.conj(velocities[fast])  # a velocity as x + iy: parts along it and across
         along.append(turned.real / np.abs(velocities[fast]) ** 2)
         across.append(turned.imag / np.abs(velocities[fast]) ** 2)

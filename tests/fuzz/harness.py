@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import select
 import shutil
 import signal
@@ -138,7 +139,11 @@ def _run_some(
 def _ended(at: dict[str, Any] | None, how: str, words: str) -> dict[str, Any]:
     if at is None:
         raise RuntimeError(f"the worker is silent between two inputs: {words}")
-    return {"end": at["begin"], "kind": at["kind"], "outcome": "fault", "group": how, "text": words[-400:],
+    words = words.partition("Extension modules:")[0].strip()
+    # Python names the frames of a process that is aborted, the last one first.
+    frame = re.search(r'/physid_drake/(\S+)", line (\d+) in (\w+)', words)
+    where = f" {frame[1]}:{frame[2]} {frame[3]}" if frame else ""
+    return {"end": at["begin"], "kind": at["kind"], "outcome": "fault", "group": how + where, "text": words[:400],
             "traceback": words}  # fmt: skip
 
 
@@ -148,7 +153,7 @@ def _last_words(child: subprocess.Popen[bytes], log: Any, *, abort: bool = False
         with suppress(subprocess.TimeoutExpired):
             child.wait(2.0)
     log.seek(0)
-    return log.read()[-4000:].decode("utf-8", "replace")
+    return log.read()[-20_000:].decode("utf-8", "replace")
 
 
 def _kill(child: subprocess.Popen[bytes]) -> None:

@@ -9,6 +9,8 @@ from rich.console import Console
 
 from fuzz.case import WrongError
 from fuzz.judge import LONGEST
+from physid_drake.diagnose import case_of, cell_config
+from physid_drake.identify.config import ThetaConfig
 from physid_drake.identify.doubts import doubts
 from physid_drake.identify.refusals import refusals
 from physid_drake.recording import Recording, digest_of, read_recording, write_recording
@@ -17,16 +19,19 @@ from physid_drake.report.picture import write_picture
 from physid_drake.wording import in_one_line
 
 
-def inspect(folder: Path, out: Path, *, picture: bool = False) -> Recording:
+def inspect(folder: Path, out: Path, *, picture: bool = False, prepared: bool = False) -> Recording:
     """Read, look at, write and read again.
 
     Args:
         folder: of the recording.
         out: where it is written.
         picture: whether it is drawn, too, which takes a fifth of a second.
+        prepared: whether it is made ready for a diagnosis, too, which takes as long.
     """
     recording = read_recording(folder)
     look_at(recording, out, picture=picture)
+    if prepared:
+        case_of(recording, cell_config(recording), ThetaConfig(), jobs=1)
     return recording
 
 

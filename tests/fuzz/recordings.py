@@ -45,7 +45,7 @@ def make(rng: Random, folder: Path) -> Case:
     if rng.random() < 0.02:
         replaced(rng, root / "recording.yaml")
     given = root / rng.choice(("recording.yaml", "x" * 300, "pushes", "not there")) if rng.random() < 0.01 else root
-    return Case(partial(inspect, given, folder / "written"))
+    return Case(partial(inspect, given, folder / "written", prepared=rng.random() < 0.5))
 
 
 def _traps(root: Path, beside: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -76,8 +77,8 @@ def _log(rng: Random, folder: Path) -> tuple[Any, Path]:
                 column = rng.randrange(8)
                 factor = rng.choice((0.0, -1.0, 1e3, 1e-3, 1e300))
                 for one in rows[3:]:
-                    if column < len(one):
-                        one[column] = repr(float(one[column]) * factor) if one[column][-1:].isdigit() else one[column]
+                    with suppress(ValueError, IndexError):
+                        one[column] = repr(float(one[column]) * factor)
             case _:
                 rows.extend([list(one) for one in rows[1:]])
         if not rows:
@@ -129,14 +130,14 @@ def _hdf5(rng: Random, folder: Path) -> tuple[Any, Path]:
         for key, rows in _streams(rng).items():
             match rng.randrange(14):
                 case 0:
-                    made[key] = h5py.ExternalLink("../../secret.txt", "/x")
+                    made[key] = h5py.ExternalLink("../secret.txt", "/x")
                 case 1:
                     made[key] = h5py.SoftLink(rng.choice(("/tip_pose", "/nothing", f"/{key}")))
                 case 2:
                     made.create_group(key)
                 case 3:
                     made.create_dataset(
-                        key, shape=(40, 4), dtype="f8", external=[("../../secret.txt", 0, h5py.h5f.UNLIMITED)]
+                        key, shape=(40, 4), dtype="f8", external=[("../secret.txt", 0, h5py.h5f.UNLIMITED)]
                     )
                 case 4:
                     made.create_dataset(

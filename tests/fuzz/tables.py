@@ -34,7 +34,8 @@ def make(rng: Random, folder: Path) -> Case:
     seeds.lay(folder / "r", files)
     if rng.random() < 0.02:
         replaced(rng, folder / "r" / name, secret=folder.parent / "secret.csv")
-    return Case(partial(inspect, folder / "r", folder / "written", picture=rng.random() < 0.01))
+    more = {"picture": rng.random() < 0.01, "prepared": rng.random() < 0.4 and len(rows) < 150}
+    return Case(partial(inspect, folder / "r", folder / "written", **more))
 
 
 def _column(rng: Random, rows: Rows, what: str = "") -> int:

@@ -128,9 +128,19 @@ def break_length(streams):
     return streams
 
 
+def break_size(streams):
+    streams["ft_wrench"][3, 1] = 1e300
+    return streams
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
-    [(break_shape, r"tip_pose: must have shape \(n, 4\)"), (break_key, "missing"), (break_length, "at least two")],
+    [
+        (break_shape, r"tip_pose: must have shape \(n, 4\)"),
+        (break_key, "missing"),
+        (break_length, "at least two"),
+        (break_size, "ft_wrench: every number must be at most"),
+    ],
 )
 @pytest.mark.parametrize("write", [write_json, write_hdf5])
 def test_a_file_without_the_three_streams_is_refused(tmp_path, change, message, write):

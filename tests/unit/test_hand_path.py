@@ -155,3 +155,11 @@ def test_a_stream_that_ends_in_a_smooth_brake_has_a_path(share):
     for path, (times, _, clean) in zip(paths, streams, strict=True):
         assert (np.diff(path.times) > 0.0).all()
         np.testing.assert_allclose(path.positions(times), clean, atol=2.5e-4)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_hand_that_moves_by_next_to_nothing_is_one_that_stands():
+    times = np.arange(60) * 0.02
+    still = np.column_stack([1e-200 * times**2, np.zeros(60)])
+    paths = fit_hand_paths([(times, still)] * 3, 1e-4)
+    assert all(np.abs(path.velocities).max() < 1e-6 for path in paths)

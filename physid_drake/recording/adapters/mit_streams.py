@@ -25,6 +25,8 @@ CLEARANCE: Final = 0.002
 
 COLUMNS: Final = 4
 MOST_ROWS: Final = 1_000_000
+LARGEST: Final = 1e10
+"""Of any number: the clocks' seconds are since 1970."""
 _OFFSET_SAMPLES: Final = 5
 
 
@@ -129,6 +131,8 @@ def _cleaned(file: Path, key: str, rows: Array, warnings: list[str]) -> Array:
     if not finite.all():
         warnings.append(f"{key}: {describe_rows(np.flatnonzero(~finite).tolist())}: not finite, left out.")
     kept = np.flatnonzero(finite)
+    if (np.abs(rows[kept]) > LARGEST).any():
+        raise RecordingError(f"{named(file)}: {key}: every number must be at most {LARGEST:g}; leave the file out.")
     latest = np.maximum.accumulate(rows[kept, 0])
     late = np.concatenate([[False], rows[kept[1:], 0] <= latest[:-1]]) if len(kept) else np.zeros(0, np.bool_)
     if late.any():
