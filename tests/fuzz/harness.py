@@ -101,7 +101,7 @@ def _run_some(
     threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     with tempfile.TemporaryFile() as log:
         child = subprocess.Popen(
-            [sys.executable, "-m", "fuzz.worker", json.dumps(asked)], stdin=subprocess.DEVNULL, stdout=log,
+            [sys.executable, "-P", "-m", "fuzz.worker", json.dumps(asked)], stdin=subprocess.DEVNULL, stdout=log,
             stderr=log,
             pass_fds=(writing,), env={**os.environ, **threads, "PYTHONPATH": paths}, start_new_session=True,
         )  # fmt: skip
