@@ -76,13 +76,26 @@ def test_a_broken_recording_is_one_line_and_status_one(tmp_path, capsys):
 def test_a_plot_that_cannot_be_written_is_an_error(tmp_path, capsys, out):
     write_recording(some_recording(), tmp_path / "r")
     assert cli.main(["inspect", str(tmp_path / "r"), "--out", str(tmp_path / out)]) == 1
-    assert "cannot be written" in capsys.readouterr().err
+    assert str(tmp_path / out) in capsys.readouterr().err
 
 
-def test_a_picture_without_a_suffix_is_refused_before_it_has_another_name(tmp_path, capsys):
+@pytest.mark.parametrize("name", ["top", "top.pgf", "top.html", ".png"])
+def test_what_is_no_picture_is_refused_before_anything_is_drawn(tmp_path, capsys, name):
     write_recording(some_recording(), tmp_path / "r")
-    assert cli.main(["inspect", str(tmp_path / "r"), "--out", str(tmp_path / "top")]) == 1
-    assert "must name a picture" in capsys.readouterr().err and not (tmp_path / "top.png").exists()
+    assert cli.main(["inspect", str(tmp_path / "r"), "--out", str(tmp_path / name)]) == 1
+    assert "must end in .png, .svg, .pdf" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["r"]
+
+
+@pytest.mark.parametrize("name", ["top.png", "top.svg", "top.pdf"])
+def test_a_picture_replaces_only_one_that_was_drawn_before(tmp_path, capsys, name):
+    write_recording(some_recording(), tmp_path / "r")
+    command = ["inspect", str(tmp_path / "r"), "--out", str(tmp_path / name)]
+    assert cli.main(command) == cli.main(command) == 0
+    (tmp_path / name).write_bytes(b"my photograph")
+    assert cli.main(command) == 1
+    assert "was not drawn by this command" in capsys.readouterr().err
+    assert (tmp_path / name).read_bytes() == b"my photograph"
 
 
 def test_convert_writes_a_recording_that_inspect_reads(tmp_path, capsys):
