@@ -40,7 +40,7 @@ from physid_drake.report.svg import drawn, png_of
 from physid_drake.report.terminal import terminal
 from physid_drake.run_folder import SETTINGS, RunFolder, settings_text, versions
 
-WORLDS, QUICK = 200, 10
+WORLDS, QUICK, MOST_WORLDS = 200, 10, 100_000
 COMMAND = "prove"
 WRITTEN = ("page.html", "proof.md", "proof.json", "confusion.png")
 UNKNOWN = "unknown"  # what hid the truth from a diagnosis that does not say so
@@ -99,6 +99,8 @@ def _checked(arguments: argparse.Namespace, out: Path) -> int:
     worlds = int(asked) if asked is not None else sealed or WORLDS
     if worlds < 1:
         raise ConfigError(f"--worlds must be at least 1, but is {worlds}.")
+    if worlds > MOST_WORLDS:
+        raise ConfigError(f"--worlds must be at most {MOST_WORLDS}, but is {worlds}.")
     check_running(arguments)
     return worlds
 

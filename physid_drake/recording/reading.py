@@ -38,6 +38,9 @@ FORCE: Final = ("force_x_n", "force_y_n", "force_z_n")
 MOST_ROWS: Final = 200_000
 """Of one table: three minutes at 1 kHz. A push takes seconds, and each of its rows some 20 us to read."""
 
+CLOSEST: Final = 1e-9
+"""In s between samples of one stream: less is round-off, and a speed over it overflows."""
+
 COLUMNS: Final = (TIME, *HAND_POSITION, *HAND_QUATERNION, *OBJECT_POSITION, *OBJECT_QUATERNION, *FORCE)
 
 
@@ -210,6 +213,14 @@ def _check_length(file: Path, lines: list[int]) -> None:
 
 def _check_seconds(table: _PushTable, times: Array, what: str) -> None:
     """Refuse times of one stream that can be no seconds, before anything is asked of them."""
+    with np.errstate(over="ignore"):
+        close = np.flatnonzero(np.diff(times) < CLOSEST)
+    if len(close):
+        one, other = (float(times[int(close[0]) + k]) for k in (0, 1))
+        raise RecordingError(
+            f"{table.file}: column {TIME}: the {what}'s samples at {one!r} s and {other!r} s are less than a"
+            " nanosecond apart; merge them."
+        )
     try:
         check_seconds(times, f"the {what}'s samples")
     except RecordingError as error:

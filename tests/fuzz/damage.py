@@ -11,11 +11,13 @@ ODD = (b"\0", b"\x80", b"\xff\xfe", b"\x1b[2J", b"\xe2\x80\xa8", b"\xed\xa0\x80"
        b'"', b"'", b",", b"%", b"&", b"*", b"{", b"[", b"\\", b"9" * 400, b"\xc2\xa0", b"\xd9\xa1", b"nan",
        b"-")  # fmt: skip
 
+LARGEST = 20_000_000  # bytes of a damaged file
+
 
 def damaged(rng: Random, content: bytes) -> bytes:
     """The content with one to three kinds of damage."""
     for _ in range(rng.choice((1, 1, 2, 3))):
-        content = rng.choice(DAMAGES)(rng, content)
+        content = rng.choice(DAMAGES)(rng, content)[:LARGEST]
     return content
 
 
@@ -60,7 +62,8 @@ def lines_mixed(rng: Random, content: bytes) -> bytes:
 def line_repeated(rng: Random, content: bytes) -> bytes:
     lines = content.split(b"\n")
     at = rng.randrange(len(lines))
-    return b"\n".join(lines[:at] + lines[at : at + 1] * rng.choice((2, 2, 50, 1000)) + lines[at:])
+    times = min(rng.choice((2, 2, 50, 1000)), 1 + LARGEST // (1 + len(lines[at])))
+    return b"\n".join(lines[:at] + lines[at : at + 1] * times + lines[at:])
 
 
 def other_ends(rng: Random, content: bytes) -> bytes:

@@ -12,11 +12,14 @@ import resource
 import shutil
 import sys
 import tempfile
+import warnings
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from random import Random
 from typing import Any, Final
+
+import numpy as np
 
 from fuzz.case import Case
 from fuzz.judge import Verdict, judged
@@ -51,7 +54,9 @@ def one(watch: Watch, kind: str, make: Maker, seed: int, index: int, scratch: Pa
     """Make one input from seed and index, run it, and look at what it left."""
     base = Path(tempfile.mkdtemp(prefix=f"{kind}_{index}_", dir=scratch))
     try:
-        case = make(Random(f"{seed} {index}"), lay_out(base))
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")  # of what makes it
+            case = make(Random(f"{seed} {index}"), lay_out(base))
         with watch.over(base, case) as seen:
             verdict = judged(case)
         if seen:

@@ -234,6 +234,7 @@ def test_another_proof_in_the_same_folder_is_refused(worlds):
     ("words", "rule"),
     [
         (["--worlds", "0"], "--worlds must be at least 1"),
+        (["--worlds", "2147483648"], "--worlds must be at most 100000"),
         (["--quick", "--worlds", "4"], "give it or --worlds"),
         (["--jobs", "0"], "--jobs must be at least 1"),
         (["--seed", "-1"], "--seed must be at least 0"),

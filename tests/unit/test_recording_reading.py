@@ -39,6 +39,11 @@ def test_a_push_has_the_name_that_it_has_when_it_is_written(written, tmp_path, f
     assert digest_of(read_recording(tmp_path / "again")) == digest_of(recording)
 
 
+def test_streams_whose_clocks_differ_by_round_off_share_one_table(written):
+    rows = [*ROWS[:2], "0.10000000000000002,,,,0.11,0,0.015,1,0,0,0", ROWS[2]]
+    assert len(read_recording(written(rows=rows)).pushes[0].object) == 3
+
+
 def test_a_spreadsheets_byte_order_mark_and_line_ends_are_read(written):
     folder = written()
     text = "\r\n".join([HEADER, *ROWS, "", ""])
@@ -102,6 +107,10 @@ def test_a_description_that_breaks_a_rule_is_refused_by_line_and_key(written, ol
 
 BAD_TABLES = {
     "time repeats": ([*ROWS[:2], "0.1,,,,0.12,0,0.015,1,0,0,0"], "row 4: column time_s: times must increase"),
+    "times are round-off apart": (
+        [*ROWS, "0.2000000000001,,,,0.12,0,0.015,1,0,0,0"],
+        "column time_s: the object's samples at 0.2 s and 0.2000000000001 s are less than a nanosecond apart",
+    ),
     "time empty": ([*ROWS, ",,,,0.12,0,0.015,1,0,0,0"], "row 5: column time_s: is empty"),
     "not a number": ([*ROWS, "0.3,a,0,0,,,,,,,"], "row 5: column hand_x_m: must be a finite number, but got 'a'"),
     "infinite": ([*ROWS, "0.3,inf,0,0,,,,,,,"], "row 5: column hand_x_m: must be a finite"),
