@@ -45,9 +45,8 @@ def main() -> int:
 
 def table_of(tally: Tally) -> Table:
     """One row for each kind of input, and their sum."""
-    table = Table(
-        title=f"{tally.inputs} inputs in {tally.seconds:.0f} s, {tally.inputs / tally.seconds:.0f} a second"
-    )
+    rate, most = tally.inputs / tally.seconds, tally.memory / 1e6
+    table = Table(title=f"{tally.inputs} inputs in {tally.seconds:.0f} s, {rate:.0f} a second, at most {most:.0f} MB")
     for column in ("kind", "inputs", "read", "refused", "warnings", "faults"):
         table.add_column(column, justify="left" if column == "kind" else "right")
     outcomes = ("read", "refused", "warning", "fault")

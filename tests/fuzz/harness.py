@@ -32,12 +32,14 @@ class Tally:
         counts: by kind and outcome.
         faults: by group, the first example and how many; of ``warnings`` likewise.
         seconds: that all took.
+        memory: the most that a process had [bytes].
     """
 
     counts: Counter[tuple[str, str]] = field(default_factory=Counter)
     faults: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     warnings: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     seconds: float = 0.0
+    memory: int = 0
 
     @property
     def inputs(self) -> int:
@@ -45,6 +47,7 @@ class Tally:
 
     def add(self, said: dict[str, Any]) -> None:
         self.counts[said["kind"], said["outcome"]] += 1
+        self.memory = max(self.memory, said.get("memory", 0))
         if said["outcome"] in ("fault", "warning"):
             found = self.faults if said["outcome"] == "fault" else self.warnings
             found.setdefault(f"{said['kind']}: {said['group']}", []).append(said)

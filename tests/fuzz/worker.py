@@ -17,7 +17,7 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 from random import Random
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -42,7 +42,7 @@ def main() -> None:
         kind, make = kinds[index % len(kinds)]
         print(json.dumps({"begin": index, "kind": kind}), file=out)
         verdict = one(watch, kind, make, asked["seed"], index, Path(asked["scratch"]), keep=asked["keep"])
-        print(json.dumps({"end": index, "kind": kind, **vars(verdict)}), file=out)
+        print(json.dumps({"end": index, "kind": kind, "memory": memory(), **vars(verdict)}), file=out)
         if verdict.group == MEMORY:
             return  # what it took is not given back
 
@@ -61,7 +61,7 @@ def one(watch: Watch, kind: str, make: Maker, seed: int, index: int, scratch: Pa
             verdict = judged(case)
         if seen:
             verdict = Verdict("fault", "outside: " + seen[0].split(":")[0], "; ".join(seen)[:1000], verdict.traceback)
-        elif resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 > MOST_MEMORY:
+        elif memory() > MOST_MEMORY:
             verdict = Verdict("fault", MEMORY, verdict.text)
     finally:
         if not keep:
@@ -69,9 +69,9 @@ def one(watch: Watch, kind: str, make: Maker, seed: int, index: int, scratch: Pa
     return verdict
 
 
-def described(verdict: dict[str, Any]) -> str:
-    """A fault as one line."""
-    return f"[{verdict['end']}] {verdict['kind']}: {verdict['group']}: {verdict['text']}"
+def memory() -> int:
+    """The most that this process has had [bytes]."""
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 if __name__ == "__main__":
