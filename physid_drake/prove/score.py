@@ -258,8 +258,9 @@ def checked(found: Outcome) -> Outcome:
     """
     if not all(isinstance(name, str) for names in found.classes for name in names):
         raise TypeError("a name must be a text")
-    if not all(map(is_number, (*found.probabilities, *found.errors, *found.theta_errors))):
-        raise TypeError("a probability or an error must be a number")
+    figures = (*found.probabilities, *found.errors, *found.theta_errors)
+    if not all(is_number(one) and abs(one) < math.inf for one in figures):
+        raise TypeError("a probability or an error must be a finite number")
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -126,9 +127,9 @@ def changed_arrays(rng: Random, arrays: dict[str, Any]) -> dict[str, Any]:
                 if not arrays:
                     return {"x": np.zeros(1)}
             case 1:
-                arrays[name] = one.astype(
-                    rng.choice(("f4", "i8", "U20", "c16", "bool", "S10", "u1", ">f8", "f2")), casting="unsafe"
-                )
+                kind = rng.choice(("f4", "i8", "U20", "c16", "bool", "S10", "u1", ">f8", "f2"))
+                with suppress(ValueError):  # a word is no number
+                    arrays[name] = one.astype(kind, casting="unsafe")
             case 2:
                 arrays[name] = np.resize(one, rng.choice(((0,), (1,), (7,), (2, 2), (3, 13), (0, 13), (), (1, 1, 1))))
             case 3 if one.dtype.kind == "f" and one.size:

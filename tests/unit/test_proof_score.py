@@ -5,6 +5,7 @@ import json
 
 import pytest
 
+from physid_drake.errors import ProofError
 from physid_drake.prove.figures import figures_of, table
 from physid_drake.prove.score import Outcome, _holds, outcome, read_outcomes
 
@@ -138,3 +139,16 @@ def test_the_table_counts_worlds(tmp_path):
     assert rows["effect below 5 sigma: found"] == "0 of 0"
     assert rows["not in the catalogue: unexplained"] == "0 of 1 (0 %)"
     assert rows["amplitudes, of pairs, too: 90 % intervals that hold the truth"] == "1 of 1 (100 %)"
+
+
+@pytest.mark.parametrize("value", [float("inf"), float("nan"), 1e308])
+def test_figures_that_are_not_finite_are_not_as_a_diagnosis_writes_them(tmp_path, value):
+    answer = said()
+    answer["effects"][0]["parameters"]["coefficient"]["value"] = value
+    (tmp_path / "sealed").mkdir()
+    (tmp_path / "sealed/0a.json").write_text(json.dumps(truth(value=0.1)))
+    (tmp_path / "diagnoses/0a").mkdir(parents=True)
+    (tmp_path / "diagnoses/0a/attempt.json").write_text(json.dumps({"seconds": 1.0, "error": None}))
+    (tmp_path / "diagnoses/0a/diagnosis.json").write_text(json.dumps(answer))
+    with pytest.raises(ProofError, match="a probability or an error must be a finite number"):
+        read_outcomes(tmp_path / "sealed", tmp_path / "diagnoses")
