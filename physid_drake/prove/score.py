@@ -230,6 +230,7 @@ def _read_truth(file: Path) -> dict[str, Any]:
         f"'kind' must be one of {', '.join(_KINDS)}": truth.get("kind") in _KINDS,
         "'size_sigma' must be a number": is_number(truth.get("size_sigma")),
         "'effects' must be a list of names with their parameters": _are_effects(truth.get("effects")),
+        "'effects' must not be empty": bool(truth.get("effects")) or truth.get("kind") not in ("effect", "pair"),
         "'theta' must be numbers by name": _are_numbers(truth.get("theta", {})),
         "'held_out_floor' must be numbers by name": _are_numbers(truth.get("held_out_floor", {})),
     }

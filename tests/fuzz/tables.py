@@ -163,6 +163,7 @@ def shifted(rng: Random, rows: Rows) -> Rows:
 
 def turned(rng: Random, rows: Rows) -> Rows:
     columns = _named(rows, rng.choice(("object_q", "hand_q")))
+    columns = columns[:4]
     if len(columns) < 4:
         return rows
     kind = rng.randrange(5)

@@ -152,3 +152,13 @@ def test_figures_that_are_not_finite_are_not_as_a_diagnosis_writes_them(tmp_path
     (tmp_path / "diagnoses/0a/diagnosis.json").write_text(json.dumps(answer))
     with pytest.raises(ProofError, match="a probability or an error must be a finite number"):
         read_outcomes(tmp_path / "sealed", tmp_path / "diagnoses")
+
+
+@pytest.mark.parametrize("kind", ["effect", "pair"])
+def test_a_truth_with_effects_names_them(tmp_path, kind):
+    (tmp_path / "sealed").mkdir()
+    (tmp_path / "sealed/0a.json").write_text(json.dumps(truth(kind, ())))
+    (tmp_path / "diagnoses/0a").mkdir(parents=True)
+    (tmp_path / "diagnoses/0a/diagnosis.json").write_text(json.dumps(said()))
+    with pytest.raises(ProofError, match=r"0a\.json' cannot be read: 'effects' must not be empty"):
+        read_outcomes(tmp_path / "sealed", tmp_path / "diagnoses")
