@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from physid_drake.cell.forces import ForceLaw, Wrench
+from physid_drake.cell.laws import Quadratic, Viscous
 from physid_drake.cell.object_state import ObjectState
 from physid_drake.effects.effect import Coordinate, Effect, PushFacts, Surroundings, parameter
 from physid_drake.ranges import NOT_NEGATIVE
@@ -16,11 +17,6 @@ from physid_drake.ranges import NOT_NEGATIVE
 # that is 12 cm wide and 3 cm high by a seventh of what friction holds). Beside slow pushes alone, a drag far above
 # friction does what a support near the middle does: it brakes turns less than motion.
 STRONGEST, STRONGEST_AT = 10.0, 0.1
-
-
-def _mean_decay(share: float) -> float:
-    """Mean of exp(-share t) over t in 0..1: what is left, on the average of a tick, of a speed that decays so."""
-    return -math.expm1(-share) / share if share > 0.0 else 1.0
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -43,21 +39,7 @@ class ViscousDrag(Effect):
 
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
         """The drag."""
-        return (_ViscousLaw(self.coefficient, facts.polar),)
-
-
-@dc.dataclass(frozen=True)
-class _ViscousLaw:
-    coefficient: float
-    polar: float
-
-    def wrench(self, state: ObjectState) -> Wrench:
-        # The mean over the tick of the exact decay, v exp(-c t / m): never drives backwards, however strong.
-        turning = self.coefficient * self.polar
-        force = self.coefficient * _mean_decay(self.coefficient * state.span / state.mass)
-        torque = turning * _mean_decay(turning * state.span / state.inertia)
-        fx, fy = (-force * state.v_WBcm).tolist()
-        return Wrench(fx=fx, fy=fy, torque=-torque * state.yaw_rate)
+        return (Viscous(self.coefficient, facts.polar),)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -83,18 +65,7 @@ class QuadraticDrag(Effect):
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
         """The drag."""
         del facts
-        return (_QuadraticLaw(self.coefficient),)
-
-
-@dc.dataclass(frozen=True)
-class _QuadraticLaw:
-    coefficient: float
-
-    def wrench(self, state: ObjectState) -> Wrench:
-        vx, vy = state.v_WBcm.tolist()
-        drag = self.coefficient * math.hypot(vx, vy)
-        factor = -drag / (1.0 + state.span * drag / state.mass)  # from the exact decay, v / (1 + k v t / m)
-        return Wrench(fx=factor * vx, fy=factor * vy, torque=0.0)
+        return (Quadratic(self.coefficient),)
 
 
 @dc.dataclass(frozen=True, kw_only=True)

@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.cell.forces import ForceLaw, Wrench
-from physid_drake.cell.object_state import ObjectState
+from physid_drake.cell.forces import ForceLaw
+from physid_drake.cell.laws import Attraction, Spring, Tilt
 from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
 from physid_drake.effects.places import grid_of_places
 from physid_drake.ranges import NOT_NEGATIVE, POSITIVE
@@ -45,16 +45,7 @@ class TableTilt(Effect):
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
         """Gravity's component."""
         del facts
-        return (_TiltLaw(math.sin(self.x), math.sin(self.y)),)
-
-
-@dc.dataclass(frozen=True)
-class _TiltLaw:
-    x: float  # of the weight
-    y: float
-
-    def wrench(self, state: ObjectState) -> Wrench:
-        return Wrench(fx=state.weight * self.x, fy=state.weight * self.y, torque=0.0)
+        return (Tilt(math.sin(self.x), math.sin(self.y)),)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -114,24 +105,7 @@ class Tether(Effect):
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
         """The spring."""
         del facts
-        return (_SpringLaw(self.stiffness, self.x, self.y, self.rest_length),)
-
-
-@dc.dataclass(frozen=True)
-class _SpringLaw:
-    stiffness: float
-    x: float
-    y: float
-    rest_length: float
-
-    def wrench(self, state: ObjectState) -> Wrench:
-        px, py = state.p_WBcm_held.tolist()
-        dx, dy = self.x - px, self.y - py
-        if self.rest_length == 0.0:
-            return Wrench(fx=self.stiffness * dx, fy=self.stiffness * dy, torque=0.0)
-        distance = math.hypot(dx, dy)
-        pull = self.stiffness * max(0.0, distance - self.rest_length) / max(distance, 1e-9)
-        return Wrench(fx=pull * dx, fy=pull * dy, torque=0.0)
+        return (Spring(self.stiffness, self.x, self.y, self.rest_length),)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -181,23 +155,8 @@ class Magnet(Effect):
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
         """The attraction."""
         del facts
-        return (_MagnetLaw(self.strength, self.x, self.y, self.core),)
+        return (Attraction(self.strength, self.x, self.y, self.core),)
 
 
 def _magnet_family(place: tuple[float, float], core: float) -> Family:
     return Family(point=(0.0, *place, math.log(core)), free=(0,))
-
-
-@dc.dataclass(frozen=True)
-class _MagnetLaw:
-    strength: float
-    x: float
-    y: float
-    core: float
-
-    def wrench(self, state: ObjectState) -> Wrench:
-        px, py = state.p_WBcm_held.tolist()
-        dx, dy = self.x - px, self.y - py
-        square = dx * dx + dy * dy
-        pull = self.strength / (square + self.core**2) / max(math.sqrt(square), 1e-6)
-        return Wrench(fx=pull * dx, fy=pull * dy, torque=0.0)

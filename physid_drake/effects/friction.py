@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import dataclasses as dc
 import math
 from typing import ClassVar
@@ -12,14 +11,13 @@ from numpy.typing import NDArray
 
 from physid_drake.cell import Body
 from physid_drake.cell.forces import FrictionLaw
-from physid_drake.cell.object_state import Complex, ObjectState
+from physid_drake.cell.laws import Ellipse, Falling, Gradient, Patch
 from physid_drake.effects.effect import Coordinate, Effect, Family, PushFacts, Surroundings, parameter
 from physid_drake.effects.places import close_grid_of_places
 from physid_drake.ranges import POSITIVE, Range
 
 Array = NDArray[np.float64]
 LEAST_LEFT = 0.05  # of the friction of the first push
-POINT = 1e-9  # m: of what stands for no disc, as under a lying cylinder
 SLIGHT_SHARE = 0.015  # of the friction
 BASE = 0.6  # of the distance between two places: a patch's radius that covers the gaps
 WIDE = (2.0, 3.5)  # times that radius: larger patches are made of those
@@ -60,21 +58,7 @@ class StribeckFriction(Effect):
     def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:
         """The law."""
         del facts
-        return (_StribeckLaw(self.excess, self.speed),)
-
-
-@dc.dataclass(frozen=True)
-class _StribeckLaw:
-    excess: float
-    speed: float
-
-    @property
-    def largest(self) -> float:
-        return 1.0 + max(0.0, self.excess)
-
-    def ratio(self, state: ObjectState) -> Array | Complex:
-        speeds = np.abs(state.slips)
-        return np.asarray(1.0 + self.excess * np.exp(-((speeds / self.speed) ** 2)))
+        return (Falling(self.excess, self.speed),)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -108,7 +92,7 @@ class _Anisotropic(Effect):
     def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:
         """The law."""
         del facts
-        return (_EllipseLaw(self.ratio, self.angle, self.fixed_in_object),)
+        return (Ellipse(self.ratio, self.angle, self.fixed_in_object),)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -131,28 +115,6 @@ class AnisotropicObject(_Anisotropic):
     statement: ClassVar[str] = "friction depends on the direction of slip in the object: a ribbed underside"
     frame: ClassVar[str] = "object"
     fixed_in_object: ClassVar[bool] = True
-
-
-@dc.dataclass(frozen=True)
-class _EllipseLaw:
-    axes: float  # largest over least friction
-    angle: float
-    fixed_in_object: bool
-
-    @property
-    def largest(self) -> float:
-        return math.sqrt(max(self.axes, 1.0 / self.axes))
-
-    def ratio(self, state: ObjectState) -> Array | Complex:
-        angle = self.angle + (state.yaw if self.fixed_in_object else 0.0)
-        # M^2 v of a plane vector v = x + iy with the slippery axis at an angle a is mean v + half e^(2ia) conj(v).
-        mean, half = 0.5 * (1.0 / self.axes + self.axes), 0.5 * (1.0 / self.axes - self.axes)
-        slips = state.slips
-        moving = slips != 0.0
-        squeezed = np.ones(len(slips), dtype=np.complex128)  # M^2 v / v; rest has no direction
-        squeezed[moving] = mean + (half * cmath.exp(2j * angle)) * (slips[moving].conj() / slips[moving])
-        # |M v|^2 = v . M^2 v
-        return np.asarray(squeezed / np.sqrt(squeezed.real))
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -220,7 +182,7 @@ class FrictionPatch(Effect):
         """The law; none of a patch that the push does not reach: the contact holds no more friction than it must."""
         place = np.array([self.x, self.y])
         away = float(np.hypot(*(place - np.clip(place, *facts.region))))
-        return (_PatchLaw(self.ratio, self.x, self.y, self.radius),) if away <= self.radius else ()
+        return (Patch(self.ratio, self.x, self.y, self.radius),) if away <= self.radius else ()
 
 
 def _patch_family(place: tuple[float, float], radius: float, shares: tuple[float, ...] = ()) -> Family:
@@ -233,43 +195,6 @@ def _shares(places: Array, place: Array, wide: float, radius: float, spacing: fl
     inside = np.clip(0.5 + 0.5 * (wide - away / radius), 0.0, 1.0)
     overlap = math.pi * radius**2 / spacing**2
     return tuple((inside / overlap).tolist())
-
-
-@dc.dataclass(frozen=True)
-class _PatchLaw:
-    inside: float
-    x: float
-    y: float
-    radius: float
-
-    @property
-    def largest(self) -> float:
-        return max(1.0, self.inside)
-
-    def ratio(self, state: ObjectState) -> Array | Complex:
-        away = np.abs(state.places - complex(self.x, self.y))
-        radii = np.maximum(state.underside.radii, POINT)
-        return 1.0 + (self.inside - 1.0) * share_inside(away, self.radius, radii)
-
-
-def share_inside(away: Array, radius: float, radii: Array) -> Array:
-    """Shares (n,) of discs that lie in a circle: areas of lenses, which two circular segments make.
-
-    An edge of the table is sharp, and crosses the disc that a support point stands for little by little.
-
-    Args:
-        away: (n,) from the circle's middle to those of the discs [m].
-        radius: of the circle [m].
-        radii: (n,) of the discs [m].
-    """
-    d = np.maximum(away, 1e-9)
-    of_disc = np.clip((d**2 + radii**2 - radius**2) / (2.0 * d * radii), -1.0, 1.0)
-    of_circle = np.clip((d**2 + radius**2 - radii**2) / (2.0 * d * radius), -1.0, 1.0)
-    kite = (radii + radius - d) * (d + radii - radius) * (d - radii + radius) * (d + radii + radius)
-    lens = radii**2 * np.arccos(of_disc) + radius**2 * np.arccos(of_circle) - 0.5 * np.sqrt(np.maximum(kite, 0.0))
-    # Of points the quotient is noise where the circle's edge goes through them.
-    inside: Array = np.clip(lens / (math.pi * radii**2), 0.0, 1.0)
-    return inside
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -304,18 +229,7 @@ class FrictionGradient(Effect):
         slopes = np.array([self.slope_x, self.slope_y])
         # Of the places that the push may reach: the contact holds no more than it must.
         steepest = float(np.maximum(slopes * facts.region[0], slopes * facts.region[1]).sum())
-        return (_GradientLaw(self.slope_x, self.slope_y, 1.0 + max(0.0, steepest)),)
-
-
-@dc.dataclass(frozen=True)
-class _GradientLaw:
-    slope_x: float
-    slope_y: float
-    largest: float
-
-    def ratio(self, state: ObjectState) -> Array | Complex:
-        places = state.places
-        return np.asarray(np.clip(1.0 + self.slope_x * places.real + self.slope_y * places.imag, 0.0, self.largest))
+        return (Gradient(self.slope_x, self.slope_y, 1.0 + max(0.0, steepest)),)
 
 
 @dc.dataclass(frozen=True, kw_only=True)

@@ -13,6 +13,7 @@ from physid_drake.cell import Body, Cell, HandPath, Motion, Outcome, Start
 from physid_drake.cell.diagram import GRAVITY
 from physid_drake.cell.forces import FrictionLaw, Frictions
 from physid_drake.cell.soft_tip import Mount
+from physid_drake.cell.solid import Solid
 from physid_drake.cell.support import PressureGrid
 from physid_drake.effects.catalogue import CATALOGUE
 from physid_drake.effects.effect import Effect, Pose, PushFacts
@@ -78,7 +79,7 @@ def roll(
     facts = facts_of(cell, body, _region(cell, body, push, present), push.order, push.hand_axes)
     body = body_with(present, body, facts)
     facts = dc.replace(facts, region=_region(cell, body, push, present))  # less friction leads further
-    start = _true_start(present, push.start)
+    start = true_start(present, push.start)
     path = push.path
     if path is not None:
         for effect in present:
@@ -90,7 +91,7 @@ def roll(
             path=path,
             begin=push.begin,
             end=push.end,
-            hand_height=_contact_height(cell, geometry, push.hand_height),
+            hand_height=contact_height(cell.solid, geometry, push.hand_height),
             laws=[law for effect in present for law in effect.laws(facts)],
             frictions=frictions_of(present, facts),
             mount=mount_of(present, facts),
@@ -110,11 +111,11 @@ def _as_rough(these: Sequence[FrictionLaw], others: Sequence[FrictionLaw]) -> bo
     return len(these) == len(others) and Frictions(tuple(these)).largest == Frictions(tuple(others)).largest
 
 
-def _contact_height(cell: Cell, plain: Geometry, height: float | None) -> float | None:
+def contact_height(solid: Solid, plain: Geometry, height: float | None) -> float | None:
     """That of an object whose size effects change: a lying cylinder at its axis, others no higher than they are."""
-    radius = cell.solid.rolling_radius
+    radius = solid.rolling_radius
     if height is None or radius is None or not isinstance(plain.shape, Cylinder):
-        return None if height is None else min(height, cell.solid.height)
+        return None if height is None else min(height, solid.height)
     return height * radius / plain.shape.radius
 
 
@@ -141,7 +142,7 @@ def _as_listed(effects: Sequence[Effect]) -> list[Effect]:
     return sorted(effects, key=lambda effect: order.get(type(effect), len(order)))
 
 
-def _true_start(effects: Sequence[Effect], start: Start) -> Start:
+def true_start(effects: Sequence[Effect], start: Start) -> Start:
     """State of B for one that the tracker reports: a tracked point beside the centre has another velocity, too."""
 
     def pose_at(time: float) -> Array:
@@ -185,11 +186,19 @@ def mount_of(effects: Sequence[Effect], facts: PushFacts) -> Mount | None:
 
 def tracked(motion: Motion, times: Array, effects: Sequence[Effect]) -> Array:
     """What the tracker reports (n, 3), x, y, yaw, at times (n,) [s]."""
-    present = [effect for effect in effects if not effect.is_null]
-    late = sum(effect.lateness() for effect in present)
-    poses = motion.planar_at(times - late)
-    for effect in _as_listed(present):
-        poses = effect.tracked(poses)
+    return reported(motion.planar_at(times - lateness_of(effects)), effects)
+
+
+def lateness_of(effects: Sequence[Effect]) -> float:
+    """By how much the tracker is late [s]."""
+    return sum(effect.lateness() for effect in effects if not effect.is_null)
+
+
+def reported(poses: Array, effects: Sequence[Effect]) -> Array:
+    """What the tracker reports (n, 3) for poses (n, 3) of B, x, y, yaw, when it comes to them."""
+    for effect in _as_listed(effects):
+        if not effect.is_null:
+            poses = effect.tracked(poses)
     return poses
 
 

@@ -8,10 +8,10 @@ import pytest
 
 from physid_drake.cell import CellConfig
 from physid_drake.cell.forces import friction_wrench, total_wrenches
+from physid_drake.cell.laws import share_inside
 from physid_drake.cell.object_state import ObjectState, Underside, as_complex
 from physid_drake.cell.outline import Disc, Polygon, rectangle
 from physid_drake.cell.support import FrictionGrid, Support, axis_support, rest_depths, support_of
-from physid_drake.effects.friction import share_inside
 
 ELLIPSE = Polygon([(0.06 * math.cos(2 * math.pi * k / 64), 0.04 * math.sin(2 * math.pi * k / 64)) for k in range(64)])
 HEXAGON = Polygon([(0.05 * math.cos(math.pi * k / 3), 0.05 * math.sin(math.pi * k / 3)) for k in range(6)])

@@ -1,0 +1,61 @@
+"""All rollouts of a batch in one compiled loop."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from physid_drake.twin.compiled import compiled
+from physid_drake.twin.rollout import STATE, roll
+from physid_drake.twin.stage import CONTACT, SOLVED
+
+
+@compiled
+def roll_all(
+    bodies,
+    base,
+    friction,
+    edges,
+    knots,
+    knot_ends,
+    starts,
+    laws,
+    law_ends,
+    tables,
+    times,
+    ends,
+    poses,
+    forces,
+    counts,
+):
+    """Simulate each of n rollouts.
+
+    Args:
+        bodies: (n,) records.
+        base: points (m, 2) in B [m], weights (m,) and radii (m,) [m].
+        friction: (n, m) of the points [-].
+        edges: of the outline.
+        knots: (k, 5) of all hand paths: time, place, velocity.
+        knot_ends: (n + 1,) where each rollout's begin and end.
+        starts: (n, 6) pose and velocity of Bo.
+        laws, law_ends, tables: records, where each rollout's begin and end, numbers.
+        times, ends: of the samples, where each rollout's begin and end.
+        poses: (samples, 3), filled in.
+        forces: (samples, 2), filled in.
+        counts: (n,) records, filled in.
+    """
+    points, weights, radii = base
+    count = len(weights)
+    px, py, mu, disc8 = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
+    room = (np.empty(count), np.empty(count), np.empty(count), np.zeros(14))
+    contact, solved, state = np.zeros(1, CONTACT), np.zeros(1, SOLVED), np.zeros(1, STATE)
+    for k in range(len(bodies)):
+        body = bodies[k]
+        for i in range(count):
+            px[i], py[i], mu[i] = points[i, 0] - body.com_x, points[i, 1] - body.com_y, friction[k, i]
+        own = knots[knot_ends[k] : knot_ends[k + 1]]
+        hand = (own[:, 0].copy(), own[:, 1:3].copy(), own[:, 3:5].copy())
+        roll(
+            body, (px, py, weights, mu, radii, disc8, edges), hand, starts[k], laws[law_ends[k] : law_ends[k + 1]],
+            tables, times[ends[k] : ends[k + 1]], poses[ends[k] : ends[k + 1]], forces[ends[k] : ends[k + 1]],
+            counts[k], room, contact[0], solved[0], state[0],
+        )  # fmt: skip

@@ -1,0 +1,203 @@
+"""One implicit stage: the velocity at its end, with friction, pressure and the tip's contact all taken there."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from physid_drake.twin.compiled import compiled
+from physid_drake.twin.contact import resting_contact
+from physid_drake.twin.laws import drags, ellipse, force_by_place, friction_by_place, friction_by_speed
+from physid_drake.twin.support import (
+    CREEP,
+    MOST_CHANGES,
+    friction,
+    moments,
+    plane_of_loads,
+    torque_of_discs,
+    unloaded_friction,
+    unloading,
+)
+
+MOST_ROUNDS = 60  # of Newton's method
+STUCK = 12  # rounds after which it begins anew from rest
+CONVERGED = 1e-8  # m/s
+CONTACT = np.dtype([(name, np.float64) for name in (
+    "touching", "nx", "ny", "rx", "ry",  # normal from tip to object and arm from Bcm, in W
+    "vx", "vy",                          # of the tip
+    "gives",                             # velocity that a tip which gives way loses per impulse [1/kg]
+)])  # fmt: skip
+"""The tip's contact as a stage sees it."""
+SOLVED = np.dtype([(name, np.float64) for name in (
+    "vx", "vy", "spin",       # of Bcm in W
+    "fx", "fy", "normal",     # of the tip on the object in W [N], and the impulse along the normal [N s]
+    "converged", "tipped", "rounds",
+    "partly",                 # whether some points carry nothing
+    "p0", "px", "py",         # the plane of loads in B [N, N/m]
+)])  # fmt: skip
+"""What a stage found; on entry, the guess."""
+
+
+@compiled
+def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, contact, solved):
+    """Implicit Euler over ``h`` from velocity (ax, ay, spin0) at the pose predicted for its end.
+
+    Newton's method on the velocity, in B. The contact with the tip is solved in closed form in every round, and the
+    pressure for the velocity and the tip's force of the round before.
+
+    Args:
+        body: record of object and tip.
+        object_: (px, py, w, mu, radii, disc8, edges) of the support points about Bcm, and the outline.
+        laws, tables: the vocabulary's.
+        room: (n,) space for friction, for loaded weights and for friction at speed, and (14,) for sums of moments:
+            of all points, of the loaded ones, and how far points are along x and y at most.
+        h: length of the stage [s].
+        x, y, yaw: of Bcm at its end [m, rad].
+        ax, ay, spin0: velocity at its start, in W.
+        contact: record of `CONTACT`.
+        solved: record of `SOLVED`; holds the guess, and afterwards what was found.
+    """
+    px, py, w, mu0, radii, disc8, _ = object_
+    mu, loaded, fast, _ = room
+    c, s = math.cos(yaw), math.sin(yaw)
+    mu[:] = mu0
+    friction_by_place(laws, tables, px, py, radii, x, y, yaw, mu)
+    oval = ellipse(laws, yaw)
+    ex, ey = _into(c, s, *force_by_place(laws, tables, x, y))
+    linear, turning_drag, quadratic = drags(laws)
+    vx, vy = _into(c, s, solved.vx, solved.vy)
+    spin = solved.spin
+    bx, by = _into(c, s, ax, ay)
+    touching = contact.touching > 0.0
+    tip = _tip_in(c, s, contact)
+    hx, hy = _into(c, s, solved.fx, solved.fy) if touching else (0.0, 0.0)
+    size = math.sqrt(body.inertia / body.mass)
+    full, before, pn, again, rounds = 1.0, np.inf, 0.0, False, 0
+    solved.converged = 0.0
+    for rounds in range(1, MOST_ROUNDS + 1):
+        turns = vx * vx + vy * vy < (spin * body.reach) ** 2
+        turns8 = spin**8 if turns else 0.0
+        now = fast if friction_by_speed(laws, tables, px, py, vx, vy, spin, mu, fast) else mu
+        _balance(body, object_, room, now, vx, vy, spin, turns8, oval, hx, hy, solved)
+        carrying = loaded if solved.partly > 0.0 else w
+        fx, fy, torque, xx, xy, yy, xw, yw, ww = friction(
+            px, py, now, carrying, vx, vy, spin, disc8, turns8, oval[0], oval[1], oval[2],
+            solved.p0, solved.px, solved.py, full,
+        )  # fmt: skip
+        if turns:
+            left = torque_of_discs(px, py, now, carrying, radii, vx, vy, spin, solved.p0, solved.px, solved.py)
+            torque -= left * spin / math.hypot(spin, CREEP / body.reach)
+        drag = linear + quadratic * math.hypot(vx, vy)
+        inverse = _inverse(
+            body.mass + h * (xx + drag), h * xy, h * xw, body.mass + h * (yy + drag), h * yw,
+            body.inertia + h * (ww + turning_drag),
+        )  # fmt: skip
+        d0, d1, d2 = _times(
+            inverse,
+            h * (fx + ex - drag * vx) + body.mass * (bx - vx),
+            h * (fy + ey - drag * vy) + body.mass * (by - vy),
+            h * (torque - turning_drag * spin) + body.inertia * (spin0 - spin),
+        )  # fmt: skip
+        fhx = fhy = 0.0
+        if touching:
+            d0, d1, d2, pn, pt = _held(
+                tip, inverse, vx + d0, vy + d1, spin + d2, d0, d1, d2, contact.gives, body.hand_friction
+            )
+            fhx, fhy = (tip[0] * pn - tip[1] * pt) / h, (tip[1] * pn + tip[0] * pt) / h
+        moved = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2 * size * size)
+        pressed = math.hypot(fhx - hx, fhy - hy) * h / body.mass
+        vx, vy, spin, hx, hy = vx + d0, vy + d1, spin + d2, fhx, fhy
+        if moved + 0.1 * pressed < CONVERGED:
+            solved.converged = 1.0
+            break
+        to_and_fro = moved > 0.5 * before
+        # Where it jumps to and fro, the slope without its soft part helps, and the whole one again.
+        full = 1.0 - full if to_and_fro else 1.0
+        if to_and_fro and rounds > STUCK and not again and not touching:
+            again, full, vx, vy, spin = True, 1.0, 0.0, 0.0, 0.0
+        before = moved
+    solved.vx, solved.vy, solved.spin = c * vx - s * vy, s * vx + c * vy, spin
+    solved.fx, solved.fy, solved.normal = c * hx - s * hy, s * hx + c * hy, pn
+    solved.rounds = float(rounds)
+
+
+@compiled
+def _balance(body, object_, room, mu, vx, vy, spin, turns8, oval, hx, hy, solved):
+    """The plane of loads for a velocity and a tip's force (hx, hy) in B: into ``solved``, and which points carry."""
+    px, py, w, _, _, disc8, _ = object_
+    _, loaded, _, sums = room
+    partly = solved.partly > 0.0
+    solved.tipped = 1.0
+    for _ in range(MOST_CHANGES):
+        g = unloaded_friction(
+            px, py, mu, loaded if partly else w, vx, vy, spin, disc8, turns8, oval[0], oval[1], oval[2]
+        )
+        stands, p0, p1, p2 = plane_of_loads(
+            sums[6:12] if partly else sums[:6], g, body.com_height, body.tip_arm * hx, body.tip_arm * hy, body.weight
+        )
+        if not stands:
+            break
+        solved.p0, solved.px, solved.py = p0, p1, p2
+        if not partly:
+            if p0 > abs(p1) * sums[12] + abs(p2) * sums[13]:  # surely all of them press
+                solved.tipped = 0.0
+                break
+            loaded[:] = w
+        if unloading(px, py, w, loaded, p0, p1, p2) == 0:
+            solved.tipped = 0.0
+            partly = partly and not np.array_equal(loaded, w)
+            break
+        partly = True
+        moments(px, py, loaded, sums[6:12])
+    if solved.tipped > 0.0:  # nothing balances it: the plane is no model of this any more
+        partly = False
+        solved.p0, solved.px, solved.py = body.weight / sums[0], 0.0, 0.0
+    solved.partly = 1.0 if partly else 0.0
+
+
+@compiled
+def _into(c, s, x, y):
+    """A vector of W in B."""
+    return c * x + s * y, c * y - s * x
+
+
+@compiled
+def _tip_in(c, s, contact):
+    """Of the contact in B: normal, its torque, that of the tangent (normal turned left), the tip's velocities."""
+    nx, ny = _into(c, s, contact.nx, contact.ny)
+    torque_n = contact.rx * contact.ny - contact.ry * contact.nx
+    torque_t = contact.rx * contact.nx + contact.ry * contact.ny
+    along = contact.vx * contact.nx + contact.vy * contact.ny
+    across = contact.vy * contact.nx - contact.vx * contact.ny
+    return nx, ny, torque_n, torque_t, along, across
+
+
+@compiled
+def _held(tip, inverse, vx, vy, spin, d0, d1, d2, gives, friction_of_tip):
+    """The change (d0, d1, d2) of a velocity with the contact's impulses, and these, from the one without."""
+    nx, ny, torque_n, torque_t, along, across = tip
+    y0, y1, y2 = _times(inverse, nx, ny, torque_n)
+    z0, z1, z2 = _times(inverse, -ny, nx, torque_t)
+    un = nx * vx + ny * vy + torque_n * spin - along
+    ut = nx * vy - ny * vx + torque_t * spin - across
+    pn, pt = resting_contact(
+        un, ut, nx * y0 + ny * y1 + torque_n * y2 + gives, nx * z0 + ny * z1 + torque_n * z2,
+        nx * z1 - ny * z0 + torque_t * z2 + gives, friction_of_tip,
+    )  # fmt: skip
+    return d0 + y0 * pn + z0 * pt, d1 + y1 * pn + z1 * pt, d2 + y2 * pn + z2 * pt, pn, pt
+
+
+@compiled
+def _inverse(k00, k01, k02, k11, k12, k22):
+    """Of a symmetric 3 x 3 matrix: its six entries."""
+    i00, i01, i02 = k11 * k22 - k12 * k12, k02 * k12 - k01 * k22, k01 * k12 - k02 * k11
+    i11, i12, i22 = k00 * k22 - k02 * k02, k01 * k02 - k00 * k12, k00 * k11 - k01 * k01
+    det = k00 * i00 + k01 * i01 + k02 * i02
+    return i00 / det, i01 / det, i02 / det, i11 / det, i12 / det, i22 / det
+
+
+@compiled
+def _times(inverse, b0, b1, b2):
+    i00, i01, i02, i11, i12, i22 = inverse
+    return i00 * b0 + i01 * b1 + i02 * b2, i01 * b0 + i11 * b1 + i12 * b2, i02 * b0 + i12 * b1 + i22 * b2

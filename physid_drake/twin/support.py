@@ -1,0 +1,142 @@
+"""Sums over the support points: Coulomb friction under a pressure that carries the weight and balances moments.
+
+Everything is in the object's frame B, about Bcm. Friction of a point is -mu N s / sqrt(s^2 + eps^2), with slip s.
+"""
+
+from __future__ import annotations
+
+import math
+
+from physid_drake.twin.compiled import compiled, compiled_sum
+
+CREEP = 1e-5  # m/s: slip at which friction fades
+MOST_CHANGES = 25  # of the set of points that carry something
+SINGULAR = 1e-12
+# Slip that turns about a place within what a point stands for: see physid_drake.cell.turning.
+LEAVES_ALL, OWN_ARM, OWN_TORQUE = 1.1, 0.35, 1.2
+TURNS_WITHIN = 2.0  # of the radius of what a point stands for, beyond the outermost points
+
+
+@compiled
+def moments(x, y, w, into):
+    """Sums of the weights with 1, x, y, x^2, x y, y^2."""
+    into[:] = 0.0
+    for i in range(len(x)):
+        into[0] += w[i]
+        into[1] += w[i] * x[i]
+        into[2] += w[i] * y[i]
+        into[3] += w[i] * x[i] * x[i]
+        into[4] += w[i] * x[i] * y[i]
+        into[5] += w[i] * y[i] * y[i]
+
+
+@compiled_sum
+def unloaded_friction(x, y, mu, w, vx, vy, spin, disc8, turns8, mxx, mxy, myy):
+    """Friction per load: sums of mu times the direction of slip, with 1, x and y, along x and along y.
+
+    Args:
+        x, y: (n,) support points from Bcm [m].
+        mu: (n,) coefficients [-].
+        w: (n,) weights; 0 of those that carry nothing.
+        vx, vy, spin: of Bcm [m/s, rad/s].
+        disc8: (n,) eighth power of the radius within which slip that turns cancels [m^8].
+        turns8: eighth power of the spin [rad^8/s^8]; 0 where slip turns about no place near.
+        mxx, mxy, myy: squared ellipse of friction; 1, 0, 1 of a circle.
+    """
+    gx0 = gx1 = gx2 = gy0 = gy1 = gy2 = 0.0
+    for i in range(x.shape[0]):
+        sx, sy = vx - spin * y[i], vy + spin * x[i]
+        dx, dy = mxx * sx + mxy * sy, mxy * sx + myy * sy
+        s2, u2 = sx * sx + sy * sy + CREEP * CREEP, sx * dx + sy * dy + CREEP * CREEP
+        s8 = (s2 * s2) * (s2 * s2)
+        k = w[i] * mu[i] * math.sqrt(s2 / (u2 * math.sqrt(math.sqrt(disc8[i] * turns8 + s8))))
+        fx, fy = k * dx, k * dy
+        gx0 += fx
+        gx1 += fx * x[i]
+        gx2 += fx * y[i]
+        gy0 += fy
+        gy1 += fy * x[i]
+        gy2 += fy * y[i]
+    return gx0, gx1, gx2, gy0, gy1, gy2
+
+
+@compiled_sum
+def friction(x, y, mu, w, vx, vy, spin, disc8, turns8, mxx, mxy, myy, p0, px, py, full):
+    """Force and torque of friction, and how they resist a change of (vx, vy, spin): xx, xy, yy, xw, yw, ww.
+
+    Args:
+        x, y, mu, w, vx, vy, spin, disc8, turns8, mxx, mxy, myy: as of `unloaded_friction`.
+        p0, px, py: load of a point with weight 1, p0 + px x + py y [N].
+        full: 1 for the slope of the whole law; 0 without the part that makes it soft across the slip.
+    """
+    fx = fy = torque = xx = xy = yy = xw = yw = ww = 0.0
+    for i in range(x.shape[0]):
+        sx, sy = vx - spin * y[i], vy + spin * x[i]
+        dx, dy = mxx * sx + mxy * sy, mxy * sx + myy * sy
+        s2, u2 = sx * sx + sy * sy + CREEP * CREEP, sx * dx + sy * dy + CREEP * CREEP
+        s8 = (s2 * s2) * (s2 * s2)
+        d8 = disc8[i] * turns8 + s8
+        k = w[i] * mu[i] * (p0 + px * x[i] + py * y[i]) * math.sqrt(s2 / (u2 * math.sqrt(math.sqrt(d8))))
+        q = full * k * s8 / (d8 * u2)
+        fx -= k * dx
+        fy -= k * dy
+        torque -= k * (x[i] * dy - y[i] * dx)
+        a, b, c = k * mxx - q * dx * dx, k * mxy - q * dx * dy, k * myy - q * dy * dy
+        xx += a
+        xy += b
+        yy += c
+        xw += b * x[i] - a * y[i]
+        yw += c * x[i] - b * y[i]
+        ww += a * y[i] * y[i] - 2.0 * b * x[i] * y[i] + c * x[i] * x[i]
+    return fx, fy, torque, xx, xy, yy, xw, yw, ww
+
+
+@compiled_sum
+def torque_of_discs(x, y, mu, w, radii, vx, vy, spin, p0, px, py):
+    """Torque [N m], against the spin, that is left within what points stand for where slip turns about them."""
+    torque = 0.0
+    for i in range(x.shape[0]):
+        sx, sy = vx - spin * y[i], vy + spin * x[i]
+        limit = OWN_TORQUE * radii[i] * spin
+        left = max(0.0, 1.0 - (sx * sx + sy * sy) / (limit * limit + 1e-300))
+        torque += OWN_ARM * radii[i] * left * mu[i] * w[i] * (p0 + px * x[i] + py * y[i])
+    return torque
+
+
+@compiled
+def plane_of_loads(sums, g, height, arm_x, arm_y, weight):
+    """The plane p0 + px x + py y of loads [N] that carries the weight and balances the moments about Bcm.
+
+    Args:
+        sums: of `moments`.
+        g: of `unloaded_friction`.
+        height: of Bcm above the table [m].
+        arm_x, arm_y: moments of the tip's force [N m].
+        weight: N.
+
+    Returns:
+        Whether there is one, and p0, px, py.
+    """
+    a00, a01, a02 = sums[0], sums[1], sums[2]
+    a10, a11, a12 = sums[1] - height * g[0], sums[3] - height * g[1], sums[4] - height * g[2]
+    a20, a21, a22 = sums[2] - height * g[3], sums[4] - height * g[4], sums[5] - height * g[5]
+    c0, c1, c2 = a11 * a22 - a12 * a21, a12 * a20 - a10 * a22, a10 * a21 - a11 * a20
+    det = a00 * c0 + a01 * c1 + a02 * c2
+    if abs(det) <= SINGULAR * (abs(a00 * c0) + abs(a01 * c1) + abs(a02 * c2)):
+        return False, 0.0, 0.0, 0.0
+    p0 = (c0 * weight + (a02 * a21 - a01 * a22) * arm_x + (a01 * a12 - a02 * a11) * arm_y) / det
+    px = (c1 * weight + (a00 * a22 - a02 * a20) * arm_x + (a02 * a10 - a00 * a12) * arm_y) / det
+    py = (c2 * weight + (a01 * a20 - a00 * a21) * arm_x + (a00 * a11 - a01 * a10) * arm_y) / det
+    return True, p0, px, py
+
+
+@compiled
+def unloading(x, y, w, loaded, p0, px, py):
+    """Take the weight off points that would pull, and give it back to those that would press: how many changed."""
+    changed = 0
+    for i in range(len(x)):
+        now = w[i] if p0 + px * x[i] + py * y[i] > 0.0 else 0.0
+        if now != loaded[i]:
+            changed += 1
+            loaded[i] = now
+    return changed
