@@ -15,6 +15,7 @@ from physid_drake.cell.touch import Tip
 from physid_drake.errors import RecordingError
 from physid_drake.recording import Box, Cylinder, PoseStream, Push, Recording
 from physid_drake.recording.clocks import check_seconds
+from physid_drake.recording.rests import rests_of
 from physid_drake.recording.screening import find_gaps
 
 Array = NDArray[np.float64]
@@ -37,6 +38,7 @@ STILL_FAST = 0.5  # of a hand's speed: faster, it has not come to a stop
 LIGHTEST, HEAVIEST = 1.0, 23000.0  # kg/m^3, of the box around an object: lighter than air, denser than osmium
 FEWEST_FORCES = 3  # pushes
 FEWEST_FREE = 3  # poses of a free motion
+MOST_HALTS = 12  # of a hand in one push; seven where the noise of a published log is slow
 BESIDE = 0.05  # m between tip and object that no error of calibration explains
 
 
@@ -52,6 +54,7 @@ def push_checks_of(recording: Recording, push: Push) -> tuple[Check, ...]:
         partial(check_upright, recording, push),
         partial(check_on_table, recording, push),
         partial(check_free_start, push),
+        partial(check_one_push, push),
     )
 
 
@@ -119,6 +122,16 @@ def check_free_start(push: Push) -> None:
         raise RecordingError(
             f"push '{push.name}': without a hand, at least {FEWEST_FREE} poses are needed for the start velocity, but"
             f" got {len(push.object)}."
+        )
+
+
+def check_one_push(push: Push) -> None:
+    """Refuses a log of many pushes in one table: a path with so many knots would take minutes to find."""
+    halts = 0 if push.hand is None else len(rests_of(push.hand))
+    if halts > MOST_HALTS:
+        raise RecordingError(
+            f"push '{push.name}': the hand stands still {halts} times in {push.duration:.0f} s; cut the table where"
+            " it does, so that each push is one of its own."
         )
 
 

@@ -71,9 +71,7 @@ def served(host: str = LOOPBACK) -> Meshcat:
     try:
         return Meshcat(MeshcatParams(host=host, show_stats_plot=False))
     except RuntimeError as error:
-        raise ConfigError(
-            f"--host {host!r}: Meshcat cannot listen there; give this machine's address."
-        ) from error
+        raise ConfigError(f"--host {host!r}: Meshcat cannot listen there; give this machine's address.") from error
 
 
 def silent() -> Meshcat:

@@ -55,8 +55,8 @@ def on_table(law, first, x, y, tables):
 
 
 @compiled
-def friction_by_place(laws, tables, px, py, radii, x, y, yaw, mu):
-    """Multiply the coefficients (n,) of points by what the laws make of where they are.
+def friction_by_place(laws, tables, px, py, radii, x, y, yaw, plain, mu):
+    """The coefficients (n,) of points, with what the laws make of where they are.
 
     Args:
         laws: records.
@@ -64,8 +64,10 @@ def friction_by_place(laws, tables, px, py, radii, x, y, yaw, mu):
         px, py: (n,) points from Bcm in B [m].
         radii: (n,) of the discs that they stand for [m].
         x, y, yaw: of Bcm in W [m, rad].
-        mu: (n,) is changed.
+        plain: (n,) without any law.
+        mu: (n,) is filled in.
     """
+    mu[:] = plain
     c, s = math.cos(yaw), math.sin(yaw)
     for law in laws:
         if law.kind == PATCH:

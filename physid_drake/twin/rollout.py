@@ -121,8 +121,7 @@ def _rest(body, object_, hand, laws, tables, room, state, limit):
     pull = math.hypot(fx, fy)
     if pull > 0.0:
         px, py, w, mu0, radii, _, _ = object_
-        room[0][:] = mu0
-        friction_by_place(laws, tables, px, py, radii, state.x, state.y, state.yaw, room[0])
+        friction_by_place(laws, tables, px, py, radii, state.x, state.y, state.yaw, mu0, room[0])
         if pull > HELD * body.weight * np.dot(w, room[0]) / room[3][0]:
             return -1.0
     times, places, velocities = hand

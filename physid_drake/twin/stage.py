@@ -15,6 +15,8 @@ from physid_drake.twin.support import (
     friction,
     moments,
     plane_of_loads,
+    round_friction,
+    round_unloaded_friction,
     torque_of_discs,
     unloaded_friction,
     unloading,
@@ -61,8 +63,7 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
     px, py, w, mu0, radii, disc8, _ = object_
     mu, loaded, fast, _ = room
     c, s = math.cos(yaw), math.sin(yaw)
-    mu[:] = mu0
-    friction_by_place(laws, tables, px, py, radii, x, y, yaw, mu)
+    friction_by_place(laws, tables, px, py, radii, x, y, yaw, mu0, mu)
     oval = ellipse(laws, yaw)
     ex, ey = _into(c, s, *force_by_place(laws, tables, x, y))
     linear, turning_drag, quadratic = drags(laws)
@@ -81,10 +82,15 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
         now = fast if friction_by_speed(laws, tables, px, py, vx, vy, spin, mu, fast) else mu
         _balance(body, object_, room, now, vx, vy, spin, turns8, oval, hx, hy, solved)
         carrying = loaded if solved.partly > 0.0 else w
-        fx, fy, torque, xx, xy, yy, xw, yw, ww = friction(
-            px, py, now, carrying, vx, vy, spin, disc8, turns8, oval[0], oval[1], oval[2],
-            solved.p0, solved.px, solved.py, full,
-        )  # fmt: skip
+        if turns or oval[0] != 1.0 or oval[1] != 0.0:
+            fx, fy, torque, xx, xy, yy, xw, yw, ww = friction(
+                px, py, now, carrying, vx, vy, spin, disc8, turns8, oval[0], oval[1], oval[2],
+                solved.p0, solved.px, solved.py, full,
+            )  # fmt: skip
+        else:
+            fx, fy, torque, xx, xy, yy, xw, yw, ww = round_friction(
+                px, py, now, carrying, vx, vy, spin, solved.p0, solved.px, solved.py, full
+            )
         if turns:
             left = torque_of_discs(px, py, now, carrying, radii, vx, vy, spin, solved.p0, solved.px, solved.py)
             torque -= left * spin / math.hypot(spin, CREEP / body.reach)
@@ -130,9 +136,11 @@ def _balance(body, object_, room, mu, vx, vy, spin, turns8, oval, hx, hy, solved
     partly = solved.partly > 0.0
     solved.tipped = 1.0
     for _ in range(MOST_CHANGES):
-        g = unloaded_friction(
-            px, py, mu, loaded if partly else w, vx, vy, spin, disc8, turns8, oval[0], oval[1], oval[2]
-        )
+        carrying = loaded if partly else w
+        if turns8 > 0.0 or oval[0] != 1.0 or oval[1] != 0.0:
+            g = unloaded_friction(px, py, mu, carrying, vx, vy, spin, disc8, turns8, oval[0], oval[1], oval[2])
+        else:
+            g = round_unloaded_friction(px, py, mu, carrying, vx, vy, spin)
         stands, p0, p1, p2 = plane_of_loads(
             sums[6:12] if partly else sums[:6], g, body.com_height, body.tip_arm * hx, body.tip_arm * hy, body.weight
         )

@@ -92,6 +92,45 @@ def friction(x, y, mu, w, vx, vy, spin, disc8, turns8, mxx, mxy, myy, p0, px, py
 
 
 @compiled_sum
+def round_unloaded_friction(x, y, mu, w, vx, vy, spin):
+    """`unloaded_friction` of a circle where slip turns about no place near: most of the time, and twice as fast."""
+    gx0 = gx1 = gx2 = gy0 = gy1 = gy2 = 0.0
+    for i in range(x.shape[0]):
+        sx, sy = vx - spin * y[i], vy + spin * x[i]
+        k = w[i] * mu[i] / math.sqrt(sx * sx + sy * sy + CREEP * CREEP)
+        fx, fy = k * sx, k * sy
+        gx0 += fx
+        gx1 += fx * x[i]
+        gx2 += fx * y[i]
+        gy0 += fy
+        gy1 += fy * x[i]
+        gy2 += fy * y[i]
+    return gx0, gx1, gx2, gy0, gy1, gy2
+
+
+@compiled_sum
+def round_friction(x, y, mu, w, vx, vy, spin, p0, px, py, full):
+    """`friction` of a circle where slip turns about no place near."""
+    fx = fy = torque = xx = xy = yy = xw = yw = ww = 0.0
+    for i in range(x.shape[0]):
+        sx, sy = vx - spin * y[i], vy + spin * x[i]
+        inverse = 1.0 / (sx * sx + sy * sy + CREEP * CREEP)
+        k = w[i] * mu[i] * (p0 + px * x[i] + py * y[i]) * math.sqrt(inverse)
+        q = full * k * inverse
+        fx -= k * sx
+        fy -= k * sy
+        torque -= k * (x[i] * sy - y[i] * sx)
+        a, b, c = k - q * sx * sx, -q * sx * sy, k - q * sy * sy
+        xx += a
+        xy += b
+        yy += c
+        xw += b * x[i] - a * y[i]
+        yw += c * x[i] - b * y[i]
+        ww += a * y[i] * y[i] - 2.0 * b * x[i] * y[i] + c * x[i] * x[i]
+    return fx, fy, torque, xx, xy, yy, xw, yw, ww
+
+
+@compiled_sum
 def torque_of_discs(x, y, mu, w, radii, vx, vy, spin, p0, px, py):
     """Torque [N m], against the spin, that is left within what points stand for where slip turns about them."""
     torque = 0.0

@@ -8,7 +8,8 @@ import pytest
 from problems import QUIET
 from runs import shipped_pushes
 
-from physid_drake.identify.frames import hand_seen_until, unseen_motion
+from physid_drake.errors import RecordingError
+from physid_drake.identify.frames import check_one_push, hand_seen_until, unseen_motion
 from physid_drake.identify.problem import problems_of
 from physid_drake.recording import PoseStream
 
@@ -103,3 +104,23 @@ def test_without_a_hand_nothing_sets_a_resting_object_moving(recording):
     bare = replace(recording, hand=None, pushes=tuple(replace(push, hand=None) for push in recording.pushes))
     (said,) = unseen_motion(bare, SIGMA)
     assert said.startswith("nothing moves at first")
+
+
+def a_log_of(count, push):
+    """A push whose hand goes to and fro, and stands in between."""
+    hand, span = push.hand, push.hand.times[-1] - push.hand.times[0] + 0.01
+    places = [hand.positions, hand.positions[::-1]]
+    return replace(push, hand=PoseStream(
+        times=np.concatenate([hand.times + k * span for k in range(count)]),
+        positions=np.concatenate([places[k % 2] for k in range(count)]),
+        quaternions=np.concatenate([hand.quaternions] * count),
+    ))  # fmt: skip
+
+
+def test_a_log_of_many_pushes_in_one_table_is_refused_before_its_path_is_fitted(recording):
+    check_one_push(a_log_of(4, recording.pushes[0]))
+    long = a_log_of(40, recording.pushes[0])
+    with pytest.raises(RecordingError, match=r"the hand stands still \d+ times in \d+ s; cut the table"):
+        check_one_push(long)
+    with pytest.raises(RecordingError, match="cut the table"):
+        problems_of(replace(recording, pushes=(long,)), QUIET, 0.03)
