@@ -82,10 +82,10 @@ class Sloshing(Effect):
         """A fresh oscillator for each rollout."""
         mass = self.fraction * facts.mass
         load = mass * GRAVITY if facts.rolling_radius is None else 0.0
-        return (_SloshLaw(mass, 2.0 * math.pi * self.frequency, self.damping, load),)
+        return (Swing(mass, 2.0 * math.pi * self.frequency, self.damping, load),)
 
 
-class _SloshLaw:
+class Swing:
     """Swinging mass: its place and velocity are the law's own state.
 
     Over a tick the object is taken to keep its velocity and spin, on which the oscillator's motion is exact; the
@@ -95,7 +95,7 @@ class _SloshLaw:
 
     def __init__(self, mass: float, frequency: float, damping: float, load: float) -> None:
         """``mass`` kg, ``frequency`` rad/s, ``damping`` ratio, ``load`` on the base that moves with the mass [N]."""
-        self._mass, self._frequency, self._damping, self._load = mass, frequency, damping, load
+        self.mass, self.frequency, self.damping, self.load = mass, frequency, damping, load
         self._time, self._span = math.inf, 0.0  # of the tick that was looked at last; before any call
         # Of the swinging mass: place [m], velocity [m/s]; of the object at the last call: place, velocity, spin.
         self._place = self._velocity = self._from = self._anchor = 0j
@@ -104,6 +104,7 @@ class _SloshLaw:
         self._wrench = Wrench(fx=0.0, fy=0.0, torque=0.0)
 
     def wrench(self, state: ObjectState) -> Wrench:
+        """The mean force over a tick, and what it shifts of the pressure."""
         if state.time < self._time:  # a rollout begins
             self._place, self._velocity = complex(*state.p_WBcm), complex(*state.v_WBcm)
         elif state.time > self._time:
@@ -116,8 +117,8 @@ class _SloshLaw:
 
     def strongest(self) -> float:
         """Largest force [N] that the swing will yet bring while the object rests."""
-        swing = math.hypot(abs(self._place - self._from), abs(self._velocity) / self._frequency)
-        return self._mass * self._frequency**2 * swing
+        swing = math.hypot(abs(self._place - self._from), abs(self._velocity) / self.frequency)
+        return self.mass * self.frequency**2 * swing
 
     def _advance(self, state: ObjectState, span: float) -> None:
         """Move by what has passed since the last look."""
@@ -128,16 +129,16 @@ class _SloshLaw:
             return
         offset, _ = self._flow(self._place - self._from, self._velocity - self._anchor, self._spin, span)
         self._place = self._from + span * self._anchor + offset
-        self._velocity -= span * self._force / self._mass
+        self._velocity -= span * self._force / self.mass
 
     def _look_ahead(self, state: ObjectState) -> None:
         """The mean wrench of the next tick."""
         self._from, self._anchor, self._spin = complex(*state.p_WBcm), complex(*state.v_WBcm), state.yaw_rate
         offset, rate = self._place - self._from, self._velocity - self._anchor
         later, slower = self._flow(offset, rate, self._spin, self._span)
-        gain = self._mass / self._span
+        gain = self.mass / self._span
         self._force = gain * (rate - slower)
-        moved = self._load * 0.5 * (offset + later)
+        moved = self.load * 0.5 * (offset + later)
         self._wrench = Wrench(
             fx=self._force.real,
             fy=self._force.imag,
@@ -151,7 +152,7 @@ class _SloshLaw:
 
         d'' + 2 z w (d' - i spin d) + w^2 d = 0.
         """
-        w, z = self._frequency, self._damping
+        w, z = self.frequency, self.damping
         root = w * cmath.sqrt(z * z - 1.0 + 2j * z * spin / w) or 1e-9
         slow, fast = -z * w + root, -z * w - root
         a = (rate - fast * offset) / (slow - fast)

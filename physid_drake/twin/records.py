@@ -20,6 +20,10 @@ BODY: Final = np.dtype([(name, np.float64) for name in (
     "tip_mass",          # of a tip that gives way [kg]; 0 of one that is moved as its path says
     "tip_stiffness",     # [N/m]
     "tip_damping",       # [N s/m]
+    "swing_mass",        # of what swings inside, a part of the whole beside ``mass`` [kg]
+    "swing_stiffness",   # [N/m]
+    "swing_damping",     # [N s/m]
+    "swing_load",        # of the weight that moves with it [N]
     "reach",             # from Bcm, within which slip may turn about a place [m]
     "begin", "end",      # [s]
 )])  # fmt: skip

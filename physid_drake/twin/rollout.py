@@ -7,23 +7,24 @@ import math
 import numpy as np
 
 from physid_drake.twin.compiled import compiled
-from physid_drake.twin.contact import blow
 from physid_drake.twin.hand import gap_between, hand_at
 from physid_drake.twin.laws import force_by_place, friction_by_place
 from physid_drake.twin.stage import solve_stage
 from physid_drake.twin.support import CREEP, LEAVES_ALL, moments
+from physid_drake.twin.swing import strongest, swing_after, swing_at_rest
+from physid_drake.twin.tip import contact_at, part, tip_after, tip_at
+from physid_drake.twin.touch import jerk, keep_touching, meeting, strike
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)  # of SDIRK2, L-stable (Alexander 1977)
 TOLERANCE = 1e-7  # m, of a step; at 1e-6 derivatives by the restitution are 12 % off
-GENTLE = 1e-3  # m/s: slower touches are no blows
 SHORTEST, LONGEST, LONGEST_TOUCHING = 2.5e-4, 0.02, 0.02  # s
 FARTHEST_TOUCHING = 2e-3  # m that the tip goes in a step while it touches
-AFTER_BLOW = 5e-4  # s
 AT_KNOT = 1e-9  # s
 STILL = 3.0 * CREEP  # m/s
+STILL_TIP = 1e-7  # m, and tenths of m/s: a tip that gives way hangs where the hand is
+LONGEST_SWINGING = 2e-3  # s, of a tip that gives way
 HELD = 0.9  # of what friction holds
 NEAR, NEARLY_TOUCHING = 2e-4, 1e-7  # s, m
-CORRECTED = 5e-4  # m of a gap that a step leaves
 FASTEST = 50.0  # m/s: faster is diverged
 MOST_STEPS = 200_000
 COMPLETED, DIVERGED, STUCK = 0, 1, 2
@@ -33,6 +34,8 @@ STATE = np.dtype([(name, np.float64) for name in (
     "ax", "ay", "aspin",                       # its acceleration, for the next guess
     "fx", "fy",                                # of the tip on the object [N]
     "touching", "next",                        # whether it does; length of the next step [s]
+    "dx", "dy", "wx", "wy",                    # what swings inside: its place less that of Bcm [m], its velocity
+    "ex", "ey", "ux", "uy",                    # a tip that gives way: the hand's place less its own [m], its velocity
 )])  # fmt: skip
 COUNTS = np.dtype([(name, np.int64) for name in (
     "outcome", "steps", "stages", "rounds", "unconverged", "lifted", "tipped", "blows",
@@ -71,12 +74,13 @@ def roll(body, object_, hand, start, laws, tables, times, poses, forces, counts,
             if rest > 0.0:
                 until = min(state.t + rest, body.end + 1.0)
                 done = _sample_rest(body, state, times, done, until, poses, forces)
+                swing_at_rest(body, state, until - state.t)
                 state.t, state.touching = until, 0.0
                 continue
             if rest == 0.0 and state.touching == 0.0:
-                _strike(body, object_, hand, state, counts)
-        elif at_knot and state.touching > 0.0:
-            _jerk(body, object_, hand, state)
+                strike(body, object_, hand, state, counts)
+        elif at_knot and state.touching > 0.0 and body.tip_stiffness == 0.0:
+            jerk(body, object_, hand, state)
         done = _step(
             body, object_, hand, laws, tables, times, done, poses, forces, counts, room, contact, solved, state, limit
         )
@@ -107,28 +111,33 @@ def _begin(body, object_, hand, start, room, state, solved, counts):
     counts.outcome = COMPLETED
     counts.steps = counts.stages = counts.rounds = counts.unconverged = counts.lifted = counts.tipped = 0
     counts.blows = 0
+    state.ex = state.ey = state.ux = state.uy = state.dx = state.dy = 0.0
+    state.wx, state.wy = state.vx, state.vy
     if len(hand[0]) > 0:
-        hx, hy, _, _ = hand_at(state.t, False, hand[0], hand[1], hand[2])
+        hx, hy, state.ux, state.uy = hand_at(state.t, False, hand[0], hand[1], hand[2])
         gap, nx, ny, _, _ = gap_between(state.x, state.y, state.yaw, hx, hy, body, edges)
         if gap < 0.0:
-            state.x, state.y = state.x - gap * nx, state.y - gap * ny
+            part(body, state, gap, nx, ny)
 
 
 @compiled
 def _rest(body, object_, hand, laws, tables, room, state, limit):
     """For how long an object at rest surely stays so [s]; 0 where the tip is at it, below 0 where it slides."""
     fx, fy = force_by_place(laws, tables, state.x, state.y)
-    pull = math.hypot(fx, fy)
+    pull = math.hypot(fx, fy) + strongest(body, state)
     if pull > 0.0:
         px, py, w, mu0, radii, _, _ = object_
         friction_by_place(laws, tables, px, py, radii, state.x, state.y, state.yaw, mu0, room[0])
         if pull > HELD * body.weight * np.dot(w, room[0]) / room[3][0]:
             return -1.0
     times, places, velocities = hand
+    swings = body.tip_stiffness > 0.0 and len(times) > 0
+    if swings and math.hypot(state.ex, state.ey) + 0.1 * math.hypot(state.ux, state.uy) > STILL_TIP:
+        return -1.0
     if len(times) == 0 or state.t >= times[-1] - AT_KNOT:
         return np.inf
     hx, hy, hvx, hvy = hand_at(state.t, False, times, places, velocities)
-    if state.touching > 0.0:
+    if state.touching > 0.0 or swings:
         _, _, evx, evy = hand_at(min(limit, body.end), True, times, places, velocities)
         stands = hvx == 0.0 and hvy == 0.0 and evx == 0.0 and evy == 0.0
         return limit - state.t if stands and limit - state.t > AT_KNOT else -1.0
@@ -146,47 +155,6 @@ def _rest(body, object_, hand, laws, tables, room, state, limit):
 
 
 @compiled
-def _strike(body, object_, hand, state, counts):
-    """The tip meets the object: a blow, or a touch that stays where it is gentle or does not rebound."""
-    hx, hy, hvx, hvy = hand_at(state.t, False, hand[0], hand[1], hand[2])
-    gap, nx, ny, rx, ry = gap_between(state.x, state.y, state.yaw, hx, hy, body, object_[6])
-    if gap < 0.0:
-        state.x, state.y = state.x - gap * nx, state.y - gap * ny
-    ux, uy = state.vx - state.spin * ry - hvx, state.vy + state.spin * rx - hvy
-    un = ux * nx + uy * ny
-    state.ax = state.ay = state.aspin = 0.0
-    if un >= 0.0:
-        state.touching = 1.0
-        return
-    restitution = body.restitution if un < -GENTLE else 0.0
-    _kick(body, state, nx, ny, rx, ry, un, uy * nx - ux * ny, restitution)
-    counts.blows += 1 if un < -GENTLE else 0
-    state.next = AFTER_BLOW
-    state.touching = 1.0 if restitution == 0.0 else 0.0
-
-
-@compiled
-def _jerk(body, object_, hand, state):
-    """The hand's velocity jumps at a knot while it touches: a blow without rebound before the step, not within it."""
-    hx, hy, hvx, hvy = hand_at(state.t, False, hand[0], hand[1], hand[2])
-    _, nx, ny, rx, ry = gap_between(state.x, state.y, state.yaw, hx, hy, body, object_[6])
-    ux, uy = state.vx - state.spin * ry - hvx, state.vy + state.spin * rx - hvy
-    un = ux * nx + uy * ny
-    if un < -1e-7:
-        _kick(body, state, nx, ny, rx, ry, un, uy * nx - ux * ny, 0.0)
-        state.ax = state.ay = state.aspin = 0.0
-
-
-@compiled
-def _kick(body, state, nx, ny, rx, ry, un, ut, restitution):
-    rn, rt = rx * ny - ry * nx, rx * nx + ry * ny
-    pn, pt = blow(body.mass, body.inertia, rn, rt, un, ut, body.hand_friction, restitution, 0.0)
-    state.vx += (nx * pn - ny * pt) / body.mass
-    state.vy += (ny * pn + nx * pt) / body.mass
-    state.spin += (rn * pn + rt * pt) / body.inertia
-
-
-@compiled
 def _step(body, object_, hand, laws, tables, times, done, poses, forces, counts, room, contact, solved, state, limit):
     """One step, cut where the tip meets the object; samples are taken within it."""
     h = _length(body, object_, hand, state, limit)
@@ -195,7 +163,9 @@ def _step(body, object_, hand, laws, tables, times, done, poses, forces, counts,
     t, x, y, yaw, vx, vy, spin = state.t, state.x, state.y, state.yaw, state.vx, state.vy, state.spin
     while True:
         tries += 1
-        x1, y1, yaw1, a, err = _two_stages(body, object_, hand, laws, tables, counts, room, contact, solved, state, h)
+        x1, y1, yaw1, a, tip, swing, err = _two_stages(
+            body, object_, hand, laws, tables, counts, room, contact, solved, state, h
+        )
         scale = (TOLERANCE / max(err, 1e-15)) ** (1.0 / 3.0)
         if err > 4.0 * TOLERANCE and h > 1.01 * SHORTEST and tries == 1:
             h = max(SHORTEST, h * max(0.2, 0.9 * scale))
@@ -204,7 +174,7 @@ def _step(body, object_, hand, laws, tables, times, done, poses, forces, counts,
             state.next = min(LONGEST, max(SHORTEST, h * min(2.0, 0.9 * scale)))
         if not has_hand or state.touching > 0.0 or cut:
             break
-        into = _meeting(body, edges, hand, state, h, x1, y1, yaw1)
+        into = meeting(body, edges, hand, state, h, x1, y1, yaw1, tip)
         if into >= 1.0:
             break
         struck = True
@@ -229,11 +199,13 @@ def _step(body, object_, hand, laws, tables, times, done, poses, forces, counts,
         state.ax, state.ay, state.aspin = (nvx - a[0]) / rest, (nvy - a[1]) / rest, (nspin - a[2]) / rest
         state.x, state.y, state.yaw, state.vx, state.vy, state.spin = x1, y1, yaw1, nvx, nvy, nspin
         state.fx, state.fy = solved.fx, solved.fy
+        state.ex, state.ey, state.ux, state.uy = tip
+        state.dx, state.dy, state.wx, state.wy = swing
         state.t = t + h
     if struck:
-        _strike(body, object_, hand, state, counts)
+        strike(body, object_, hand, state, counts)
     elif state.touching > 0.0:
-        _keep_touching(body, edges, hand, solved, state)
+        keep_touching(body, edges, hand, solved, state)
     return done
 
 
@@ -241,8 +213,11 @@ def _step(body, object_, hand, laws, tables, times, done, poses, forces, counts,
 def _length(body, object_, hand, state, limit):
     """How long the next step is [s]: to the next knot at most, and short beside the tip."""
     h = min(LONGEST, state.next)
-    if len(hand[0]) > 0 and state.t < hand[0][-1]:
-        hx, hy, hvx, hvy = hand_at(state.t, False, hand[0], hand[1], hand[2])
+    swings = body.tip_stiffness > 0.0 and len(hand[0]) > 0
+    if swings:
+        h = min(h, LONGEST_SWINGING)
+    if len(hand[0]) > 0 and (swings or state.t < hand[0][-1]):
+        hx, hy, hvx, hvy = tip_at(body, hand, state, state.t, False)
         if state.touching > 0.0:
             speed = math.hypot(hvx, hvy) + 0.05 * abs(state.spin)
             h = min(h, LONGEST_TOUCHING, max(FARTHEST_TOUCHING / max(speed, 1e-9), SHORTEST))
@@ -268,9 +243,13 @@ def _two_stages(body, object_, hand, laws, tables, counts, room, contact, solved
     xa = state.x + g * (vx + 0.5 * g * state.ax)
     ya = state.y + g * (vy + 0.5 * g * state.ay)
     yawa = state.yaw + g * (spin + 0.5 * g * state.aspin)
-    _contact_at(body, edges, hand, state.t + g, xa, ya, yawa, touching, contact)
-    solve_stage(body, object_, laws, tables, room, g, xa, ya, yawa, vx, vy, spin, contact, solved)
+    tip0 = (state.ex, state.ey, state.ux, state.uy)
+    contact_at(body, edges, hand, state.t + g, g, xa, ya, yawa, tip0, state.ux, state.uy, touching, contact)
+    swing0 = (state.dx, state.dy, state.wx, state.wy)
+    solve_stage(body, object_, laws, tables, room, g, xa, ya, yawa, vx, vy, spin, swing0, contact, solved)
     _count(counts, solved)
+    tipa = tip_after(g, tip0, contact, solved)
+    swinga = swing_after(body, g, swing0, spin, solved.vx, solved.vy)
     a = (solved.vx, solved.vy, solved.spin, solved.fx, solved.fy)
     aax, aay, aaspin = (a[0] - vx) / g, (a[1] - vy) / g, (a[2] - spin) / g
     rest = (1.0 - GAMMA) * h
@@ -278,34 +257,42 @@ def _two_stages(body, object_, hand, laws, tables, counts, room, contact, solved
     xb = state.x + rest * a[0] + g * solved.vx
     yb = state.y + rest * a[1] + g * solved.vy
     yawb = state.yaw + rest * a[2] + g * solved.spin
-    _contact_at(body, edges, hand, state.t + h, xb, yb, yawb, touching, contact)
+    # From where the second stage starts, and how fast the tip will about be at its end.
+    tips = (
+        state.ex + rest / g * (tipa[0] - state.ex), state.ey + rest / g * (tipa[1] - state.ey),
+        state.ux + rest / g * (tipa[2] - state.ux), state.uy + rest / g * (tipa[3] - state.uy),
+    )  # fmt: skip
+    swings = (
+        state.dx + rest / g * (swinga[0] - state.dx), state.dy + rest / g * (swinga[1] - state.dy),
+        state.wx + rest / g * (swinga[2] - state.wx), state.wy + rest / g * (swinga[3] - state.wy),
+    )  # fmt: skip
+    later_x, later_y = state.ux + (tipa[2] - state.ux) / GAMMA, state.uy + (tipa[3] - state.uy) / GAMMA
+    contact_at(body, edges, hand, state.t + h, g, xb, yb, yawb, tips, later_x, later_y, touching, contact)
     solve_stage(
         body, object_, laws, tables, room, g, xb, yb, yawb,
-        vx + rest * aax, vy + rest * aay, spin + rest * aaspin, contact, solved,
+        vx + rest * aax, vy + rest * aay, spin + rest * aaspin, swings, contact, solved,
     )  # fmt: skip
     _count(counts, solved)
     size = math.sqrt(body.inertia / body.mass)
     ex, ey = solved.vx - vx - h * aax, solved.vy - vy - h * aay
     espin = (solved.spin - spin - h * aaspin) * size
     error = h * math.sqrt(ex * ex + ey * ey + espin * espin)
+    tipb = tip_after(g, tips, contact, solved)
+    swingb = swing_after(body, g, swings, spin + rest * aaspin, solved.vx, solved.vy)
+    if body.swing_mass > 0.0:
+        soon_x, soon_y = state.wx + (swinga[2] - state.wx) / GAMMA, state.wy + (swinga[3] - state.wy) / GAMMA
+        error = max(error, h * math.hypot(swingb[2] - soon_x, swingb[3] - soon_y))
+    if body.tip_stiffness > 0.0:
+        error = max(error, h * math.hypot(tipb[2] - later_x, tipb[3] - later_y))
     return (
         state.x + rest * a[0] + g * solved.vx,
         state.y + rest * a[1] + g * solved.vy,
         state.yaw + rest * a[2] + g * solved.spin,
         a,
+        tipb,
+        swingb,
         error,
     )
-
-
-@compiled
-def _contact_at(body, edges, hand, t, x, y, yaw, touching, contact):
-    """The tip's contact at a time, with the object at a pose; the hand's velocity is that before a knot."""
-    contact.gives = 0.0
-    contact.touching = 1.0 if touching else 0.0
-    if touching:
-        hx, hy, hvx, hvy = hand_at(t, True, hand[0], hand[1], hand[2])
-        _, nx, ny, rx, ry = gap_between(x, y, yaw, hx, hy, body, edges)
-        contact.nx, contact.ny, contact.rx, contact.ry, contact.vx, contact.vy = nx, ny, rx, ry, hvx, hvy
 
 
 @compiled
@@ -318,56 +305,9 @@ def _count(counts, solved):
 
 
 @compiled
-def _meeting(body, edges, hand, state, h, x1, y1, yaw1):
-    """The share of a step after which the tip meets the object; 1 or more where it does not."""
-    hx, hy, _, _ = hand_at(state.t + h, True, hand[0], hand[1], hand[2])
-    after, _, _, _, _ = gap_between(x1, y1, yaw1, hx, hy, body, edges)
-    if after >= 0.0:
-        return 2.0
-    hx, hy, hvx, hvy = hand_at(state.t, False, hand[0], hand[1], hand[2])
-    before, nx, ny, rx, ry = gap_between(state.x, state.y, state.yaw, hx, hy, body, edges)
-    if before <= 1e-10:
-        rate = nx * (state.vx - state.spin * ry - hvx) + ny * (state.vy + state.spin * rx - hvy)
-        return 2.0 if rate > 0.0 and before < after else 0.0
-    low, high, gap_low, gap_high = 0.0, 1.0, before, after
-    for _ in range(40):
-        u = low + (high - low) * min(max(gap_low / (gap_low - gap_high), 0.02), 0.98)
-        hx, hy, _, _ = hand_at(state.t + u * h, False, hand[0], hand[1], hand[2])
-        gap, _, _, _, _ = gap_between(
-            _between(u, h, state.x, state.vx, x1), _between(u, h, state.y, state.vy, y1),
-            _between(u, h, state.yaw, state.spin, yaw1), hx, hy, body, edges,
-        )  # fmt: skip
-        if gap > 0.0:
-            low, gap_low = u, gap
-        else:
-            high, gap_high = u, gap
-        if (high - low) * h < 1e-10 or gap_low < 1e-10:
-            break
-    return low
-
-
-@compiled
-def _between(u, h, q, v, q1):
-    """Within a step, from where and how fast it began to where it ended."""
-    return q + u * h * v + u * u * (q1 - q - h * v)
-
-
-@compiled
 def _hermite(u, h, q, v, q1, v1):
     u2, u3 = u * u, u * u * u
     return (2 * u3 - 3 * u2 + 1) * q + (u3 - 2 * u2 + u) * h * v + (3 * u2 - 2 * u3) * q1 + (u3 - u2) * h * v1
-
-
-@compiled
-def _keep_touching(body, edges, hand, solved, state):
-    """Let go where nothing presses any more; else take back what the gap has drifted by."""
-    hx, hy, _, _ = hand_at(state.t, True, hand[0], hand[1], hand[2])
-    gap, nx, ny, _, _ = gap_between(state.x, state.y, state.yaw, hx, hy, body, edges)
-    apart = solved.normal <= 0.0
-    if apart:
-        state.touching = state.fx = state.fy = state.ax = state.ay = state.aspin = 0.0
-    if gap < 0.0 if apart else abs(gap) < CORRECTED:
-        state.x, state.y = state.x - gap * nx, state.y - gap * ny
 
 
 @compiled

@@ -21,13 +21,15 @@ from physid_drake.twin.support import (
     unloaded_friction,
     unloading,
 )
+from physid_drake.twin.swing import pull_of, torque_of
 
 MOST_ROUNDS = 60  # of Newton's method
 STUCK = 12  # rounds after which it begins anew from rest
 CONVERGED = 1e-8  # m/s
 CONTACT = np.dtype([(name, np.float64) for name in (
     "touching", "nx", "ny", "rx", "ry",  # normal from tip to object and arm from Bcm, in W
-    "vx", "vy",                          # of the tip
+    "vx", "vy",                          # of the tip, were there no contact
+    "hand_vx", "hand_vy",                # of the hand that holds it
     "gives",                             # velocity that a tip which gives way loses per impulse [1/kg]
 )])  # fmt: skip
 """The tip's contact as a stage sees it."""
@@ -42,7 +44,7 @@ SOLVED = np.dtype([(name, np.float64) for name in (
 
 
 @compiled
-def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, contact, solved):
+def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, swing, contact, solved):
     """Implicit Euler over ``h`` from velocity (ax, ay, spin0) at the pose predicted for its end.
 
     Newton's method on the velocity, in B. The contact with the tip is solved in closed form in every round, and the
@@ -57,16 +59,20 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
         h: length of the stage [s].
         x, y, yaw: of Bcm at its end [m, rad].
         ax, ay, spin0: velocity at its start, in W.
+        swing: (dx, dy, wx, wy) of what swings inside, likewise.
         contact: record of `CONTACT`.
         solved: record of `SOLVED`; holds the guess, and afterwards what was found.
     """
-    px, py, w, mu0, radii, disc8, _ = object_
+    px, py, w, mu0, radii, _, _ = object_
     mu, loaded, fast, _ = room
     c, s = math.cos(yaw), math.sin(yaw)
     friction_by_place(laws, tables, px, py, radii, x, y, yaw, mu0, mu)
     oval = ellipse(laws, yaw)
-    ex, ey = _into(c, s, *force_by_place(laws, tables, x, y))
+    wx, wy = force_by_place(laws, tables, x, y)
+    swing_x, swing_y, swing_drag = pull_of(body, h, swing, spin0)
+    ex, ey = _into(c, s, wx + swing_x, wy + swing_y)
     linear, turning_drag, quadratic = drags(laws)
+    arms = _into(c, s, body.swing_load * swing[0], body.swing_load * swing[1])
     vx, vy = _into(c, s, solved.vx, solved.vy)
     spin = solved.spin
     bx, by = _into(c, s, ax, ay)
@@ -77,24 +83,14 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
     full, before, pn, again, rounds = 1.0, np.inf, 0.0, False, 0
     solved.converged = 0.0
     for rounds in range(1, MOST_ROUNDS + 1):
-        turns = vx * vx + vy * vy < (spin * body.reach) ** 2
-        turns8 = spin**8 if turns else 0.0
+        turns8 = spin**8 if vx * vx + vy * vy < (spin * body.reach) ** 2 else 0.0
         now = fast if friction_by_speed(laws, tables, px, py, vx, vy, spin, mu, fast) else mu
-        _balance(body, object_, room, now, vx, vy, spin, turns8, oval, hx, hy, solved)
-        carrying = loaded if solved.partly > 0.0 else w
-        if turns or oval[0] != 1.0 or oval[1] != 0.0:
-            fx, fy, torque, xx, xy, yy, xw, yw, ww = friction(
-                px, py, now, carrying, vx, vy, spin, disc8, turns8, oval[0], oval[1], oval[2],
-                solved.p0, solved.px, solved.py, full,
-            )  # fmt: skip
-        else:
-            fx, fy, torque, xx, xy, yy, xw, yw, ww = round_friction(
-                px, py, now, carrying, vx, vy, spin, solved.p0, solved.px, solved.py, full
-            )
-        if turns:
-            left = torque_of_discs(px, py, now, carrying, radii, vx, vy, spin, solved.p0, solved.px, solved.py)
-            torque -= left * spin / math.hypot(spin, CREEP / body.reach)
-        drag = linear + quadratic * math.hypot(vx, vy)
+        _balance(body, object_, room, now, vx, vy, spin, turns8, oval, hx, hy, arms, solved)
+        fx, fy, torque, xx, xy, yy, xw, yw, ww = _friction(
+            body, object_, now, loaded if solved.partly > 0.0 else w, vx, vy, spin, turns8, oval, solved, full
+        )
+        torque += torque_of(body, swing, c * vx - s * vy, s * vx + c * vy, spin)
+        drag = linear + quadratic * math.hypot(vx, vy) + swing_drag
         inverse = _inverse(
             body.mass + h * (xx + drag), h * xy, h * xw, body.mass + h * (yy + drag), h * yw,
             body.inertia + h * (ww + turning_drag),
@@ -129,8 +125,27 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
 
 
 @compiled
-def _balance(body, object_, room, mu, vx, vy, spin, turns8, oval, hx, hy, solved):
-    """The plane of loads for a velocity and a tip's force (hx, hy) in B: into ``solved``, and which points carry."""
+def _friction(body, object_, mu, carrying, vx, vy, spin, turns8, oval, solved, full):
+    """`friction` under the plane of loads that was found, with what turns within what single points stand for."""
+    px, py, _, _, radii, disc8, _ = object_
+    if turns8 == 0.0 and oval[0] == 1.0 and oval[1] == 0.0:
+        return round_friction(px, py, mu, carrying, vx, vy, spin, solved.p0, solved.px, solved.py, full)
+    fx, fy, torque, xx, xy, yy, xw, yw, ww = friction(
+        px, py, mu, carrying, vx, vy, spin, disc8, turns8, oval[0], oval[1], oval[2],
+        solved.p0, solved.px, solved.py, full,
+    )  # fmt: skip
+    if turns8 > 0.0:
+        left = torque_of_discs(px, py, mu, carrying, radii, vx, vy, spin, solved.p0, solved.px, solved.py)
+        torque -= left * spin / math.hypot(spin, CREEP / body.reach)
+    return fx, fy, torque, xx, xy, yy, xw, yw, ww
+
+
+@compiled
+def _balance(body, object_, room, mu, vx, vy, spin, turns8, oval, hx, hy, arms, solved):
+    """The plane of loads for a velocity and a tip's force (hx, hy) in B: into ``solved``, and which points carry.
+
+    ``arms`` are the moments of a weight that has moved [N m].
+    """
     px, py, w, _, _, disc8, _ = object_
     _, loaded, _, sums = room
     partly = solved.partly > 0.0
@@ -142,7 +157,12 @@ def _balance(body, object_, room, mu, vx, vy, spin, turns8, oval, hx, hy, solved
         else:
             g = round_unloaded_friction(px, py, mu, carrying, vx, vy, spin)
         stands, p0, p1, p2 = plane_of_loads(
-            sums[6:12] if partly else sums[:6], g, body.com_height, body.tip_arm * hx, body.tip_arm * hy, body.weight
+            sums[6:12] if partly else sums[:6],
+            g,
+            body.com_height,
+            body.tip_arm * hx + arms[0],
+            body.tip_arm * hy + arms[1],
+            body.weight,
         )
         if not stands:
             break

@@ -12,8 +12,10 @@ from physid_drake.cell import Body, HandPath, Outcome, Start
 from physid_drake.cell.diagram import GRAVITY
 from physid_drake.cell.laws import Law
 from physid_drake.cell.outline import Disc, Outline, Polygon
+from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.solid import Solid
 from physid_drake.cell.support import FrictionGrid, PressureGrid, Support, support_of
+from physid_drake.effects.liquid import Swing
 from physid_drake.errors import CellError
 from physid_drake.twin.batch import roll_all
 from physid_drake.twin.records import BODY
@@ -23,6 +25,7 @@ from physid_drake.twin.vocabulary import by_place, records_of
 
 Array = NDArray[np.float64]
 
+LIGHTEST_TIP = 1e-6  # kg
 POINTS, POINTS_BY_PLACE = 36, 144
 """Under the object; more where friction depends on the place: its edges cross the base point by point."""
 
@@ -39,6 +42,8 @@ class TwinPush:
         times: (n,) at which poses are asked for, increasing [s].
         hand_height: of the contact above the table [m]; half the object's height if None.
         laws: of the vocabulary: forces and frictions.
+        swing: what swings inside; None where nothing does.
+        mount: what holds a tip that gives way; None for one that is moved as the path says.
     """
 
     body: Body
@@ -49,6 +54,8 @@ class TwinPush:
     times: Array
     hand_height: float | None = None
     laws: Sequence[Law] = ()
+    swing: Swing | None = None
+    mount: Mount | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,10 +148,28 @@ class Twin:
             "tip_radius": self.hand_radius or 0.0, "tip_arm": height - 0.5 * solid.height,
             "hand_friction": body.hand_friction, "restitution": body.restitution,
             "reach": float((away + TURNS_WITHIN * support.radii).max()), "begin": push.begin, "end": push.end,
+            **_tip_of(push.mount), **_swing_of(push.swing),
         }  # fmt: skip
         for name, value in values.items():
             record[name] = value
         return record
+
+
+def _tip_of(mount: Mount | None) -> dict[str, float]:
+    if mount is None:
+        return {}
+    return {
+        "tip_mass": max(mount.mass, LIGHTEST_TIP), "tip_stiffness": mount.stiffness, "tip_damping": mount.damping,
+    }  # fmt: skip
+
+
+def _swing_of(swing: Swing | None) -> dict[str, float]:
+    if swing is None:
+        return {}
+    return {
+        "swing_mass": swing.mass, "swing_stiffness": swing.mass * swing.frequency**2,
+        "swing_damping": 2.0 * swing.damping * swing.mass * swing.frequency, "swing_load": swing.load,
+    }  # fmt: skip
 
 
 def _edges(outline: Outline) -> Array:

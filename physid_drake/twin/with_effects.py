@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import Body
 from physid_drake.cell.laws import Law
 from physid_drake.effects import Effect, PushFacts
+from physid_drake.effects.liquid import Swing
 from physid_drake.effects.rollout import (
     Geometry,
     Rollout,
@@ -53,12 +54,14 @@ def push_with(
             path = effect.hand(path, facts)
     asked = [*(law for effect in present for law in effect.laws(facts)), *frictions_of(present, facts)]
     laws = [law for law in asked if isinstance(law, VOCABULARY)]
-    if mount_of(present, facts) is not None or len(laws) < len(asked):
+    swings = [law for law in asked if isinstance(law, Swing)]
+    if len(laws) + len(swings) < len(asked) or len(swings) > 1:
         return None
     height = contact_height(twin.solid, plain, push.hand_height)
     return TwinPush(
         body=body, start=true_start(present, push.start), path=path, begin=push.begin, end=push.end,
         times=times - lateness_of(present), hand_height=height, laws=laws,
+        swing=swings[0] if swings else None, mount=mount_of(present, facts),
     )  # fmt: skip
 
 

@@ -23,9 +23,12 @@ STIFF = CellConfig(
     ),
     solver=SolverConfig(time_step_s=5e-4, slide_time_step_s=5e-4),
 )  # fmt: skip
-CELL_ONLY = ("sloshing", "hand_compliance", "friction_by_distance")
-# Deviations; measured: a spring .15, a rebound .13, a lagging hand .11, a patch .07, all others below .05.
-FURTHEST = {"tether": 0.2, "restitution": 0.2, "actuator_lag": 0.2, "friction_patch": 0.15}
+CELL_ONLY = ("friction_by_distance",)
+# Deviations; measured: a spring .15, a rebound .13, a lagging hand .11, a tip that gives way .09, a patch .07, all
+# others below .05.
+FURTHEST = {
+    "tether": 0.2, "restitution": 0.2, "actuator_lag": 0.2, "hand_compliance": 0.15, "friction_patch": 0.15,
+}  # fmt: skip
 
 planar = [kind for kind in (*CATALOGUE, *FOILS) if not rolls_for(kind)]
 

@@ -10,7 +10,9 @@ from twin import SIGMA, body_of, path_of, rms, shape_of, twin_body
 
 from physid_drake.cell import HandPath, Outcome, Start
 from physid_drake.cell.laws import Attraction, Ellipse, Falling, Gradient, Patch, Quadratic, Spring, Tilt, Viscous
+from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.solid import solid_of
+from physid_drake.effects.liquid import Swing
 from physid_drake.recording import Box, Cylinder
 from physid_drake.twin.twin import Twin, TwinPush
 
@@ -222,3 +224,62 @@ def test_friction_that_changes_across_the_table():
 
 def test_a_patch_that_holds_all_of_the_slide_is_another_friction():
     assert slide(Patch(2.0, 0.0, 0.0, 1.0)).poses == pytest.approx(slide(mu=2.0 * MU).poses, abs=1e-9)
+
+
+# What moves by itself: a tip that gives way, a mass that swings inside.
+
+
+def test_a_tip_that_gives_way_pushes_as_its_spring_says():
+    """The object holds; after the hand has stopped, the force is stiffness times what the spring is pressed by."""
+    mount = Mount(stiffness=50.0, damping=2.0, mass=0.01)
+    (trace,) = BOX.rollouts([
+        pushed(start=(-0.08, 0.0), heading=0.0, body=body_of(2.0, 0.9), mount=mount, times=np.array([0.7, 0.8]))
+    ])  # fmt: skip
+    way = 0.3 * (0.25 + 0.045)  # of the hand
+    assert trace.poses[-1] == pytest.approx([0.0, 0.0, 0.0], abs=3e-6)  # friction that is regularised creeps
+    assert trace.forces[-1, 0] == pytest.approx(50.0 * (way - (0.08 - 0.05 - 0.01)), rel=1e-4)
+
+
+def test_a_stiff_tip_that_is_damped_pushes_as_a_rigid_one():
+    """One whose spring swings with the object's mass throws it ahead instead, as a rebound does."""
+    mount = Mount(stiffness=1e6, damping=2.0 * math.sqrt(1e6 * 0.35), mass=1e-3)
+    rigid, stiff = BOX.rollouts([pushed(), pushed(mount=mount)])
+    assert rms((rigid.poses - stiff.poses) / SIGMA) < 0.3
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.2, 1.5])
+def test_a_mass_that_swings_inside_keeps_the_momentum_of_both(damping):
+    """Without friction their centre goes on as it came: the object is off it by m_s d / (m + m_s).
+
+    A tilt pulls at the object alone here, so that d swings about, and comes to, F / (m w^2 (1 + m_s / m)).
+    """
+    mass, swinging, own, tilt = 0.3, 0.1, 2 * math.pi * 3.0, 1e-3
+    push = TwinPush(
+        body=body_of(mass, 1e-12), start=Start(pose=(0.0, 0.0, 0.0), velocity=(0.2, 0.0, 0.0)), path=None, begin=0.0,
+        end=1.0, times=np.linspace(0.0, 1.0, 501), swing=Swing(swinging, own, damping, 0.0), laws=(Tilt(tilt, 0.0),),
+    )  # fmt: skip
+    (trace,) = BOX.rollouts([push])
+    centre = 0.2 * push.times + 0.5 * mass * G * tilt / (mass + swinging) * push.times**2
+    away, comes_to = (
+        trace.poses[:, 0] - centre,
+        swinging * G * tilt / (own**2 * (1.0 + swinging / mass) * (mass + swinging)),
+    )
+    if damping == 0.0:
+        assert away.max() == pytest.approx(2.0 * comes_to, rel=0.02) and away.min() > -1e-8
+    else:
+        assert away[-1] == pytest.approx(comes_to, rel=0.05)
+
+
+def test_a_mass_that_swings_has_the_frequency_of_two_bodies_on_a_spring():
+    """w sqrt(1 + m_s / m) in an object that is free."""
+    mass, swinging, own = 0.3, 0.1, 2 * math.pi * 3.0
+    times = np.linspace(0.0, 2.0, 4001)
+    push = TwinPush(
+        body=body_of(mass, 1e-12), start=Start(pose=(0.0, 0.0, 0.0)), path=None, begin=0.0, end=2.0, times=times,
+        swing=Swing(swinging, own, 0.0, 0.0), laws=(Tilt(0.02, 0.0),),
+    )  # fmt: skip
+    (trace,) = BOX.rollouts([push])
+    left = trace.poses[:, 0] - 0.5 * mass * G * 0.02 / (mass + swinging) * times**2  # (1 - cos) of an amplitude
+    crossings = times[:-1][np.diff(np.sign(left - left.mean())) != 0]
+    period = 2.0 * float(np.mean(np.diff(crossings)))
+    assert 2 * math.pi / period == pytest.approx(own * math.sqrt(1.0 + swinging / mass), rel=2e-3)
