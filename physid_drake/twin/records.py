@@ -24,7 +24,7 @@ BODY: Final = np.dtype([(name, np.float64) for name in (
     "swing_stiffness",   # [N/m]
     "swing_damping",     # [N s/m]
     "swing_load",        # of the weight that moves with it [N]
-    "reach",             # from Bcm, within which slip may turn about a place [m]
+    "reach",             # from Bcm, within which slip may turn about a place [m]; the rollout fills it in
     "begin", "end",      # [s]
 )])  # fmt: skip
 """The object and the hand's tip in one rollout."""

@@ -10,7 +10,7 @@ from physid_drake.twin.compiled import compiled
 from physid_drake.twin.hand import gap_between, hand_at
 from physid_drake.twin.laws import force_by_place, friction_by_place
 from physid_drake.twin.stage import solve_stage
-from physid_drake.twin.support import CREEP, LEAVES_ALL, moments
+from physid_drake.twin.support import CREEP, LEAVES_ALL, TURNS_WITHIN, moments
 from physid_drake.twin.swing import strongest, swing_after, swing_at_rest
 from physid_drake.twin.tip import contact_at, part, tip_after, tip_at
 from physid_drake.twin.touch import jerk, keep_touching, meeting, strike
@@ -96,8 +96,10 @@ def roll(body, object_, hand, start, laws, tables, times, poses, forces, counts,
 def _begin(body, object_, hand, start, room, state, solved, counts):
     """Put the object at its start, out of the tip."""
     px, py, w, _, radii, disc8, edges = object_
+    body.reach = 0.0
     for i in range(len(px)):
         disc8[i] = (LEAVES_ALL * radii[i]) ** 8
+        body.reach = max(body.reach, math.hypot(px[i], py[i]) + TURNS_WITHIN * radii[i])
     moments(px, py, w, room[3][:6])
     room[3][12], room[3][13] = np.abs(px).max(), np.abs(py).max()
     c, s = math.cos(start[2]), math.sin(start[2])

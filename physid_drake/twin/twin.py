@@ -20,7 +20,6 @@ from physid_drake.errors import CellError
 from physid_drake.twin.batch import roll_all
 from physid_drake.twin.records import BODY
 from physid_drake.twin.rollout import COUNTS, DIVERGED, STUCK
-from physid_drake.twin.support import TURNS_WITHIN
 from physid_drake.twin.vocabulary import by_place, records_of
 
 Array = NDArray[np.float64]
@@ -105,71 +104,72 @@ class Twin:
     @property
     def polar(self) -> float:
         """Mean square distance of the underside from Bo [m^2]."""
-        return self._support(False).polar
+        return self._support(POINTS).polar
 
     def rollouts(self, pushes: Sequence[TwinPush]) -> list[Trace]:
         """Simulate all pushes, each as if it were alone."""
-        if not pushes:
-            return []
-        support = self._support(any(by_place(law) for push in pushes for law in push.laws))
+        fine = [k for k, push in enumerate(pushes) if any(by_place(law) for law in push.laws)]
+        coarse = sorted(set(range(len(pushes))).difference(fine))
+        traces: dict[int, Trace] = {}
+        for which, support in ((coarse, self._support(POINTS)), (fine, self._support(POINTS_BY_PLACE))):
+            if which:
+                traces |= zip(which, self._rolled([pushes[k] for k in which], support), strict=True)
+        return [traces[k] for k in range(len(pushes))]
+
+    def _rolled(self, pushes: Sequence[TwinPush], support: Support) -> list[Trace]:
+        """Those that need the same support points."""
         ends = np.cumsum([0, *(len(push.times) for push in pushes)])
         poses, forces = np.zeros((int(ends[-1]), 3)), np.zeros((int(ends[-1]), 2))
         counts = np.zeros(len(pushes), COUNTS)
-        bodies = np.concatenate([self._record(push, support) for push in pushes])
-        friction = np.array([push.body.support_friction[support.cells] for push in pushes])
         laws, law_ends, tables = records_of([(push.laws, push.body.mass * self.gravity) for push in pushes])
         knots, knot_ends = _knots(pushes)
-        starts = np.array([(*push.start.pose, *push.start.velocity) for push in pushes])
         roll_all(  # type: ignore[no-untyped-call]
-            bodies, (np.ascontiguousarray(support.points), support.weights, support.radii), friction,
-            _edges(self.solid.outline), knots, knot_ends, starts, laws, law_ends, tables,
-            np.concatenate([push.times for push in pushes]).astype(np.float64), ends, poses, forces, counts,
+            np.array([self._record(push) for push in pushes], dtype=BODY),
+            (np.ascontiguousarray(support.points), support.weights, support.radii),
+            np.array([push.body.support_friction[support.cells] for push in pushes]),
+            _edges(self.solid.outline), knots, knot_ends,
+            np.array([(*push.start.pose, *push.start.velocity) for push in pushes]),
+            laws, law_ends, tables, np.concatenate([push.times for push in pushes]).astype(np.float64), ends,
+            poses, forces, counts,
         )  # fmt: skip
+        outcomes = np.isin(counts["outcome"], (DIVERGED, STUCK)).tolist()
+        tips, lifts = counts["tipped"].tolist(), counts["lifted"].tolist()
         return [
-            _trace(poses[ends[k] : ends[k + 1]], forces[ends[k] : ends[k + 1]], counts[k]) for k in range(len(pushes))
-        ]
+            Trace(
+                poses=poses[ends[k] : ends[k + 1]], forces=forces[ends[k] : ends[k + 1]],
+                outcome=Outcome.DIVERGED if outcomes[k] else Outcome.COMPLETED, tips=tips[k], lifts=lifts[k],
+            )
+            for k in range(len(pushes))
+        ]  # fmt: skip
 
-    def _support(self, needs_many: bool) -> Support:
-        count = self.points or (POINTS_BY_PLACE if needs_many else POINTS)
+    def _support(self, count: int) -> Support:
+        count = self.points or count
         if count not in self._supports:
             self._supports[count] = support_of(self.solid.underside, self.grid, count, pressure=self.pressure)
         return self._supports[count]
 
-    def _record(self, push: TwinPush, support: Support) -> NDArray[np.void]:
+    def _record(self, push: TwinPush) -> tuple[float, ...]:
+        """The numbers of `BODY`, in their order."""
         body, solid = push.body, self.solid
-        record = np.zeros(1, BODY)
-        com_x, com_y = (float(value) for value in body.p_BBcm)
+        com_x, com_y = body.p_BBcm.tolist()
         height = 0.5 * solid.height if push.hand_height is None else push.hand_height
-        away = np.hypot(*(support.points - body.p_BBcm).T)
-        values = {
-            "mass": body.mass, "inertia": body.mass * body.inertia_ratio * solid.gyration[2],
-            "weight": body.mass * self.gravity, "com_x": com_x, "com_y": com_y, "com_height": 0.5 * solid.height,
-            "outline_radius": solid.outline.radius if isinstance(solid.outline, Disc) else 0.0,
-            "tip_radius": self.hand_radius or 0.0, "tip_arm": height - 0.5 * solid.height,
-            "hand_friction": body.hand_friction, "restitution": body.restitution,
-            "reach": float((away + TURNS_WITHIN * support.radii).max()), "begin": push.begin, "end": push.end,
-            **_tip_of(push.mount), **_swing_of(push.swing),
-        }  # fmt: skip
-        for name, value in values.items():
-            record[name] = value
-        return record
+        return (
+            body.mass, body.mass * body.inertia_ratio * solid.gyration[2], body.mass * self.gravity,
+            com_x, com_y, 0.5 * solid.height, solid.outline.radius if isinstance(solid.outline, Disc) else 0.0,
+            self.hand_radius or 0.0, height - 0.5 * solid.height, body.hand_friction, body.restitution,
+            *_tip_of(push.mount), *_swing_of(push.swing), 0.0, push.begin, push.end,
+        )  # fmt: skip
 
 
-def _tip_of(mount: Mount | None) -> dict[str, float]:
-    if mount is None:
-        return {}
-    return {
-        "tip_mass": max(mount.mass, LIGHTEST_TIP), "tip_stiffness": mount.stiffness, "tip_damping": mount.damping,
-    }  # fmt: skip
+def _tip_of(mount: Mount | None) -> tuple[float, float, float]:
+    return (0.0, 0.0, 0.0) if mount is None else (max(mount.mass, LIGHTEST_TIP), mount.stiffness, mount.damping)
 
 
-def _swing_of(swing: Swing | None) -> dict[str, float]:
+def _swing_of(swing: Swing | None) -> tuple[float, float, float, float]:
     if swing is None:
-        return {}
-    return {
-        "swing_mass": swing.mass, "swing_stiffness": swing.mass * swing.frequency**2,
-        "swing_damping": 2.0 * swing.damping * swing.mass * swing.frequency, "swing_load": swing.load,
-    }  # fmt: skip
+        return 0.0, 0.0, 0.0, 0.0
+    rate = swing.mass * swing.frequency
+    return swing.mass, rate * swing.frequency, 2.0 * swing.damping * rate, swing.load
 
 
 def _edges(outline: Outline) -> Array:
@@ -196,11 +196,3 @@ def _knots(pushes: Sequence[TwinPush]) -> tuple[Array, NDArray[np.int64]]:
         for push in pushes
     ]  # fmt: skip
     return np.ascontiguousarray(np.concatenate(rows)), np.cumsum([0, *map(len, rows)])
-
-
-def _trace(poses: Array, forces: Array, counts: NDArray[np.void]) -> Trace:
-    lost = int(counts["outcome"]) in (DIVERGED, STUCK)
-    return Trace(
-        poses=poses, forces=forces, outcome=Outcome.DIVERGED if lost else Outcome.COMPLETED,
-        tips=int(counts["tipped"]), lifts=int(counts["lifted"]),
-    )  # fmt: skip

@@ -126,9 +126,12 @@ def test_energy_never_grows_in_a_slide():
 
 
 def test_what_is_simulated_together_is_simulated_as_alone():
-    pushes = [pushed(), pushed(heading=0.2, laws=(Tilt(0.02, 0.0),)), pushed(body=body_of(0.3, 0.5))]
+    pushes = [
+        pushed(), pushed(heading=0.2, laws=(Tilt(0.02, 0.0),)), pushed(laws=(Patch(1.5, 0.05, 0.0, 0.03),)),
+        pushed(body=body_of(0.3, 0.5)),
+    ]  # fmt: skip
     together = BOX.rollouts([*pushes, *reversed(pushes)])
-    for push, first, last in zip(pushes, together[:3], reversed(together[3:]), strict=True):
+    for push, first, last in zip(pushes, together[:4], reversed(together[4:]), strict=True):
         (alone,) = BOX.rollouts([push])
         assert np.array_equal(alone.poses, first.poses) and np.array_equal(alone.poses, last.poses)
         assert np.array_equal(alone.forces, first.forces)
