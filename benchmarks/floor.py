@@ -20,7 +20,7 @@ from rich.table import Table
 from physid_drake.diagnose import case_of, cell_config
 from physid_drake.effects.catalogue import effect_named
 from physid_drake.identify.config import ThetaConfig
-from physid_drake.identify.rollouts import Task
+from physid_drake.identify.task import Task
 from physid_drake.prove.effects.catalogue import CATALOGUED, OTHERS
 from physid_drake.prove.floor import floor_of
 from physid_drake.prove.make import simulate

@@ -21,8 +21,9 @@ from physid_drake.identify.doubts import doubts
 from physid_drake.identify.kept_rollouts import KeptRollouts
 from physid_drake.identify.nuisance import nuisance_of
 from physid_drake.identify.problem import HandUse
-from physid_drake.identify.rollouts import Task, simulate
+from physid_drake.identify.rollouts import simulate
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
+from physid_drake.identify.task import Task
 from physid_drake.model import Model
 from physid_drake.plan import Hindsight, Plan, caveat_of, outcome_under
 from physid_drake.plan.system import Planner, PolicySystem, identified_model, planner_of

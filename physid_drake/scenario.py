@@ -15,6 +15,7 @@ from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
 from physid_drake.cell.checks import check_config
 from physid_drake.errors import ConfigError
+from physid_drake.identify.rollouts import INTEGRATORS
 from physid_drake.policies import POLICIES
 from physid_drake.ranges import Range
 from physid_drake.resources import shipped
@@ -216,6 +217,8 @@ def _words(scenario: Scenario) -> list[Rule]:
     method, policy = scenario.search.method, scenario.plan.policy
     return [
         ("search.method", method, method in SEARCHES, f"one of {', '.join(SEARCHES)}"),
+        ("search.integrator", scenario.search.integrator, scenario.search.integrator in INTEGRATORS,
+         f"one of {', '.join(INTEGRATORS)}"),
         ("plan.policy", policy, policy in POLICIES, f"one of {', '.join(POLICIES)}"),
     ]
 

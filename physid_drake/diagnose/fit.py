@@ -23,7 +23,7 @@ from physid_drake.diagnose.steps import Step, effect_steps, own_steps, theta_ste
 from physid_drake.effects import Effect
 from physid_drake.identify.misfit import FAILED, diverged
 from physid_drake.identify.prediction import Prediction
-from physid_drake.identify.rollouts import Task
+from physid_drake.identify.task import Task
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,8 @@ from physid_drake.diagnose.model import State
 from physid_drake.diagnose.values import NextPush
 from physid_drake.identify.frames import reach_of
 from physid_drake.identify.problem import PushProblem
-from physid_drake.identify.rollouts import RolloutPool, Task
+from physid_drake.identify.rollouts import RolloutPool
+from physid_drake.identify.task import Task
 from physid_drake.model import turned
 
 Array = NDArray[np.float64]

@@ -21,7 +21,7 @@ from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, sol
 from physid_drake.diagnose.model import Fitted
 from physid_drake.effects import Effect, Family
 from physid_drake.identify.misfit import difference
-from physid_drake.identify.rollouts import Task
+from physid_drake.identify.task import Task
 
 Array = NDArray[np.float64]
 Tick = Callable[[int, int], None]

@@ -18,7 +18,7 @@ from physid_drake.identify.misfit import FAILED, whitened_residual
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
 from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.problem import PushProblem
-from physid_drake.identify.rollouts import Task
+from physid_drake.identify.task import Task
 from physid_drake.recording import Recording
 from physid_drake.search import EntropySearch, GreedyEntropySearch, RandomSearch, Search, search_minimum
 from physid_drake.space import ParameterSpace

@@ -39,6 +39,11 @@ class ForceWindows:
     stds: Array
 
 
+def offsets() -> Array:
+    """Of ten samples within a window, from its middle [s]."""
+    return np.asarray(WINDOW * np.linspace(-0.45, 0.45, 10))
+
+
 def force_windows(push: Push, path: HandPath | None, sensor_std: float, start_std: float) -> ForceWindows:
     """The windows of a push whose force tells something of the object.
 

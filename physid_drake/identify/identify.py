@@ -25,7 +25,8 @@ from physid_drake.identify.polish import Polished, Polisher
 from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.problem import PushProblem, problems_of, spec_of
 from physid_drake.identify.refusals import refuse
-from physid_drake.identify.rollouts import RolloutPool, Task
+from physid_drake.identify.rollouts import RolloutPool
+from physid_drake.identify.task import Task
 from physid_drake.identify.theta import ThetaMap, cell_error, range_of, theta_map
 from physid_drake.progress import Progress
 from physid_drake.recording import Recording, thinned
@@ -179,7 +180,7 @@ class Identifier:
         free = theta_map(recording.object, solid, grid, theta, cell.default_density_kgpm3)
         self.thetas = tied_cells(free, solid.outline, theta)
         self._config, self._chooser = search, search_named(search.method)
-        self.pool = RolloutPool(spec_of(recording, cell), self.thetas, jobs=search.jobs)
+        self.pool = RolloutPool(spec_of(recording, cell), self.thetas, jobs=search.jobs, integrator=search.integrator)
         self._streams = np.random.SeedSequence(seed).spawn(2)
         train, held = split_pushes(len(self.problems), held_out_share, np.random.default_rng(self._streams[0]))
         self.training = [self.problems[i] for i in train]

@@ -29,7 +29,8 @@ from physid_drake.identify.polish import (
 from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.problem import PushProblem, problems_of, spec_of
 from physid_drake.identify.refusals import refuse
-from physid_drake.identify.rollouts import RolloutPool, Task
+from physid_drake.identify.rollouts import RolloutPool
+from physid_drake.identify.task import Task
 from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.progress import Progress
 from physid_drake.recording import Push, Recording, thinned
@@ -140,7 +141,9 @@ class OnlineIdentifier:
         grid = (cell.friction_cells[0], cell.friction_cells[1])
         free = theta_map(recording.object, solid, grid, theta, cell.default_density_kgpm3)
         self.thetas: ThetaMap = tied_cells(free, solid.outline, theta)
-        self.pool = pool or RolloutPool(spec_of(recording, cell), self.thetas, jobs=search.jobs)
+        self.pool = pool or RolloutPool(
+            spec_of(recording, cell), self.thetas, jobs=search.jobs, integrator=search.integrator
+        )
         self._recording, self._height = recording, solid.height
         self._chooser, self._seed, self._budget = search_named(search.method), seed, budget
         self._progress: Progress = progress or (lambda stage, done, total: None)

@@ -12,7 +12,7 @@ from physid_drake.identify.misfit import difference, model_error_columns
 from physid_drake.identify.noise import Noise
 from physid_drake.identify.nuisance import Nuisance
 from physid_drake.identify.problem import PushProblem
-from physid_drake.identify.rollouts import Task
+from physid_drake.identify.task import Task
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,8 @@ from physid_drake.identify.noise import Noise
 from physid_drake.identify.nuisance import Nuisance, nuisance_of
 from physid_drake.identify.own_columns import own_columns, own_tasks
 from physid_drake.identify.problem import PushProblem
-from physid_drake.identify.rollouts import RolloutPool, Task
+from physid_drake.identify.rollouts import RolloutPool
+from physid_drake.identify.task import Task
 from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]

@@ -7,7 +7,6 @@ import os
 import signal
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from multiprocessing import parent_process
 from threading import current_thread, main_thread
 
@@ -17,19 +16,22 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from numpy.typing import NDArray
 
 from physid_drake.cell import Cell, Motion, Outcome
-from physid_drake.effects import Effect
 from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
 from physid_drake.errors import TippedError, WorkerError
-from physid_drake.identify.force_windows import WINDOW
+from physid_drake.identify.by_twin import predicted_by_twin
+from physid_drake.identify.force_windows import offsets
 from physid_drake.identify.kept_rollouts import KeptRollouts, key_of
-from physid_drake.identify.nuisance import Nuisance, apply_nuisance
+from physid_drake.identify.nuisance import apply_nuisance
 from physid_drake.identify.prediction import Prediction
-from physid_drake.identify.problem import CellSpec, PushProblem
+from physid_drake.identify.problem import CellSpec
+from physid_drake.identify.task import Task
 from physid_drake.identify.theta import ThetaMap
 from physid_drake.processes import ENDED, end_with_parent
 
 Array = NDArray[np.float64]
 
+INTEGRATORS = CELL, TWIN = "cell", "twin"
+TOGETHER = 512  # tasks in a call of the twin
 MOST_CELLS = 24  # kept by a process: effects of shape and pressure build their own
 
 _cells: OrderedDict[str, Cell] = OrderedDict()
@@ -53,17 +55,6 @@ def cell_of(spec: CellSpec, geometry: Geometry | None = None) -> Cell:
             _cells.popitem(last=False)
     _cells.move_to_end(key)
     return _cells[key]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Task:
-    """One rollout to make: push ``problem`` with ``theta`` (d,), the push's own unknowns (k,), and effects."""
-
-    problem: PushProblem
-    theta: Array
-    nuisance: Nuisance
-    values: Array
-    effects: tuple[Effect, ...] = ()
 
 
 def simulate(spec: CellSpec, thetas: ThetaMap, task: Task) -> Motion:
@@ -116,9 +107,8 @@ def _window_forces(motion: Motion, middles: Array) -> Array:
     """Mean forces (k, 2) over the windows about the middles."""
     if not len(middles):
         return np.zeros((0, 2))
-    offsets = WINDOW * np.linspace(-0.45, 0.45, 10)
-    samples = motion.forces_at((middles[:, None] + offsets).ravel())
-    means: Array = samples[:, :2].reshape(len(middles), len(offsets), 2).mean(axis=1)
+    samples = motion.forces_at((middles[:, None] + offsets()).ravel())
+    means: Array = samples[:, :2].reshape(len(middles), -1, 2).mean(axis=1)
     return means
 
 
@@ -132,7 +122,15 @@ def _predict_many(spec: CellSpec, thetas: ThetaMap, tasks: Sequence[Task]) -> li
 class RolloutPool:
     """Runs many tasks on all cores, in order, with the same bits as one core would give."""
 
-    def __init__(self, spec: CellSpec, thetas: ThetaMap, jobs: int = 0, *, kept: KeptRollouts | None = None) -> None:
+    def __init__(
+        self,
+        spec: CellSpec,
+        thetas: ThetaMap,
+        jobs: int = 0,
+        *,
+        kept: KeptRollouts | None = None,
+        integrator: str = CELL,
+    ) -> None:
         """Prepare.
 
         Args:
@@ -140,15 +138,16 @@ class RolloutPool:
             thetas: what theta means in it.
             jobs: processes; 0 takes the machine's cores.
             kept: rollouts that need not be made again, and where those that are made are kept; None keeps none.
+            integrator: ``cell``, or ``twin``, which leaves to the cell what it does not know.
         """
-        self.spec, self.thetas, self.kept = spec, thetas, kept
+        self.spec, self.thetas, self.kept, self.integrator = spec, thetas, kept, integrator
         self.jobs = jobs or os.cpu_count() or 1
         self.count = 0
         self.diverged = 0
 
     def of(self, spec: CellSpec) -> RolloutPool:
         """A pool for another cell, which keeps its rollouts in the same place."""
-        return RolloutPool(spec, self.thetas, self.jobs, kept=self.kept)
+        return RolloutPool(spec, self.thetas, self.jobs, kept=self.kept, integrator=self.integrator)
 
     def run(self, tasks: Sequence[Task], tick: Callable[[int], None] | None = None) -> list[Prediction | None]:
         """Predictions in the order of the tasks; ``tick`` is told how many more are done."""
@@ -167,7 +166,7 @@ class RolloutPool:
         self, tasks: Sequence[Task], kept: KeptRollouts, tick: Callable[[int], None] | None
     ) -> Iterable[Prediction | None]:
         """Of the tasks, those that are not kept are made, each of them once."""
-        cell = repr((self.spec, self.thetas))
+        cell = repr((self.spec, self.thetas, self.integrator))
         keys = [key_of(task, cell) for task in tasks]
         fresh = {key: task for key, task in zip(keys, tasks, strict=True) if key not in kept}
         missing, made = iter(fresh), dict[bytes, Prediction | None]()
@@ -182,6 +181,20 @@ class RolloutPool:
         return (made[key] if key in made else kept[key] for key in keys)
 
     def _chunks(self, tasks: Sequence[Task]) -> Iterable[list[Prediction | None]]:
+        if self.integrator == TWIN:
+            return self._by_twin(tasks)
+        return self._by_cell(tasks)
+
+    def _by_twin(self, tasks: Sequence[Task]) -> Iterator[list[Prediction | None]]:
+        """The twin's answers, and the cell's to what it leaves open."""
+        for k in range(0, len(tasks), TOGETHER):
+            some = tasks[k : k + TOGETHER]
+            said = predicted_by_twin(self.spec, self.thetas, some)
+            left = [task for task, answer in zip(some, said, strict=True) if answer is None]
+            rest = iter([answer for chunk in self._by_cell(left) for answer in chunk] if left else [])
+            yield [next(rest) if answer is None else answer for answer in said]
+
+    def _by_cell(self, tasks: Sequence[Task]) -> Iterable[list[Prediction | None]]:
         if self.jobs == 1 or len(tasks) == 1:
             return ([predict(self.spec, self.thetas, task)] for task in tasks)
         size = max(1, min(8, len(tasks) // (2 * self.jobs)))

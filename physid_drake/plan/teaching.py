@@ -16,7 +16,8 @@ from physid_drake.identify.linearise import linearised, prior_slope
 from physid_drake.identify.noise import Noise
 from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
 from physid_drake.identify.problem import PushProblem, first_motion
-from physid_drake.identify.rollouts import RolloutPool, Task
+from physid_drake.identify.rollouts import RolloutPool
+from physid_drake.identify.task import Task
 from physid_drake.policies import PlannedPush
 from physid_drake.policies.planned_push import LEAD
 

@@ -11,7 +11,7 @@ from physid_drake.errors import ConfigError
 from physid_drake.identify import Identifier, SearchConfig, ThetaConfig
 from physid_drake.identify.identify import split_pushes
 from physid_drake.identify.nuisance import nuisance_of
-from physid_drake.identify.rollouts import Task
+from physid_drake.identify.task import Task
 from physid_drake.report.result import result_json
 
 FRICTION = ThetaConfig(parameters=["support_friction"])

@@ -1,0 +1,117 @@
+"""What the compiled twin predicts of recorded pushes, all tasks in a few calls; what it cannot say, the cell does."""
+
+from __future__ import annotations
+
+from collections import OrderedDict, defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.cell import Outcome
+from physid_drake.cell.solid import solid_of
+from physid_drake.cell.support import FrictionGrid
+from physid_drake.effects.rollout import Geometry, Rollout, geometry_with, lateness_of
+from physid_drake.errors import CellError
+from physid_drake.identify.force_windows import offsets
+from physid_drake.identify.nuisance import apply_nuisance
+from physid_drake.identify.prediction import Prediction
+from physid_drake.identify.problem import CellSpec
+from physid_drake.identify.task import Task
+from physid_drake.identify.theta import ThetaMap
+from physid_drake.twin.twin import Trace, Twin, TwinPush
+from physid_drake.twin.with_effects import as_reported, push_with
+
+Array = NDArray[np.float64]
+
+MOST_TWINS = 24  # kept by a process: effects of shape and pressure have their own
+
+_twins: OrderedDict[str, Twin] = OrderedDict()
+
+
+def predicted_by_twin(spec: CellSpec, thetas: ThetaMap, tasks: Sequence[Task]) -> list[Prediction | None]:
+    """Predictions in the order of the tasks; None where the cell has to be asked.
+
+    That is where a law is not of the vocabulary, where the object rolls, tips or comes to the table's edge, and where
+    the integration diverges.
+    """
+    answers: list[Prediction | None] = [None] * len(tasks)
+    waiting: dict[str, list[tuple[int, TwinPush]]] = defaultdict(list)
+    for k, task in enumerate(tasks):
+        key, push = _asked(spec, thetas, task)
+        if push is not None:
+            waiting[key].append((k, push))
+    for key, asked in waiting.items():
+        twin = _twins[key]
+        for (k, push), trace in zip(asked, twin.rollouts([push for _, push in asked]), strict=True):
+            if trace.outcome is Outcome.COMPLETED and not trace.tips and _stays(spec, twin, trace):
+                answers[k] = _prediction(tasks[k], push, trace)
+    return answers
+
+
+def _asked(spec: CellSpec, thetas: ThetaMap, task: Task) -> tuple[str, TwinPush | None]:
+    """The twin's name, and the rollout that it has to make; None where it cannot."""
+    plain = Geometry(shape=spec.shape)
+    key = _twin_for(spec, geometry_with(task.effects, plain))
+    if key is None:
+        return "", None
+    problem, setting = task.problem, apply_nuisance(task.problem, task.nuisance, task.values)
+    body = thetas.body(task.theta, friction_scale=setting.friction_scale, restitution=setting.restitution)
+    if body.static_ratio != 1.0:  # what sticks before it slips is the cell's
+        return "", None
+    push = Rollout(
+        start=setting.start, path=setting.path, begin=problem.begin, end=problem.end,
+        hand_height=problem.hand_height, order=problem.order, hand_axes=problem.hand_axes,
+    )  # fmt: skip
+    asked = push_with(_twins[key], plain, body, push, task.effects, _times(task))
+    # In their order, each once: they are put back where they belong afterwards.
+    return key, None if asked is None else replace(asked, times=np.unique(asked.times))
+
+
+def _times(task: Task) -> Array:
+    """When the tracker is asked [s]: as the push begins, at the recorded times, and about the middles of windows."""
+    late = lateness_of(task.effects)
+    windows = (task.problem.force_times[:, None] + offsets()).ravel() + late  # forces are not late
+    return np.concatenate([[task.problem.begin], task.problem.times, windows])
+
+
+def _prediction(task: Task, push: TwinPush, trace: Trace) -> Prediction:
+    problem = task.problem
+    where = np.searchsorted(push.times, _times(task) - lateness_of(task.effects))
+    poses = as_reported(trace, task.effects).poses[where[: 1 + len(problem.times)]]
+    first, poses = poses[0, 2], poses[1:].copy()
+    # The recorded yaw may have been unwrapped from another turn.
+    poses[:, 2] += 2.0 * np.pi * np.round((problem.start.pose[2] - first) / (2.0 * np.pi))
+    if len(poses) == 1:  # nothing was recorded on the way to it: by how many turns nobody saw
+        poses[:, 2] += 2.0 * np.pi * np.round((problem.poses[:, 2] - poses[:, 2]) / (2.0 * np.pi))
+    forces = trace.forces[where[1 + len(problem.times) :]]
+    means = forces.reshape(len(problem.force_times), -1, 2).mean(axis=1) if len(forces) else np.zeros((0, 2))
+    return Prediction(poses=poses, forces=means)
+
+
+def _stays(spec: CellSpec, twin: Twin, trace: Trace) -> bool:
+    """Whether all of the object was on the table all the while."""
+    low, high = np.array(spec.table)
+    x0, y0, x1, y1 = twin.solid.underside.extent()
+    reach = float(max(np.hypot(x, y) for x in (x0, x1) for y in (y0, y1)))
+    places = trace.poses[:, :2]
+    return bool((places - reach >= low).all() and (places + reach <= high).all())
+
+
+def _twin_for(spec: CellSpec, geometry: Geometry) -> str | None:
+    """The name of this process's twin for a geometry, built at the first call; None of what rolls."""
+    key = repr((geometry, spec.hand_radius, spec.config.friction_cells))
+    if key not in _twins:
+        try:
+            _twins[key] = Twin(
+                solid=solid_of(geometry.shape), hand_radius=spec.hand_radius, pressure=geometry.pressure,
+                gravity=geometry.gravity,
+                grid=FrictionGrid(nx=spec.config.friction_cells[0], ny=spec.config.friction_cells[1]),
+            )  # fmt: skip
+        except CellError:
+            return None
+        if len(_twins) > MOST_TWINS:
+            _twins.popitem(last=False)
+    _twins.move_to_end(key)
+    return key
