@@ -164,10 +164,10 @@ def test_motion_prediction_runs_from_end_to_end_and_is_resumed(tmp_path):
     experiment = MotionPrediction(
         seed=0, repetitions=2, pushes=4, training=2, testing=1, subsets=(1, 2), budget=4, tick_s=4e-3
     )  # fmt: skip
-    folder = claim("motion_prediction", experiment, tmp_path)
-    records = run_all(experiment, folder, jobs=1, tick=lambda stage, done, total: None)
-    result = experiment.result(records)
-    write(folder, result, "motion_prediction", "the command")
+    with claim("motion_prediction", experiment, tmp_path) as folder:
+        records = run_all(experiment, folder, jobs=1, tick=lambda stage, done, total: None)
+        result = experiment.result(records)
+        write(folder, result, "motion_prediction", "the command")
     names = {"command.txt", "figure.svg", "result.json", "result.md", "budget.csv", "training_pushes.csv"}
     assert names <= {file.name for file in tmp_path.iterdir()}
     for record in records:
@@ -175,5 +175,6 @@ def test_motion_prediction_runs_from_end_to_end_and_is_resumed(tmp_path):
             assert all(np.diff(method["sigmas"]) <= 1e-12)
         assert record["true_theta"]["mm"] < 5.0
     kept = (tmp_path / "repetitions" / "001.json").read_text()
-    again = run_all(experiment, claim("motion_prediction", experiment, tmp_path), jobs=1, tick=lambda s, d, t: None)
+    with claim("motion_prediction", experiment, tmp_path) as folder:
+        again = run_all(experiment, folder, jobs=1, tick=lambda s, d, t: None)
     assert again == records and (tmp_path / "repetitions" / "001.json").read_text() == kept
