@@ -217,8 +217,12 @@ def _words(scenario: Scenario) -> list[Rule]:
     method, policy = scenario.search.method, scenario.plan.policy
     return [
         ("search.method", method, method in SEARCHES, f"one of {', '.join(SEARCHES)}"),
-        ("search.integrator", scenario.search.integrator, scenario.search.integrator in INTEGRATORS,
-         f"one of {', '.join(INTEGRATORS)}"),
+        (
+            "search.integrator",
+            scenario.search.integrator,
+            scenario.search.integrator in INTEGRATORS,
+            f"one of {', '.join(INTEGRATORS)}",
+        ),
         ("plan.policy", policy, policy in POLICIES, f"one of {', '.join(POLICIES)}"),
     ]
 
