@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections import OrderedDict, defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +22,7 @@ from physid_drake.identify.prediction import Prediction
 from physid_drake.identify.problem import CellSpec
 from physid_drake.identify.task import Task
 from physid_drake.identify.theta import ThetaMap
+from physid_drake.twin.compiled import is_compiled
 from physid_drake.twin.twin import Trace, Twin, TwinPush
 from physid_drake.twin.with_effects import as_reported, push_with
 
@@ -36,6 +39,7 @@ def predicted_by_twin(spec: CellSpec, thetas: ThetaMap, tasks: Sequence[Task]) -
     That is where a law is not of the vocabulary, where the object rolls, tips or comes to the table's edge, and where
     the integration diverges.
     """
+    _say_that_it_compiles()
     answers: list[Prediction | None] = [None] * len(tasks)
     waiting: dict[str, list[tuple[int, TwinPush]]] = defaultdict(list)
     for k, task in enumerate(tasks):
@@ -48,6 +52,12 @@ def predicted_by_twin(spec: CellSpec, thetas: ThetaMap, tasks: Sequence[Task]) -
             if trace.outcome is Outcome.COMPLETED and not trace.tips and _stays(spec, twin, trace):
                 answers[k] = _prediction(tasks[k], push, trace)
     return answers
+
+
+@cache
+def _say_that_it_compiles() -> None:
+    if not is_compiled():
+        print("compiling the twin for this machine, once: some twenty seconds", file=sys.stderr, flush=True)
 
 
 def _asked(spec: CellSpec, thetas: ThetaMap, task: Task) -> tuple[str, TwinPush | None]:

@@ -10,12 +10,13 @@ from physid_drake.cell import CellConfig, ContactConfig
 from physid_drake.effects.drag import RollingResistance, ViscousDrag
 from physid_drake.effects.foils import FrictionByDistance
 from physid_drake.effects.tracker import TrackerLatency
-from physid_drake.identify import SearchConfig
+from physid_drake.identify import SearchConfig, by_twin
 from physid_drake.identify.by_twin import predicted_by_twin
 from physid_drake.identify.nuisance import nuisance_of
 from physid_drake.identify.rollouts import RolloutPool, predict
 from physid_drake.identify.task import Task
 from physid_drake.recording import Cylinder
+from physid_drake.twin import compiled
 
 SIGMA = np.array([3e-4, 3e-4, 3e-3])
 
@@ -90,3 +91,27 @@ def test_identification_says_the_same_with_either(integrator):
     for name, true in (("support_friction", 0.27), ("hand_friction", 0.22)):
         low, high = told[name].ci90
         assert low - 0.01 < true < high + 0.01
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_the_first_use_says_once_that_it_compiles(identifier, monkeypatch, capsys, kept):
+    monkeypatch.setattr(by_twin, "is_compiled", lambda: kept)
+    by_twin._say_that_it_compiles.cache_clear()
+    tasks = list(tasks_of(identifier))[:1]
+    for _ in range(2):
+        predicted_by_twin(identifier.pool.spec, identifier.thetas, tasks)
+    assert capsys.readouterr().err.count("compiling the twin") == (0 if kept else 1)
+
+
+def test_machine_code_is_kept_where_the_user_may_write_and_else_made_anew(tmp_path, monkeypatch):
+    """The folder is named after the sources, so that no other revision's code is taken."""
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    for home, there in ((tmp_path, True), (tmp_path / "file", False)):
+        (tmp_path / "file").touch()
+        monkeypatch.setenv("XDG_CACHE_HOME", str(home))
+        compiled.cache_folder.cache_clear()
+        folder = compiled.cache_folder()
+        assert (folder is not None and folder.parent == tmp_path / "physid_drake" / "twin") == there
+        made = compiled.compiled(lambda x: x + 1)
+        assert made(2) == 3 and (folder is None or any(folder.rglob("*.nbi")))
+    compiled.cache_folder.cache_clear()
