@@ -63,7 +63,7 @@ def enter(run: Callable[[], int], *, interrupted: str = "interrupted") -> int:
     """
     _make_printable()
     try:
-        with _warnings_on_stderr():
+        with _warnings_on_stderr(), _safe_helpers():
             _check_working_folder()
             try:
                 status = run()
@@ -74,6 +74,8 @@ def enter(run: Callable[[], int], *, interrupted: str = "interrupted") -> int:
     except MemoryError:
         return _failed("there is not enough memory for this.")
     except OSError as error:
+        if error.filename is not None:  # a folder that may not be looked into, say
+            return _failed(f"'{error.filename}': {error.strerror or error}.")
         if not _is_of_output(error):
             raise
         return _without_output(error)
@@ -83,6 +85,20 @@ def enter(run: Callable[[], int], *, interrupted: str = "interrupted") -> int:
         _say(interrupted)
         return INTERRUPTED
     return status
+
+
+@contextmanager
+def _safe_helpers() -> Iterator[None]:
+    """Processes that work for this one do not look for modules in the working folder, either."""
+    before = os.environ.get("PYTHONSAFEPATH")
+    os.environ["PYTHONSAFEPATH"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["PYTHONSAFEPATH"]
+        else:
+            os.environ["PYTHONSAFEPATH"] = before
 
 
 def _failed(message: str) -> int:

@@ -100,18 +100,15 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     source = recording_folder(scenario.recording)
     out = arguments.out or Path("runs") / named_after(name)
     # Everything that can be refused is refused before anything is written.
-    RunFolder.check(out, COMMAND, inputs=[source, *config_folders(arguments.config)])
+    RunFolder.check(out, COMMAND, inputs=config_folders(arguments.config), recordings=[source])
     recording = read_recording(source)
     identifier = _identifier(scenario, recording, out)
     planner = None if arguments.no_plan else _planner(scenario, recording, identifier, console)
     # A comment, so that the file is still a configuration that can be given to this command.
     made_by = f"{dump_scenario(name, scenario)}# of recording {digest_of(recording)}\n# by {made_with()}\n"
-    had_one = (out / RESULTS[0]).exists()
+    stage = None if arguments.no_view else _live(recording, arguments.host, console)
     with RunFolder.open(out, COMMAND, made_by, state=(BELIEF, STATE), results=RESULTS) as folder:
-        if had_one and not folder.holds(RESULTS[0]):
-            console.print(f"Note: {out} held results of another recording, or of other settings; they are gone.")
         _refuse_to_drop(folder, arguments)
-        stage = None if arguments.no_view else _live(recording, arguments.host, console)
         stage = _fill(folder, identifier, planner, scenario, recording, stage, arguments, console)
     _keep_serving(arguments.no_view, stage, console)
 

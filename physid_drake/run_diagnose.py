@@ -69,11 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
     })  # fmt: skip
     # Not the recording's name, which those that were converted from one data set share.
     out = arguments.out or Path("diagnoses") / named_after(source.resolve().name)
-    RunFolder.check(out, COMMAND, inputs=[source])
-    had_one = (out / FILES[0]).exists()
+    RunFolder.check(out, COMMAND, recordings=[source])
     with RunFolder.open(out, COMMAND, settings, name=SETTINGS, state=(STATE,), results=FILES) as folder:
-        if had_one and not folder.holds(FILES[0]):
-            console.print(f"Note: {out} held a diagnosis of another recording, or with other settings; it is gone.")
         kept = KeptRollouts(folder.own(STATE))
         if len(kept):
             console.print(f"going on with what was kept, rollouts: {len(kept)}")

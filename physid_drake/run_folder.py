@@ -8,6 +8,7 @@ import json
 import os
 import platform
 import re
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from physid_drake.files import NotTextError, read_json, read_text
 MANIFEST: Final = "manifest.json"
 FORMAT: Final = "physid-folder/1"
 LOCK: Final = ".lock"
-_BEFORE: Final = (LOCK, f".{MANIFEST}.part")  # what a run that was killed as it began may leave
+PART: Final = ".part"
 _NO_LOCKS: Final = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS)
 CONFIG, SETTINGS = "config.yaml", "settings.json"  # what a folder was made with: by run_cell, by other commands
 PACKAGES = ("physid_drake", "drake", "mujoco", "numpy", "scipy", "scikit-learn")
@@ -69,21 +70,23 @@ class RunFolder:
     command: str
 
     @classmethod
-    def check(cls, path: Path, command: str, *, inputs: Sequence[Path] = ()) -> None:
+    def check(cls, path: Path, command: str, *, inputs: Sequence[Path] = (), recordings: Sequence[Path] = ()) -> None:
         """Refuse a folder that cannot or may not be written to, before anything is computed.
 
         Args:
             path: of the folder.
             command: that is to write there.
             inputs: folders that the command reads, which are somebody's own.
+            recordings: likewise, and nothing is written below them, either.
 
         Raises:
             OutputError: if it is no folder, or cannot be written to.
             ConfigError: if it is an input, or holds what this command did not write.
         """
         try:
-            for one in inputs:
-                if path.resolve() == one.resolve():
+            place = path.resolve()
+            for one in (*inputs, *recordings):
+                if place == one.resolve() or (one in recordings and one.resolve() in place.parents):
                     raise ConfigError(f"output folder '{path}': is a folder that is read from; choose another --out.")
             existing = next(one for one in (path, *path.absolute().parents) if _is_there(one))
             if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
@@ -126,7 +129,9 @@ class RunFolder:
         state: Sequence[str] = (),
         results: Sequence[str] = (),
     ) -> Iterator[RunFolder]:
-        """Make the folder, or go on in one, while no other run does; what other settings made there is dropped.
+        """Make the folder, or go on in one, while no other run does; results of other settings are refused.
+
+        The state of an interrupted run with other settings is dropped.
 
         Args:
             path: of the folder.
@@ -145,7 +150,13 @@ class RunFolder:
             for file in (name, *state, *results):
                 folder._refuse_foreign(file)
             if folder.read(name) != configuration:
-                for file in (*state, *results):
+                held = next((file for file in results if folder.holds(file)), None)
+                if held is not None:
+                    raise ConfigError(
+                        f"output folder '{path}': holds '{held}' of another recording, or of other settings or"
+                        " versions; choose another --out."
+                    )
+                for file in state:
                     folder.forget(file)
                 folder.write(name, configuration)
             yield folder
@@ -266,7 +277,7 @@ class RunFolder:
 
     def _refuse_others(self) -> None:
         command, _ = _manifest(self.path)
-        if command is None and self.path.is_dir() and any(one.name not in _BEFORE for one in self.path.iterdir()):
+        if command is None and self.path.is_dir() and not all(map(_is_scrap, self.path.iterdir())):
             raise ConfigError(
                 f"output folder '{self.path}': is not empty, and not of this program (it has no {MANIFEST}); choose"
                 " another --out."
@@ -281,16 +292,25 @@ def write_whole(path: Path, content: bytes) -> None:
     Raises:
         OutputError: if it cannot be written.
     """
-    part = path.with_name(f".{path.name}.part")
     try:
-        try:
+        with part_of(path) as part:
             part.write_bytes(content)
             os.replace(part, path)  # noqa: PTH105
-        except BaseException:
-            part.unlink(missing_ok=True)
-            raise
     except OSError as error:
         raise OutputError(f"'{path}': cannot be written: {_cause(error)}.") from error
+
+
+@contextmanager
+def part_of(path: Path) -> Iterator[Path]:
+    """A new, empty file beside a path, to be filled and renamed to it; removed where that does not come about."""
+    descriptor, name = tempfile.mkstemp(prefix=f".{path.name[:100]}.", suffix=PART, dir=path.parent)
+    os.close(descriptor)
+    part = Path(name)
+    try:
+        part.chmod(0o644)
+        yield part
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def _manifest(path: Path) -> tuple[str | None, tuple[str, ...]]:
@@ -353,6 +373,12 @@ def _take(descriptor: int, path: Path) -> None:
     except OSError as error:
         if error.errno not in _NO_LOCKS:  # some network file systems: there, nothing keeps two runs apart
             raise
+
+
+def _is_scrap(path: Path) -> bool:
+    """What a run that was killed as it began may leave in a folder: its lock, and a manifest that was not ended."""
+    named = path.name == LOCK or (path.name.startswith(f".{MANIFEST}.") and path.suffix == PART)
+    return named and path.is_file() and not path.is_symlink()
 
 
 def _is_there(path: Path) -> bool:

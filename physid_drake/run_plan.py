@@ -88,7 +88,10 @@ def run(arguments: argparse.Namespace) -> int:
         )
     with_effects = outcome_under(made, full) if arguments.plain and full.effects else None
     hindsight = Hindsight(caveat=learnt.caveat) if learnt.caveat else None
-    with RunFolder.open(out, COMMAND, settings_text(COMMAND, _settings(arguments)), name=SETTINGS) as folder:
+    settings = settings_text(COMMAND, _settings(arguments))
+    with RunFolder.open(out, COMMAND, settings, name=SETTINGS) as folder:
+        if folder.holds(FILES[0]):
+            console.print(f"The plan that {out} held is replaced.")
         write(folder, made, seed=arguments.seed, with_effects=with_effects, hindsight=hindsight)
     console.print(plan_table(made, with_effects=with_effects, hindsight=hindsight))
     nothing = made.cost_function.at(np.array(start[:2]))

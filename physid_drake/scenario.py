@@ -64,7 +64,7 @@ def load_scenario(
         ConfigError: naming the file and the key.
     """
     if config is None and recording is not None:
-        name, scenario, where = named_after(Path(os.path.realpath(recording)).name), Scenario(), "the defaults"
+        name, scenario, where = _name_of(recording), Scenario(), "the defaults"
     else:
         name, scenario, where = _named_scenario(config or DEFAULT)
     if override is not None:
@@ -74,6 +74,18 @@ def load_scenario(
     if seed is not None:
         scenario.seed = seed
     return name, _checked(scenario, where)
+
+
+def _name_of(recording: str) -> str:
+    """Of a run: that of the recording's folder.
+
+    Raises:
+        ConfigError: if nothing can have such a name.
+    """
+    try:
+        return named_after(Path(os.path.realpath(recording)).name)
+    except (OSError, ValueError) as error:
+        raise ConfigError(f"recording {shown(recording)}: nothing can have such a name.") from error
 
 
 def config_folders(config: str | None) -> tuple[Path, ...]:
@@ -126,6 +138,11 @@ def _read_yaml(path: Path) -> dict[str, Any]:
         raise ConfigError(f"config '{named(path)}': needs named scenarios at the top level, 'name: {{...}}'.")
     # Keys that start with an underscore are for anchors and templates.
     scenarios = {str(key): value for key, value in content.items() if not str(key).startswith("_")}
+    for name, content in scenarios.items():
+        if content is not None and not isinstance(content, dict):
+            raise ConfigError(
+                f"config '{path}': scenario {shown(name)} needs keys and values below it, but is {shown(content)}."
+            )
     if not scenarios:
         raise ConfigError(f"config '{named(path)}': holds no scenario; names that start with '_' are templates.")
     return scenarios

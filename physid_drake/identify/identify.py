@@ -30,6 +30,7 @@ from physid_drake.identify.task import Task
 from physid_drake.identify.theta import ThetaMap, cell_error, range_of, theta_map
 from physid_drake.progress import Progress
 from physid_drake.recording import Recording, thinned
+from physid_drake.run_folder import part_of
 from physid_drake.search import SearchResult, search_minimum, search_named
 from physid_drake.space import Parameter, ParameterSpace
 
@@ -226,14 +227,13 @@ class Identifier:
         """Written beside and renamed, so that an interruption leaves the last whole one; a full disk ends no run."""
         if self._state is None:
             return
-        part = self._state.with_name(f".{self._state.name}.part")
         try:
-            belief.to_npz(part)
-            part.replace(self._state)
+            with part_of(self._state) as part:
+                belief.to_npz(part)
+                part.replace(self._state)
         except OSError as error:
             warnings.warn(f"the search's state is not kept, so that it cannot go on from here: {error}", stacklevel=2)
             self._state = None
-            part.unlink(missing_ok=True)
 
     def _saved_belief(self, candidates: Array) -> Belief | None:
         """The belief of an interrupted run of the same search; one with other candidates is not taken."""

@@ -25,6 +25,8 @@ from physid_drake.wording import shown
 DIAGNOSE: Final = "diagnose"
 """The command that answers."""
 RESULT: Final = "diagnosis.json"
+OTHERS: Final = ("page.html", "scene.html", "model.yaml")
+"""What it writes beside it."""
 ATTEMPT: Final = "attempt.json"
 """Beside a diagnosis: how long it took [s], or why there is none."""
 FRESH_ERRORS: Final = "fresh.json"
@@ -191,7 +193,7 @@ class _Running:
     @classmethod
     def begin(cls, task: Task) -> _Running:
         folder = RunFolder.begin(task.folder, DIAGNOSE)
-        for name in (ATTEMPT, RESULT, FRESH_ERRORS):  # of an attempt that failed
+        for name in (ATTEMPT, RESULT, FRESH_ERRORS, *OTHERS):  # of an attempt that failed
             folder.forget(name)
         log = folder.own(LOG).open("wb")
         # One thread each: several diagnoses run side by side.

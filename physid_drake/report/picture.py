@@ -15,6 +15,10 @@ from physid_drake.run_folder import write_whole
 MARK: Final = "physid_drake inspect"
 _KEYS: Final = {".png": "Software", ".svg": "Creator", ".pdf": "Creator"}
 """Under which each kind of picture says what made it."""
+_SIGNED: Final = {
+    ".png": f"Software\0{MARK}".encode(), ".svg": f"<dc:title>{MARK}</dc:title>".encode(),
+    ".pdf": f"/Creator ({MARK})".encode(),
+}  # fmt: skip
 
 
 def check_picture(file: Path) -> None:
@@ -26,7 +30,7 @@ def check_picture(file: Path) -> None:
     if file.suffix.lower() not in _KEYS:
         raise ConfigError(f"--out '{file}': must end in {', '.join(_KEYS)}, such as pushes.png.")
     try:
-        ours = MARK.encode() in read_bytes(file)
+        ours = _SIGNED[file.suffix.lower()] in read_bytes(file)
     except MissingFileError:
         return
     except FileError as error:

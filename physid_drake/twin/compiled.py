@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -18,6 +19,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _SUMS: Final = {"nnan", "contract", "reassoc", "arcp", "nsz", "afn"}
 """What sums over support points may do for speed: change the order of terms. No number in them is infinite."""
+REVISION: Final = re.compile("[0-9a-f]{16}")
 _KEPT: Final = 3  # revisions whose machine code is kept
 
 
@@ -60,6 +62,13 @@ def is_compiled() -> bool:
     return folder is not None and any(folder.rglob("*.nbi"))
 
 
+def drop_cache() -> None:
+    """Drop this revision's machine code: it was cut off, or there is no room for it."""
+    folder = cache_folder()
+    if folder is not None:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
 def _compiled(function: F, **how: Any) -> F:
     folder = cache_folder()
     if folder is None:
@@ -76,6 +85,7 @@ def _compiled(function: F, **how: Any) -> F:
 def _tidy(root: Path) -> None:
     """Drop the machine code of older revisions."""
     with suppress(OSError):
-        folders = sorted(root.iterdir(), key=lambda folder: folder.stat().st_mtime, reverse=True)
+        ours = (folder for folder in root.iterdir() if REVISION.fullmatch(folder.name))
+        folders = sorted(ours, key=lambda folder: folder.stat().st_mtime, reverse=True)
         for folder in folders[_KEPT:]:
             shutil.rmtree(folder, ignore_errors=True)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,7 @@ from physid_drake.cell.support import FrictionGrid, PressureGrid, Support, suppo
 from physid_drake.effects.liquid import Swing
 from physid_drake.errors import CellError
 from physid_drake.twin.batch import roll_all
+from physid_drake.twin.compiled import drop_cache
 from physid_drake.twin.records import BODY
 from physid_drake.twin.rollout import COUNTS, DIVERGED, STUCK
 from physid_drake.twin.vocabulary import by_place, records_of
@@ -123,7 +126,7 @@ class Twin:
         counts = np.zeros(len(pushes), COUNTS)
         laws, law_ends, tables = records_of([(push.laws, push.body.mass * self.gravity) for push in pushes])
         knots, knot_ends = _knots(pushes)
-        roll_all(  # type: ignore[no-untyped-call]
+        _roll_all(
             np.array([self._record(push) for push in pushes], dtype=BODY),
             (np.ascontiguousarray(support.points), support.weights, support.radii),
             np.array([push.body.support_friction[support.cells] for push in pushes]),
@@ -159,6 +162,15 @@ class Twin:
             self.hand_radius or 0.0, height - 0.5 * solid.height, body.hand_friction, body.restitution,
             *_tip_of(push.mount), *_swing_of(push.swing), 0.0, push.begin, push.end,
         )  # fmt: skip
+
+
+def _roll_all(*arrays: Any) -> None:
+    """`roll_all`, and once more where the machine code that was kept cannot be read, or none can be kept."""
+    try:
+        roll_all(*arrays)  # type: ignore[no-untyped-call]
+    except (OSError, EOFError, ValueError, pickle.UnpicklingError):
+        drop_cache()
+        roll_all(*arrays)  # type: ignore[no-untyped-call]
 
 
 def _tip_of(mount: Mount | None) -> tuple[float, float, float]:

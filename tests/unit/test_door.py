@@ -171,3 +171,15 @@ def test_a_checkout_that_is_not_installed_runs_where_it_lies(tmp_path):
         [sys.executable, "-m", "physid_drake.where"], check=False, capture_output=True, text=True, cwd=tmp_path
     )
     assert Path(done.stdout.strip()).parent == tmp_path / "physid_drake", done.stderr
+
+
+def test_processes_that_work_for_a_command_run_nothing_of_the_working_folder(tmp_path):
+    for name in ("joblib", "contextlib", "threading", "random"):
+        (tmp_path / f"{name}.py").write_text(f"open('ran_{name}', 'w')")
+    script = (
+        "import sys; from joblib import Parallel, delayed; from physid_drake.door import enter\n"
+        "sys.exit(enter(lambda: len(Parallel(n_jobs=2)(delayed(abs)(k) for k in range(4))) - 4))"
+    )
+    done = subprocess.run([sys.executable, "-P", "-c", script], check=False, capture_output=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert list(tmp_path.glob("ran_*")) == []

@@ -316,8 +316,6 @@ def test_a_flag_that_leaves_a_result_out_does_not_drop_the_one_that_is_there(
     assert run_cell.main(asked) == 0
     assert flag in refused(capsys, *asked, flag)
     assert (tmp_path / "out" / file).exists()
-    # With other settings it is another run's, and a line says that it is gone.
-    monkeypatch.setattr(run_cell, "_fill", lambda folder, *_: folder.write("result.json", "{}"))
-    assert run_cell.main(asked) == 0
-    assert run_cell.main([*asked, "--seed", "5", flag]) == 0
-    assert "they are gone" in capsys.readouterr().out and not (tmp_path / "out" / file).exists()
+    for other in (["--seed", "5", flag], ["--seed", "5"], ["--seed", "5", "--host", "nonsense"]):
+        refused(capsys, *asked, *other)
+        assert (tmp_path / "out" / file).exists()

@@ -30,14 +30,17 @@ def test_a_recordings_name_is_one_folder_where_the_command_runs(name, folder):
     assert named_after(name) == folder
 
 
-def test_the_files_of_a_run_with_another_configuration_are_dropped(tmp_path):
+def test_results_of_another_configuration_are_refused_and_its_state_is_dropped(tmp_path):
     with RunFolder.open(tmp_path, RUN, "seed: 0", **FILES) as folder:
-        for name in ("result.json", "state.npz"):
-            folder.write(name, "{}")
+        folder.write("state.npz", "{}")
     opened(tmp_path)
-    assert folder.holds("result.json") and folder.holds("state.npz")
+    assert folder.holds("state.npz")
     opened(tmp_path, "seed: 7")
     assert {path.name for path in tmp_path.iterdir()} == {MANIFEST, "config.yaml"}
+    folder.write("result.json", "{}")
+    with pytest.raises(ConfigError, match=r"holds 'result\.json' of another recording, or of other settings"):
+        opened(tmp_path, "seed: 8")
+    assert folder.read("result.json") == "{}" and folder.read("config.yaml") == "seed: 7"
 
 
 def test_what_a_person_keeps_in_a_runs_folder_stays(tmp_path):
@@ -78,6 +81,23 @@ def test_an_input_is_never_written_to(tmp_path):
     for spelt in (tmp_path, tmp_path / "." / "x" / "..", tmp_path.parent / f"{tmp_path.name}_link"):
         with pytest.raises(ConfigError, match="read from"):
             RunFolder.check(spelt, RUN, inputs=[tmp_path])
+
+
+def test_nothing_is_written_within_a_recording(tmp_path):
+    with pytest.raises(ConfigError, match="read from"):
+        RunFolder.check(tmp_path / "out" / "deep", RUN, recordings=[tmp_path])
+    RunFolder.check(tmp_path / "out", RUN, inputs=[tmp_path])  # runs/x beside a CONFIG
+
+
+def test_what_lies_where_a_part_is_written_is_not_followed(tmp_path):
+    (tmp_path / "mine").write_text("mine")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / f".{MANIFEST}.part").symlink_to(tmp_path / "mine")
+    with pytest.raises(ConfigError, match="is not empty"):
+        opened(tmp_path / "out")
+    (tmp_path / ".result.json.part").symlink_to(tmp_path / "mine")
+    write_whole(tmp_path / "result.json", b"whole")
+    assert (tmp_path / "mine").read_text() == "mine" and not (tmp_path / "result.json").is_symlink()
 
 
 def test_a_folder_with_another_commands_results_is_refused(tmp_path):
@@ -138,7 +158,7 @@ def test_of_two_runs_into_one_folder_the_second_is_refused_and_changes_nothing(t
                 other()
         assert folder.read("config.yaml") == "seed: 0" and folder.holds("result.json")
     assert not (tmp_path / LOCK).exists()
-    opened(tmp_path, "seed: 7")
+    opened(tmp_path)
 
 
 def test_a_run_that_was_killed_leaves_a_folder_that_can_be_taken_up(tmp_path):
@@ -153,7 +173,7 @@ def test_a_run_that_was_killed_leaves_a_folder_that_can_be_taken_up(tmp_path):
 
 
 def test_a_run_that_was_killed_before_its_manifest_leaves_a_folder_that_can_be_taken_up(tmp_path):
-    for name in (LOCK, f".{MANIFEST}.part"):
+    for name in (LOCK, f".{MANIFEST}.x1y2.part"):
         (tmp_path / name).touch()
     opened(tmp_path)
 

@@ -318,3 +318,10 @@ def test_aliases_that_stand_for_a_billion_values_are_refused_at_once(tmp_path):
 def test_a_named_pipe_is_no_config(tmp_path):
     os.mkfifo(tmp_path / "pipe.yaml")
     assert "it is a named pipe" in refusal(str(tmp_path / "pipe.yaml"))
+
+
+def test_keys_beside_scenarios_are_refused(tmp_path):
+    """What should lie below a scenario, and was not indented, would be left out in silence."""
+    (tmp_path / "flat.yaml").write_text("mine:\nrecording: rec\nseed: 3\n")
+    with pytest.raises(ConfigError, match="scenario 'recording' needs keys and values below it"):
+        load_scenario(str(tmp_path / "flat.yaml"), None)
