@@ -38,8 +38,8 @@ class SearchConfig:
         patience: over so many updates.
         refine_every: trials after which the candidates gather where the best theta may be; 0 keeps one fixed set.
         jobs: processes; 0 takes the machine's cores.
-        integrator: ``cell`` simulates every trial in Drake; ``twin`` in the compiled planar image of the cell, a
-            hundred times faster, and in Drake what that does not know.
+        integrator: ``cell`` simulates every trial in Drake; ``twin`` in the compiled planar image of the cell,
+            many times faster, and in Drake what that does not know.
         online: learn from one push after another, with a small search for each, instead of from all at once. Every
             push is learned from, none is held out.
     """
