@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from physid_drake.twin.compiled import compiled
+from physid_drake.twin.compiled import compiled_outermost
+from physid_drake.twin.hand import places_of_knots
 from physid_drake.twin.rollout import STATE, roll
 from physid_drake.twin.stage import CONTACT, SOLVED
 
 
-@compiled
+@compiled_outermost
 def roll_all(
     bodies,
     base,
     friction,
     edges,
-    knots,
+    knot_times,
+    knot_velocities,
+    path_starts,
     knot_ends,
     starts,
     laws,
@@ -31,10 +34,12 @@ def roll_all(
 
     Args:
         bodies: (n,) records.
-        base: points (m, 2) in B [m], weights (m,) and radii (m,) [m].
+        base: points (m, 2) in B [m], weights (m,) and radii (m,) [m]; the last may have no weight.
         friction: (n, m) of the points [-].
         edges: of the outline.
-        knots: (k, 5) of all hand paths: time, place, velocity.
+        knot_times: (k,) of all hand paths [s].
+        knot_velocities: (k, 2) of the hands there [m/s].
+        path_starts: (n, 2) where they start [m].
         knot_ends: (n + 1,) where each rollout's begin and end.
         starts: (n, 6) pose and velocity of Bo.
         laws, law_ends, tables: records, where each rollout's begin and end, numbers.
@@ -46,16 +51,19 @@ def roll_all(
     points, weights, radii = base
     count = len(weights)
     px, py, mu, disc8 = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
-    room = (np.empty(count), np.empty(count), np.empty(count), np.zeros(14))
+    room = (np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.zeros(14))
     contact, solved, state = np.zeros(1, CONTACT), np.zeros(1, SOLVED), np.zeros(1, STATE)
     for k in range(len(bodies)):
         body = bodies[k]
         for i in range(count):
             px[i], py[i], mu[i] = points[i, 0] - body.com_x, points[i, 1] - body.com_y, friction[k, i]
-        own = knots[knot_ends[k] : knot_ends[k + 1]]
-        hand = (own[:, 0].copy(), own[:, 1:3].copy(), own[:, 3:5].copy())
+        own_times = knot_times[knot_ends[k] : knot_ends[k + 1]]
+        own_velocities = knot_velocities[knot_ends[k] : knot_ends[k + 1]]
+        places = np.empty((len(own_times), 2))
+        places_of_knots(own_times, own_velocities, path_starts[k], places)
         roll(
-            body, (px, py, weights, mu, radii, disc8, edges), hand, starts[k], laws[law_ends[k] : law_ends[k + 1]],
-            tables, times[ends[k] : ends[k + 1]], poses[ends[k] : ends[k + 1]], forces[ends[k] : ends[k + 1]],
+            body, (px, py, weights, mu, radii, disc8, edges), (own_times, places, own_velocities), starts[k],
+            laws[law_ends[k] : law_ends[k + 1]], tables, times[ends[k] : ends[k + 1]],
+            poses[ends[k] : ends[k + 1]], forces[ends[k] : ends[k + 1]],
             counts[k], room, contact[0], solved[0], state[0],
         )  # fmt: skip

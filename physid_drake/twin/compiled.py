@@ -23,14 +23,27 @@ REVISION: Final = re.compile("[0-9a-f]{16}")
 _KEPT: Final = 3  # revisions whose machine code is kept
 
 
-def compiled(function: F) -> F:
-    """A function in machine code. A division by zero gives what IEEE says, so that loops can use vectors."""
+def compiled_outermost(function: F) -> F:
+    """A function in machine code, which Python calls, and which makes all the arrays that those within it use."""
     return _compiled(function, error_model="numpy")
+
+
+def compiled(function: F) -> F:
+    """A function in machine code that makes no arrays; so none has to count who uses them, which took half the time.
+
+    A division by zero gives what IEEE says, so that loops can use vectors.
+    """
+    return _compiled(function, error_model="numpy", _nrt=False)
+
+
+def compiled_inside(function: F) -> F:
+    """The same of what is called often: it becomes a part of what calls it, which hands over no tuples of arrays."""
+    return _compiled(function, error_model="numpy", _nrt=False, forceinline=True)
 
 
 def compiled_sum(function: F) -> F:
     """The same of a sum over points, whose terms may be added in another order."""
-    return _compiled(function, error_model="numpy", fastmath=_SUMS)
+    return _compiled(function, error_model="numpy", _nrt=False, fastmath=_SUMS)
 
 
 @cache

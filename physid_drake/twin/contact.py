@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from physid_drake.twin.compiled import compiled
+from physid_drake.twin.compiled import compiled, compiled_inside
 
 NO_SLIP = 1e-15  # m/s
 FEWEST_PHASES = 4  # of a planar blow: slip, stick or slip back, before and after the greatest compression
 
 
-@compiled
+@compiled_inside
 def resting_contact(un, ut, wnn, wnt, wtt, friction):
     """Normal and tangential impulse that end a relative velocity: the contact separates, sticks or slips.
 

@@ -7,8 +7,28 @@ import math
 import numpy as np
 
 from physid_drake.twin.compiled import compiled
+from physid_drake.twin.plane import length
 
 AT_ONCE = 1e-12  # s
+
+
+@compiled
+def places_of_knots(times, velocities, start, places):
+    """Where the hand is at the knots: (k, 2), filled in.
+
+    Args:
+        times: (k,) knots [s].
+        velocities: (k, 2) at them [m/s].
+        start: (2,) place at the first [m].
+        places: (k, 2) at all of them [m], filled in.
+    """
+    wx = wy = 0.0
+    for i in range(len(times)):
+        if i > 0:
+            half = (times[i] - times[i - 1]) * 0.5
+            wx += half * (velocities[i, 0] + velocities[i - 1, 0])
+            wy += half * (velocities[i, 1] + velocities[i - 1, 1])
+        places[i, 0], places[i, 1] = start[0] + wx, start[1] + wy
 
 
 @compiled
@@ -50,7 +70,7 @@ def nearest(x, y, edges, radius):
         radius: of a disc about Bo [m].
     """
     if len(edges) == 0:
-        r = math.hypot(x, y)
+        r = length(x, y)
         return (r - radius, x / r, y / r) if r > 0.0 else (-radius, 1.0, 0.0)
     height, face = -np.inf, 0
     for i in range(len(edges)):
@@ -69,7 +89,7 @@ def _corner(x, y, edges):
     least, dx, dy = np.inf, 1.0, 0.0
     for i in range(len(edges)):
         ex, ey = x - edges[i, 0], y - edges[i, 1]
-        r = math.hypot(ex, ey)
+        r = length(ex, ey)
         if r < least:
             least, dx, dy = r, ex, ey
     return (least, dx / least, dy / least) if least > 0.0 else (0.0, 1.0, 0.0)

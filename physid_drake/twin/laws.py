@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from physid_drake.twin.compiled import compiled
+from physid_drake.twin.plane import copied, length
 from physid_drake.twin.records import (
     ATTRACTION,
     ELLIPSE,
@@ -67,12 +68,12 @@ def friction_by_place(laws, tables, px, py, radii, x, y, yaw, plain, mu):
         plain: (n,) without any law.
         mu: (n,) is filled in.
     """
-    mu[:] = plain
+    copied(plain, mu)
     c, s = math.cos(yaw), math.sin(yaw)
     for law in laws:
         if law.kind == PATCH:
             for i in range(len(px)):
-                away = math.hypot(x + c * px[i] - s * py[i] - law.b, y + s * px[i] + c * py[i] - law.c)
+                away = length(x + c * px[i] - s * py[i] - law.b, y + s * px[i] + c * py[i] - law.c)
                 mu[i] *= 1.0 + (law.a - 1.0) * share_inside(away, law.d, max(radii[i], SMALLEST_DISC))
         elif law.kind == GRADIENT:
             for i in range(len(px)):
@@ -121,7 +122,7 @@ def ellipse(laws, yaw):
             angle = 2.0 * (law.b - (0.0 if law.c > 0.0 else yaw))
             cosine += math.log(law.a) * math.cos(angle)
             sine += math.log(law.a) * math.sin(angle)
-    size = math.hypot(cosine, sine)
+    size = length(cosine, sine)
     if size == 0.0:
         return 1.0, 0.0, 1.0
     mean, half = math.cosh(size), -math.sinh(size)
@@ -138,7 +139,7 @@ def force_by_place(laws, tables, x, y):
             fy += law.b
         elif law.kind == SPRING:
             dx, dy = law.b - x, law.c - y
-            distance = math.hypot(dx, dy)
+            distance = length(dx, dy)
             pull = law.a * max(0.0, distance - law.d) / max(distance, CLOSEST)
             fx += pull * dx
             fy += pull * dy

@@ -9,6 +9,7 @@ import numpy as np
 from physid_drake.twin.compiled import compiled
 from physid_drake.twin.hand import gap_between, hand_at
 from physid_drake.twin.laws import force_by_place, friction_by_place
+from physid_drake.twin.plane import largest, length, product
 from physid_drake.twin.stage import solve_stage
 from physid_drake.twin.support import CREEP, LEAVES_ALL, TURNS_WITHIN, moments
 from physid_drake.twin.swing import strongest, swing_after, swing_at_rest
@@ -99,9 +100,10 @@ def _begin(body, object_, hand, start, room, state, solved, counts):
     body.reach = 0.0
     for i in range(len(px)):
         disc8[i] = (LEAVES_ALL * radii[i]) ** 8
-        body.reach = max(body.reach, math.hypot(px[i], py[i]) + TURNS_WITHIN * radii[i])
-    moments(px, py, w, room[3][:6])
-    room[3][12], room[3][13] = np.abs(px).max(), np.abs(py).max()
+        body.reach = max(body.reach, length(px[i], py[i]) + TURNS_WITHIN * radii[i])
+    sums = room[-1]
+    moments(px, py, w, sums[:6])
+    sums[12], sums[13] = largest(px), largest(py)
     c, s = math.cos(start[2]), math.sin(start[2])
     rx, ry = c * body.com_x - s * body.com_y, s * body.com_x + c * body.com_y
     state.t, state.yaw, state.spin = body.begin, start[2], start[5]
@@ -126,15 +128,15 @@ def _begin(body, object_, hand, start, room, state, solved, counts):
 def _rest(body, object_, hand, laws, tables, room, state, limit):
     """For how long an object at rest surely stays so [s]; 0 where the tip is at it, below 0 where it slides."""
     fx, fy = force_by_place(laws, tables, state.x, state.y)
-    pull = math.hypot(fx, fy) + strongest(body, state)
+    pull = length(fx, fy) + strongest(body, state)
     if pull > 0.0:
         px, py, w, mu0, radii, _, _ = object_
         friction_by_place(laws, tables, px, py, radii, state.x, state.y, state.yaw, mu0, room[0])
-        if pull > HELD * body.weight * np.dot(w, room[0]) / room[3][0]:
+        if pull > HELD * body.weight * product(w, room[0]) / room[-1][0]:
             return -1.0
     times, places, velocities = hand
     swings = body.tip_stiffness > 0.0 and len(times) > 0
-    if swings and math.hypot(state.ex, state.ey) + 0.1 * math.hypot(state.ux, state.uy) > STILL_TIP:
+    if swings and length(state.ex, state.ey) + 0.1 * length(state.ux, state.uy) > STILL_TIP:
         return -1.0
     if len(times) == 0 or state.t >= times[-1] - AT_KNOT:
         return np.inf
@@ -148,7 +150,7 @@ def _rest(body, object_, hand, laws, tables, room, state, limit):
         return 0.0 if nx * hvx + ny * hvy > 0.0 else max(min(limit - state.t, 1e-3), 1e-7)
     fastest = 0.0
     for k in range(len(times)):
-        fastest = max(fastest, math.hypot(velocities[k, 0], velocities[k, 1]))
+        fastest = max(fastest, length(velocities[k, 0], velocities[k, 1]))
     soon = gap / fastest
     if soon < NEAR:  # go up to it along its own velocity
         rate = nx * hvx + ny * hvy
@@ -221,7 +223,7 @@ def _length(body, object_, hand, state, limit):
     if len(hand[0]) > 0 and (swings or state.t < hand[0][-1]):
         hx, hy, hvx, hvy = tip_at(body, hand, state, state.t, False)
         if state.touching > 0.0:
-            speed = math.hypot(hvx, hvy) + 0.05 * abs(state.spin)
+            speed = length(hvx, hvy) + 0.05 * abs(state.spin)
             h = min(h, LONGEST_TOUCHING, max(FARTHEST_TOUCHING / max(speed, 1e-9), SHORTEST))
         else:
             gap, nx, ny, rx, ry = gap_between(state.x, state.y, state.yaw, hx, hy, body, object_[6])
@@ -283,9 +285,9 @@ def _two_stages(body, object_, hand, laws, tables, counts, room, contact, solved
     swingb = swing_after(body, g, swings, spin + rest * aaspin, solved.vx, solved.vy)
     if body.swing_mass > 0.0:
         soon_x, soon_y = state.wx + (swinga[2] - state.wx) / GAMMA, state.wy + (swinga[3] - state.wy) / GAMMA
-        error = max(error, h * math.hypot(swingb[2] - soon_x, swingb[3] - soon_y))
+        error = max(error, h * length(swingb[2] - soon_x, swingb[3] - soon_y))
     if body.tip_stiffness > 0.0:
-        error = max(error, h * math.hypot(tipb[2] - later_x, tipb[3] - later_y))
+        error = max(error, h * length(tipb[2] - later_x, tipb[3] - later_y))
     return (
         state.x + rest * a[0] + g * solved.vx,
         state.y + rest * a[1] + g * solved.vy,

@@ -6,17 +6,18 @@ import math
 
 import numpy as np
 
-from physid_drake.twin.compiled import compiled
+from physid_drake.twin.compiled import compiled, compiled_inside
 from physid_drake.twin.contact import resting_contact
 from physid_drake.twin.laws import drags, ellipse, force_by_place, friction_by_place, friction_by_speed
+from physid_drake.twin.plane import copied, differ, length, turned_back
 from physid_drake.twin.support import (
     CREEP,
     MOST_CHANGES,
     friction,
+    grips,
     moments,
     plane_of_loads,
-    round_friction,
-    round_unloaded_friction,
+    round_grips,
     torque_of_discs,
     unloaded_friction,
     unloading,
@@ -54,8 +55,8 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
         body: record of object and tip.
         object_: (px, py, w, mu, radii, disc8, edges) of the support points about Bcm, and the outline.
         laws, tables: the vocabulary's.
-        room: (n,) space for friction, for loaded weights and for friction at speed, and (14,) for sums of moments:
-            of all points, of the loaded ones, and how far points are along x and y at most.
+        room: (n,) space for friction, for loaded weights, for friction at speed and for `grips`, and (14,) for sums
+            of moments: of all points, of the loaded ones, and how far points are along x and y at most.
         h: length of the stage [s].
         x, y, yaw: of Bcm at its end [m, rad].
         ax, ay, spin0: velocity at its start, in W.
@@ -64,33 +65,38 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
         solved: record of `SOLVED`; holds the guess, and afterwards what was found.
     """
     px, py, w, mu0, radii, _, _ = object_
-    mu, loaded, fast, _ = room
+    mu, loaded, fast, grip, soft, _ = room
     c, s = math.cos(yaw), math.sin(yaw)
     friction_by_place(laws, tables, px, py, radii, x, y, yaw, mu0, mu)
     oval = ellipse(laws, yaw)
     wx, wy = force_by_place(laws, tables, x, y)
     swing_x, swing_y, swing_drag = pull_of(body, h, swing, spin0)
-    ex, ey = _into(c, s, wx + swing_x, wy + swing_y)
+    ex, ey = turned_back(c, s, wx + swing_x, wy + swing_y)
     linear, turning_drag, quadratic = drags(laws)
-    arms = _into(c, s, body.swing_load * swing[0], body.swing_load * swing[1])
-    vx, vy = _into(c, s, solved.vx, solved.vy)
+    arms = turned_back(c, s, body.swing_load * swing[0], body.swing_load * swing[1])
+    vx, vy = turned_back(c, s, solved.vx, solved.vy)
     spin = solved.spin
-    bx, by = _into(c, s, ax, ay)
+    bx, by = turned_back(c, s, ax, ay)
     touching = contact.touching > 0.0
     tip = _tip_in(c, s, contact)
-    hx, hy = _into(c, s, solved.fx, solved.fy) if touching else (0.0, 0.0)
+    hx, hy = turned_back(c, s, solved.fx, solved.fy) if touching else (0.0, 0.0)
     size = math.sqrt(body.inertia / body.mass)
     full, before, pn, again, rounds = 1.0, np.inf, 0.0, False, 0
     solved.converged = 0.0
     for rounds in range(1, MOST_ROUNDS + 1):
         turns8 = spin**8 if vx * vx + vy * vy < (spin * body.reach) ** 2 else 0.0
         now = fast if friction_by_speed(laws, tables, px, py, vx, vy, spin, mu, fast) else mu
-        _balance(body, object_, room, now, vx, vy, spin, turns8, oval, hx, hy, arms, solved)
-        fx, fy, torque, xx, xy, yy, xw, yw, ww = _friction(
-            body, object_, now, loaded if solved.partly > 0.0 else w, vx, vy, spin, turns8, oval, solved, full
-        )
+        _grips(object_, vx, vy, spin, turns8, oval, grip, soft)
+        _balance(body, object_, room, now, vx, vy, spin, oval, hx, hy, arms, solved)
+        carrying = loaded if solved.partly > 0.0 else w
+        fx, fy, torque, xx, xy, yy, xw, yw, ww = friction(
+            px, py, carrying, now, grip, soft, vx, vy, spin, oval[0], oval[1], oval[2],
+            solved.p0, solved.px, solved.py, full,
+        )  # fmt: skip
+        if turns8 > 0.0:
+            torque -= _torque_within(body, object_, now, carrying, vx, vy, spin, solved)
         torque += torque_of(body, swing, c * vx - s * vy, s * vx + c * vy, spin)
-        drag = linear + quadratic * math.hypot(vx, vy) + swing_drag
+        drag = linear + quadratic * length(vx, vy) + swing_drag
         inverse = _inverse(
             body.mass + h * (xx + drag), h * xy, h * xw, body.mass + h * (yy + drag), h * yw,
             body.inertia + h * (ww + turning_drag),
@@ -108,7 +114,7 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
             )
             fhx, fhy = (tip[0] * pn - tip[1] * pt) / h, (tip[1] * pn + tip[0] * pt) / h
         moved = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2 * size * size)
-        pressed = math.hypot(fhx - hx, fhy - hy) * h / body.mass
+        pressed = length(fhx - hx, fhy - hy) * h / body.mass
         vx, vy, spin, hx, hy = vx + d0, vy + d1, spin + d2, fhx, fhy
         if moved + 0.1 * pressed < CONVERGED:
             solved.converged = 1.0
@@ -124,38 +130,37 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
     solved.rounds = float(rounds)
 
 
-@compiled
-def _friction(body, object_, mu, carrying, vx, vy, spin, turns8, oval, solved, full):
-    """`friction` under the plane of loads that was found, with what turns within what single points stand for."""
-    px, py, _, _, radii, disc8, _ = object_
+@compiled_inside
+def _grips(object_, vx, vy, spin, turns8, oval, grip, soft):
+    """`grips`, or those of a circle that does not turn about a place near."""
+    px, py, _, _, _, disc8, _ = object_
     if turns8 == 0.0 and oval[0] == 1.0 and oval[1] == 0.0:
-        return round_friction(px, py, mu, carrying, vx, vy, spin, solved.p0, solved.px, solved.py, full)
-    fx, fy, torque, xx, xy, yy, xw, yw, ww = friction(
-        px, py, mu, carrying, vx, vy, spin, disc8, turns8, oval[0], oval[1], oval[2],
-        solved.p0, solved.px, solved.py, full,
-    )  # fmt: skip
-    if turns8 > 0.0:
-        left = torque_of_discs(px, py, mu, carrying, radii, vx, vy, spin, solved.p0, solved.px, solved.py)
-        torque -= left * spin / math.hypot(spin, CREEP / body.reach)
-    return fx, fy, torque, xx, xy, yy, xw, yw, ww
+        round_grips(px, py, vx, vy, spin, grip, soft)
+    else:
+        grips(px, py, vx, vy, spin, disc8, turns8, oval[0], oval[1], oval[2], grip, soft)
 
 
-@compiled
-def _balance(body, object_, room, mu, vx, vy, spin, turns8, oval, hx, hy, arms, solved):
+@compiled_inside
+def _torque_within(body, object_, mu, carrying, vx, vy, spin, solved):
+    """Torque [N m], against the spin, within what single points stand for where slip turns about them."""
+    px, py, _, _, radii, _, _ = object_
+    left = torque_of_discs(px, py, mu, carrying, radii, vx, vy, spin, solved.p0, solved.px, solved.py)
+    return left * spin / length(spin, CREEP / body.reach)
+
+
+@compiled_inside
+def _balance(body, object_, room, mu, vx, vy, spin, oval, hx, hy, arms, solved):
     """The plane of loads for a velocity and a tip's force (hx, hy) in B: into ``solved``, and which points carry.
 
     ``arms`` are the moments of a weight that has moved [N m].
     """
-    px, py, w, _, _, disc8, _ = object_
-    _, loaded, _, sums = room
+    px, py, w, _, _, _, _ = object_
+    _, loaded, _, grip, _, sums = room
     partly = solved.partly > 0.0
     solved.tipped = 1.0
     for _ in range(MOST_CHANGES):
         carrying = loaded if partly else w
-        if turns8 > 0.0 or oval[0] != 1.0 or oval[1] != 0.0:
-            g = unloaded_friction(px, py, mu, carrying, vx, vy, spin, disc8, turns8, oval[0], oval[1], oval[2])
-        else:
-            g = round_unloaded_friction(px, py, mu, carrying, vx, vy, spin)
+        g = unloaded_friction(px, py, carrying, mu, grip, vx, vy, spin, oval[0], oval[1], oval[2])
         stands, p0, p1, p2 = plane_of_loads(
             sums[6:12] if partly else sums[:6],
             g,
@@ -171,10 +176,10 @@ def _balance(body, object_, room, mu, vx, vy, spin, turns8, oval, hx, hy, arms, 
             if p0 > abs(p1) * sums[12] + abs(p2) * sums[13]:  # surely all of them press
                 solved.tipped = 0.0
                 break
-            loaded[:] = w
+            copied(w, loaded)
         if unloading(px, py, w, loaded, p0, p1, p2) == 0:
             solved.tipped = 0.0
-            partly = partly and not np.array_equal(loaded, w)
+            partly = partly and differ(loaded, w)
             break
         partly = True
         moments(px, py, loaded, sums[6:12])
@@ -184,16 +189,10 @@ def _balance(body, object_, room, mu, vx, vy, spin, turns8, oval, hx, hy, arms, 
     solved.partly = 1.0 if partly else 0.0
 
 
-@compiled
-def _into(c, s, x, y):
-    """A vector of W in B."""
-    return c * x + s * y, c * y - s * x
-
-
-@compiled
+@compiled_inside
 def _tip_in(c, s, contact):
     """Of the contact in B: normal, its torque, that of the tangent (normal turned left), the tip's velocities."""
-    nx, ny = _into(c, s, contact.nx, contact.ny)
+    nx, ny = turned_back(c, s, contact.nx, contact.ny)
     torque_n = contact.rx * contact.ny - contact.ry * contact.nx
     torque_t = contact.rx * contact.nx + contact.ry * contact.ny
     along = contact.vx * contact.nx + contact.vy * contact.ny
@@ -201,7 +200,7 @@ def _tip_in(c, s, contact):
     return nx, ny, torque_n, torque_t, along, across
 
 
-@compiled
+@compiled_inside
 def _held(tip, inverse, vx, vy, spin, d0, d1, d2, gives, friction_of_tip):
     """The change (d0, d1, d2) of a velocity with the contact's impulses, and these, from the one without."""
     nx, ny, torque_n, torque_t, along, across = tip
@@ -216,7 +215,7 @@ def _held(tip, inverse, vx, vy, spin, d0, d1, d2, gives, friction_of_tip):
     return d0 + y0 * pn + z0 * pt, d1 + y1 * pn + z1 * pt, d2 + y2 * pn + z2 * pt, pn, pt
 
 
-@compiled
+@compiled_inside
 def _inverse(k00, k01, k02, k11, k12, k22):
     """Of a symmetric 3 x 3 matrix: its six entries."""
     i00, i01, i02 = k11 * k22 - k12 * k12, k02 * k12 - k01 * k22, k01 * k12 - k02 * k11
@@ -225,7 +224,7 @@ def _inverse(k00, k01, k02, k11, k12, k22):
     return i00 / det, i01 / det, i02 / det, i11 / det, i12 / det, i22 / det
 
 
-@compiled
+@compiled_inside
 def _times(inverse, b0, b1, b2):
     i00, i01, i02, i11, i12, i22 = inverse
     return i00 * b0 + i01 * b1 + i02 * b2, i01 * b0 + i11 * b1 + i12 * b2, i02 * b0 + i12 * b1 + i22 * b2

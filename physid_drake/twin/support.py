@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from physid_drake.twin.compiled import compiled, compiled_sum
+from physid_drake.twin.compiled import compiled, compiled_inside, compiled_sum
 
 CREEP = 1e-5  # m/s: slip at which friction fades
 MOST_CHANGES = 25  # of the set of points that carry something
@@ -31,26 +31,53 @@ def moments(x, y, w, into):
 
 
 @compiled_sum
-def unloaded_friction(x, y, mu, w, vx, vy, spin, disc8, turns8, mxx, mxy, myy):
-    """Friction per load: sums of mu times the direction of slip, with 1, x and y, along x and along y.
+def round_grips(x, y, vx, vy, spin, grip, soft):
+    """`grips` of a circle where slip turns about no place near: most of the time, and twice as fast."""
+    for i in range(x.shape[0]):
+        sx, sy = vx - spin * y[i], vy + spin * x[i]
+        inverse = 1.0 / (sx * sx + sy * sy + CREEP * CREEP)
+        grip[i] = math.sqrt(inverse)
+        soft[i] = inverse
+
+
+@compiled_sum
+def grips(x, y, vx, vy, spin, disc8, turns8, mxx, mxy, myy, grip, soft):
+    """What friction takes roots and quotients for, once for all sums.
 
     Args:
         x, y: (n,) support points from Bcm [m].
-        mu: (n,) coefficients [-].
-        w: (n,) weights; 0 of those that carry nothing.
         vx, vy, spin: of Bcm [m/s, rad/s].
         disc8: (n,) eighth power of the radius within which slip that turns cancels [m^8].
         turns8: eighth power of the spin [rad^8/s^8]; 0 where slip turns about no place near.
-        mxx, mxy, myy: squared ellipse of friction; 1, 0, 1 of a circle.
+        mxx, mxy, myy: squared ellipse of friction M; 1, 0, 1 of a circle.
+        grip: (n,) friction of a point is -mu N grip M s with slip s; filled in [s/m].
+        soft: (n,) its slope is -mu N grip (M - soft M s (M s)'); filled in [s^2/m^2].
+    """
+    for i in range(x.shape[0]):
+        sx, sy = vx - spin * y[i], vy + spin * x[i]
+        s2 = sx * sx + sy * sy + CREEP * CREEP
+        u2 = mxx * sx * sx + 2.0 * mxy * sx * sy + myy * sy * sy + CREEP * CREEP
+        s8 = (s2 * s2) * (s2 * s2)
+        d8 = disc8[i] * turns8 + s8
+        grip[i] = math.sqrt(s2 / (u2 * math.sqrt(math.sqrt(d8))))
+        soft[i] = s8 / (d8 * u2)
+
+
+@compiled_sum
+def unloaded_friction(x, y, w, mu, grip, vx, vy, spin, mxx, mxy, myy):
+    """Friction per load: sums of mu times the direction of slip, with 1, x and y, along x and along y.
+
+    Args:
+        x, y, vx, vy, spin, mxx, mxy, myy: as of `grips`.
+        w: (n,) weights; 0 of those that carry nothing.
+        mu: (n,) coefficients [-].
+        grip: of `grips`.
     """
     gx0 = gx1 = gx2 = gy0 = gy1 = gy2 = 0.0
     for i in range(x.shape[0]):
         sx, sy = vx - spin * y[i], vy + spin * x[i]
-        dx, dy = mxx * sx + mxy * sy, mxy * sx + myy * sy
-        s2, u2 = sx * sx + sy * sy + CREEP * CREEP, sx * dx + sy * dy + CREEP * CREEP
-        s8 = (s2 * s2) * (s2 * s2)
-        k = w[i] * mu[i] * math.sqrt(s2 / (u2 * math.sqrt(math.sqrt(disc8[i] * turns8 + s8))))
-        fx, fy = k * dx, k * dy
+        k = w[i] * mu[i] * grip[i]
+        fx, fy = k * (mxx * sx + mxy * sy), k * (mxy * sx + myy * sy)
         gx0 += fx
         gx1 += fx * x[i]
         gx2 += fx * y[i]
@@ -61,66 +88,25 @@ def unloaded_friction(x, y, mu, w, vx, vy, spin, disc8, turns8, mxx, mxy, myy):
 
 
 @compiled_sum
-def friction(x, y, mu, w, vx, vy, spin, disc8, turns8, mxx, mxy, myy, p0, px, py, full):
+def friction(x, y, w, mu, grip, soft, vx, vy, spin, mxx, mxy, myy, p0, px, py, full):
     """Force and torque of friction, and how they resist a change of (vx, vy, spin): xx, xy, yy, xw, yw, ww.
 
     Args:
-        x, y, mu, w, vx, vy, spin, disc8, turns8, mxx, mxy, myy: as of `unloaded_friction`.
+        x, y, w, mu, vx, vy, spin, mxx, mxy, myy: as of `unloaded_friction`.
+        grip, soft: of `grips`.
         p0, px, py: load of a point with weight 1, p0 + px x + py y [N].
-        full: 1 for the slope of the whole law; 0 without the part that makes it soft across the slip.
+        full: 1 for the slope of the whole law; 0 without the part that makes it soft along the slip.
     """
     fx = fy = torque = xx = xy = yy = xw = yw = ww = 0.0
     for i in range(x.shape[0]):
         sx, sy = vx - spin * y[i], vy + spin * x[i]
         dx, dy = mxx * sx + mxy * sy, mxy * sx + myy * sy
-        s2, u2 = sx * sx + sy * sy + CREEP * CREEP, sx * dx + sy * dy + CREEP * CREEP
-        s8 = (s2 * s2) * (s2 * s2)
-        d8 = disc8[i] * turns8 + s8
-        k = w[i] * mu[i] * (p0 + px * x[i] + py * y[i]) * math.sqrt(s2 / (u2 * math.sqrt(math.sqrt(d8))))
-        q = full * k * s8 / (d8 * u2)
+        k = w[i] * mu[i] * grip[i] * (p0 + px * x[i] + py * y[i])
+        q = full * k * soft[i]
         fx -= k * dx
         fy -= k * dy
         torque -= k * (x[i] * dy - y[i] * dx)
         a, b, c = k * mxx - q * dx * dx, k * mxy - q * dx * dy, k * myy - q * dy * dy
-        xx += a
-        xy += b
-        yy += c
-        xw += b * x[i] - a * y[i]
-        yw += c * x[i] - b * y[i]
-        ww += a * y[i] * y[i] - 2.0 * b * x[i] * y[i] + c * x[i] * x[i]
-    return fx, fy, torque, xx, xy, yy, xw, yw, ww
-
-
-@compiled_sum
-def round_unloaded_friction(x, y, mu, w, vx, vy, spin):
-    """`unloaded_friction` of a circle where slip turns about no place near: most of the time, and twice as fast."""
-    gx0 = gx1 = gx2 = gy0 = gy1 = gy2 = 0.0
-    for i in range(x.shape[0]):
-        sx, sy = vx - spin * y[i], vy + spin * x[i]
-        k = w[i] * mu[i] / math.sqrt(sx * sx + sy * sy + CREEP * CREEP)
-        fx, fy = k * sx, k * sy
-        gx0 += fx
-        gx1 += fx * x[i]
-        gx2 += fx * y[i]
-        gy0 += fy
-        gy1 += fy * x[i]
-        gy2 += fy * y[i]
-    return gx0, gx1, gx2, gy0, gy1, gy2
-
-
-@compiled_sum
-def round_friction(x, y, mu, w, vx, vy, spin, p0, px, py, full):
-    """`friction` of a circle where slip turns about no place near."""
-    fx = fy = torque = xx = xy = yy = xw = yw = ww = 0.0
-    for i in range(x.shape[0]):
-        sx, sy = vx - spin * y[i], vy + spin * x[i]
-        inverse = 1.0 / (sx * sx + sy * sy + CREEP * CREEP)
-        k = w[i] * mu[i] * (p0 + px * x[i] + py * y[i]) * math.sqrt(inverse)
-        q = full * k * inverse
-        fx -= k * sx
-        fy -= k * sy
-        torque -= k * (x[i] * sy - y[i] * sx)
-        a, b, c = k - q * sx * sx, -q * sx * sy, k - q * sy * sy
         xx += a
         xy += b
         yy += c
@@ -142,7 +128,7 @@ def torque_of_discs(x, y, mu, w, radii, vx, vy, spin, p0, px, py):
     return torque
 
 
-@compiled
+@compiled_inside
 def plane_of_loads(sums, g, height, arm_x, arm_y, weight):
     """The plane p0 + px x + py y of loads [N] that carries the weight and balances the moments about Bcm.
 

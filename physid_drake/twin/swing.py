@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from physid_drake.twin.compiled import compiled
+from physid_drake.twin.compiled import compiled, compiled_inside
 
 
 @compiled
@@ -45,7 +45,7 @@ def swing_after(body, g, swing, spin, vx, vy):
     return swing[0] + g * (wx - vx), swing[1] + g * (wy - vy), wx, wy
 
 
-@compiled
+@compiled_inside
 def torque_of(body, swing, vx, vy, spin):
     """Of the damper on the object [N m]."""
     if body.swing_mass == 0.0:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import pickle
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -30,6 +32,8 @@ Array = NDArray[np.float64]
 LIGHTEST_TIP = 1e-6  # kg
 POINTS, POINTS_BY_PLACE = 36, 144
 """Under the object; more where friction depends on the place: its edges cross the base point by point."""
+AT_ONCE = 8  # numbers in a vector of the machine
+NO_TIMES, NO_VELOCITIES, NOWHERE = np.zeros(0), np.zeros((0, 2)), np.zeros(2)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,6 +84,17 @@ class Trace:
 
 
 @dataclass(frozen=True, kw_only=True)
+class _Base:
+    """A `Support` as loops like it: points of no weight fill the last of their vectors."""
+
+    points: Array
+    weights: Array
+    radii: Array
+    cells: NDArray[np.intp]
+    polar: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Twin:
     """An object on an endless table, pushed by a round tip, as the compiled integrator sees it.
 
@@ -98,7 +113,7 @@ class Twin:
     pressure: PressureGrid | None = None
     gravity: float = GRAVITY
     points: int | None = None
-    _supports: dict[int, Support] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _bases: dict[int, _Base] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.solid.rolling_radius is not None:
@@ -107,49 +122,54 @@ class Twin:
     @property
     def polar(self) -> float:
         """Mean square distance of the underside from Bo [m^2]."""
-        return self._support(POINTS).polar
+        return self._base(POINTS).polar
 
     def rollouts(self, pushes: Sequence[TwinPush]) -> list[Trace]:
         """Simulate all pushes, each as if it were alone."""
         fine = [k for k, push in enumerate(pushes) if any(by_place(law) for law in push.laws)]
         coarse = sorted(set(range(len(pushes))).difference(fine))
         traces: dict[int, Trace] = {}
-        for which, support in ((coarse, self._support(POINTS)), (fine, self._support(POINTS_BY_PLACE))):
+        for which, count in ((coarse, POINTS), (fine, POINTS_BY_PLACE)):
             if which:
-                traces |= zip(which, self._rolled([pushes[k] for k in which], support), strict=True)
+                traces |= zip(which, self._rolled([pushes[k] for k in which], self._base(count)), strict=True)
         return [traces[k] for k in range(len(pushes))]
 
-    def _rolled(self, pushes: Sequence[TwinPush], support: Support) -> list[Trace]:
+    def _rolled(self, pushes: Sequence[TwinPush], base: _Base) -> list[Trace]:
         """Those that need the same support points."""
-        ends = np.cumsum([0, *(len(push.times) for push in pushes)])
-        poses, forces = np.zeros((int(ends[-1]), 3)), np.zeros((int(ends[-1]), 2))
+        ends = _ends([len(push.times) for push in pushes])
+        poses, forces = np.zeros((ends[-1], 3)), np.zeros((ends[-1], 2))
         counts = np.zeros(len(pushes), COUNTS)
         laws, law_ends, tables = records_of([(push.laws, push.body.mass * self.gravity) for push in pushes])
-        knots, knot_ends = _knots(pushes)
         _roll_all(
             np.array([self._record(push) for push in pushes], dtype=BODY),
-            (np.ascontiguousarray(support.points), support.weights, support.radii),
-            np.array([push.body.support_friction[support.cells] for push in pushes]),
-            _edges(self.solid.outline), knots, knot_ends,
+            (base.points, base.weights, base.radii),
+            np.array([push.body.support_friction[base.cells] for push in pushes]),
+            self._edges, *_hands(pushes),
             np.array([(*push.start.pose, *push.start.velocity) for push in pushes]),
-            laws, law_ends, tables, np.concatenate([push.times for push in pushes]).astype(np.float64), ends,
+            laws, law_ends, tables, np.concatenate([push.times for push in pushes], dtype=np.float64),
+            np.array(ends),
             poses, forces, counts,
         )  # fmt: skip
-        outcomes = np.isin(counts["outcome"], (DIVERGED, STUCK)).tolist()
-        tips, lifts = counts["tipped"].tolist(), counts["lifted"].tolist()
+        outcomes, tips, lifts = (counts[name].tolist() for name in ("outcome", "tipped", "lifted"))
         return [
             Trace(
                 poses=poses[ends[k] : ends[k + 1]], forces=forces[ends[k] : ends[k + 1]],
-                outcome=Outcome.DIVERGED if outcomes[k] else Outcome.COMPLETED, tips=tips[k], lifts=lifts[k],
+                outcome=Outcome.DIVERGED if outcomes[k] in (DIVERGED, STUCK) else Outcome.COMPLETED,
+                tips=tips[k], lifts=lifts[k],
             )
             for k in range(len(pushes))
         ]  # fmt: skip
 
-    def _support(self, count: int) -> Support:
+    def _base(self, count: int) -> _Base:
         count = self.points or count
-        if count not in self._supports:
-            self._supports[count] = support_of(self.solid.underside, self.grid, count, pressure=self.pressure)
-        return self._supports[count]
+        if count not in self._bases:
+            support = support_of(self.solid.underside, self.grid, count, pressure=self.pressure)
+            self._bases[count] = _base_of(support)
+        return self._bases[count]
+
+    @cached_property
+    def _edges(self) -> Array:
+        return _edges(self.solid.outline)
 
     def _record(self, push: TwinPush) -> tuple[float, ...]:
         """The numbers of `BODY`, in their order."""
@@ -171,6 +191,14 @@ def _roll_all(*arrays: Any) -> None:
     except (OSError, EOFError, ValueError, pickle.UnpicklingError):
         drop_cache()
         roll_all(*arrays)  # type: ignore[no-untyped-call]
+
+
+def _base_of(support: Support) -> _Base:
+    missing = -len(support.weights) % AT_ONCE
+    return _Base(
+        points=np.pad(support.points, ((0, missing), (0, 0))), weights=np.pad(support.weights, (0, missing)),
+        radii=np.pad(support.radii, (0, missing)), cells=np.pad(support.cells, (0, missing)), polar=support.polar,
+    )  # fmt: skip
 
 
 def _tip_of(mount: Mount | None) -> tuple[float, float, float]:
@@ -200,11 +228,18 @@ def _edges(outline: Outline) -> Array:
     return np.hstack([corners, along / lengths, lengths])
 
 
-def _knots(pushes: Sequence[TwinPush]) -> tuple[Array, NDArray[np.int64]]:
-    """All hand paths (k, 5): time, place, velocity at each knot; and where each push's end."""
-    rows = [
-        np.zeros((0, 5)) if push.path is None
-        else np.column_stack([push.path.times, push.path.knot_positions(), push.path.velocities])
-        for push in pushes
-    ]  # fmt: skip
-    return np.ascontiguousarray(np.concatenate(rows)), np.cumsum([0, *map(len, rows)])
+def _hands(pushes: Sequence[TwinPush]) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+    """All hand paths: times (k,) of their knots, velocities (k, 2) there, starts (n, 2); where each push's end."""
+    paths = [push.path for push in pushes]
+    there = [path for path in paths if path is not None]
+    return (
+        np.concatenate([NO_TIMES, *(path.times for path in there)]),
+        np.concatenate([NO_VELOCITIES, *(path.velocities for path in there)]),
+        np.array([NOWHERE if path is None else path.start for path in paths]),
+        np.array(_ends([0 if path is None else len(path.times) for path in paths])),
+    )
+
+
+def _ends(counts: Sequence[int]) -> list[int]:
+    """Where each one's begin, and the last one's end."""
+    return list(accumulate(counts, initial=0))
