@@ -1,6 +1,7 @@
 """The vocabulary of laws: values that the cell reads here and the compiled twin in its own way.
 
-An effect writes down what it does in these words. A law that is none of them works, too, in the cell alone.
+An effect writes down what it does in these words. A law that is none of them works, too, in the cell alone. Tables
+are for what has no name: a friction or a force that changes smoothly with place, heading and speed.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 
 from physid_drake.cell.forces import Wrench
 from physid_drake.cell.object_state import Complex, ObjectState
+from physid_drake.cell.tables import Places, Row, Rows, Speeds, around, slopes_around
 
 Array = NDArray[np.float64]
 POINT = 1e-9  # m: of what stands for no disc, as under a lying cylinder
@@ -191,7 +194,163 @@ class Gradient:
         return np.asarray(np.clip(1.0 + self.slope_x * places.real + self.slope_y * places.imag, 0.0, self.largest))
 
 
-Law: TypeAlias = Tilt | Viscous | Quadratic | Spring | Attraction | Falling | Ellipse | Patch | Gradient
+@dataclass(frozen=True)
+class PlaceTable:
+    """Friction times a factor that is bilinear between places on the table, and constant beyond the last.
+
+    Attributes:
+        factors: rows along x of W, of numbers along y [-]; not below 0.
+        places: where they stand.
+    """
+
+    factors: Rows
+    places: Places
+
+    @property
+    def largest(self) -> float:
+        """Of the factor."""
+        return max(1.0, *map(max, self.factors))
+
+    def ratio(self, state: ObjectState) -> Array | Complex:
+        """The factor (n,) of the support points."""
+        return self.places.between(self.numbers, state.places)
+
+    @cached_property
+    def numbers(self) -> Array:
+        """The factors as an array."""
+        return np.array(self.factors)
+
+
+@dataclass(frozen=True)
+class SpeedTable:
+    """Friction times a factor that is linear over the logarithm of the slip, and constant beyond the last.
+
+    Attributes:
+        factors: at slips in equal steps of their logarithm [-]; not below 0.
+        speeds: the first slip and the last.
+    """
+
+    factors: Row
+    speeds: Speeds
+
+    @property
+    def largest(self) -> float:
+        """Of the factor."""
+        return max(1.0, *self.factors)
+
+    def ratio(self, state: ObjectState) -> Array | Complex:
+        """The factor (n,) of the support points."""
+        return self.speeds.between(self.numbers, np.abs(state.slips))
+
+    @cached_property
+    def numbers(self) -> Array:
+        """The factors as an array."""
+        return np.array(self.factors)
+
+
+@dataclass(frozen=True)
+class HeadingTable:
+    """Friction -mu N (f u + f' w) of a point that slips along u, w being u turned left; f is a factor by u's heading.
+
+    f is periodic and linear between equal angles, and so is f', its slope [1/rad] between a number's neighbours. The
+    part across the slip does no work. Friction has it if it comes of a potential mu N f abs(v), as that of an ellipse
+    does: a table of abs(M u) is an `Ellipse`. It resists a change of velocity across the slip by
+    mu N (f + f'') / abs(v), and along it by nothing. That slope is symmetric, and does not drive where f + f'' is
+    positive, as for convex limit curves: an implicit step has one solution. Without the part across it is neither.
+
+    Attributes:
+        factors: f [-] at angles of 2 pi k / n from x of W to y; not below 0.
+    """
+
+    factors: Row
+
+    @property
+    def slopes(self) -> Row:
+        """Numbers f' at the same angles [1/rad]."""
+        return slopes_around(self.factors)
+
+    @cached_property
+    def largest(self) -> float:
+        """Of the factor's size."""
+        return max(1.0, float(np.abs(self.numbers).max()))
+
+    def ratio(self, state: ObjectState) -> Array | Complex:
+        """The factor (n,) of the support points; its imaginary part turns friction to the left."""
+        slips = state.slips
+        numbers = around(self.numbers, np.angle(slips))
+        return np.asarray(np.where(slips == 0.0, self.numbers.real.mean(), numbers))  # rest has no direction
+
+    @cached_property
+    def numbers(self) -> Complex:
+        """Complex f + i f'."""
+        return np.array(self.factors) + 1j * np.array(self.slopes)
+
+
+@dataclass(frozen=True)
+class ForceTable:
+    """A force at the centre of mass in W that is bilinear between its places, and constant beyond the last.
+
+    Attributes:
+        x_forces, y_forces: rows along x of W, of numbers along y [N].
+        places: where they stand.
+    """
+
+    x_forces: Rows
+    y_forces: Rows
+    places: Places
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        """The force midway through the tick."""
+        px, py = state.p_WBcm_held.tolist()
+        force = complex(self.places.between(self.numbers, np.array([complex(px, py)]))[0])
+        return Wrench(fx=force.real, fy=force.imag, torque=0.0)
+
+    @cached_property
+    def numbers(self) -> Complex:
+        """Forces, x + iy [N]."""
+        return np.array(self.x_forces) + 1j * np.array(self.y_forces)
+
+
+@dataclass(frozen=True)
+class MotionTable:
+    """A force at the centre of mass along its velocity and across it, by the logarithm of its speed.
+
+    It is linear over the logarithm, constant above the fastest speed, and below the slowest in proportion to the
+    speed: what rests is not moved, and what creeps is held by a friction that is larger.
+
+    Attributes:
+        along: forces that drive [N]; below 0 where they brake.
+        across: forces to the left [N].
+        speeds: the first speed and the last, in equal steps of their logarithm.
+    """
+
+    along: Row
+    across: Row
+    speeds: Speeds
+
+    def wrench(self, state: ObjectState) -> Wrench:
+        """The mean force over the tick: of a speed that grows evenly or, below the slowest, by its own size.
+
+        The velocity turns by what the force across says and keeps its size; a brake never drives backwards.
+        """
+        v, slowest = complex(*state.v_WBcm.tolist()), self.speeds.slowest
+        speed = abs(v)
+        force = complex(self.speeds.between(self.numbers, np.array([speed]))[0])
+        change = state.span * force / (state.mass * max(speed, slowest))
+        grown = max(1.0 + change.real, 0.0) if speed > slowest else math.exp(change.real)
+        mean = state.mass / state.span * v * (grown * cmath.exp(1j * change.imag) - 1.0)
+        return Wrench(fx=mean.real, fy=mean.imag, torque=0.0)
+
+    @cached_property
+    def numbers(self) -> Complex:
+        """Forces, along + i across [N]."""
+        return np.array(self.along) + 1j * np.array(self.across)
+
+
+Law: TypeAlias = (
+    Tilt | Viscous | Quadratic | Spring | Attraction | ForceTable | MotionTable
+    | Falling | Ellipse | Patch | Gradient | PlaceTable | SpeedTable | HeadingTable
+)  # fmt: skip
 """What both integrators know."""
 
 

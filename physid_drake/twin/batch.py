@@ -7,7 +7,7 @@ import numpy as np
 from physid_drake.twin.compiled import compiled_outermost
 from physid_drake.twin.hand import places_of_knots
 from physid_drake.twin.rollout import STATE, roll
-from physid_drake.twin.stage import CONTACT, SOLVED
+from physid_drake.twin.stage import CONTACT, SOLVED, SPACES
 
 
 @compiled_outermost
@@ -51,7 +51,7 @@ def roll_all(
     points, weights, radii = base
     count = len(weights)
     px, py, mu, disc8 = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
-    room = (np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.zeros(14))
+    room = (np.empty((SPACES, count)), np.zeros(14))
     contact, solved, state = np.zeros(1, CONTACT), np.zeros(1, SOLVED), np.zeros(1, STATE)
     for k in range(len(bodies)):
         body = bodies[k]

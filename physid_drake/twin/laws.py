@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 
-from physid_drake.twin.compiled import compiled
-from physid_drake.twin.plane import copied, length
+from physid_drake.twin.compiled import compiled, compiled_inside
+from physid_drake.twin.plane import copied, length, within
 from physid_drake.twin.records import (
     ATTRACTION,
     ELLIPSE,
     FALLING,
     FORCE_TABLE,
     GRADIENT,
+    HEADING_TABLE,
+    MOTION_TABLE,
     PATCH,
     PLACE_TABLE,
     PUSH,
@@ -25,6 +27,7 @@ SMALLEST_DISC = 1e-9  # m
 CLOSEST = 1e-9  # m: a spring to where the object is has no direction
 CLOSEST_ATTRACTION = 1e-6  # m
 SLOWEST = 1e-9  # m/s: of whose logarithm a table is asked
+SOFTEST = 0.25  # of a factor: what resists at least, where a table of headings bends inwards
 
 
 @compiled
@@ -46,13 +49,26 @@ def share_inside(away, circle, disc):
 def on_table(law, first, x, y, tables):
     """Bilinear between the numbers of a table over places, and constant beyond its edge."""
     nx, ny = int(law.b), int(law.c)
-    u = min(max((x - law.d) / law.f, 0.0), nx - 1.0)
-    v = min(max((y - law.e) / law.g, 0.0), ny - 1.0)
-    i, j = min(int(u), max(nx - 2, 0)), min(int(v), max(ny - 2, 0))
-    du, dv, i1, j1 = u - i, v - j, min(i + 1, nx - 1), min(j + 1, ny - 1)
-    low = tables[first + i * ny + j] * (1.0 - dv) + tables[first + i * ny + j1] * dv
-    high = tables[first + i1 * ny + j] * (1.0 - dv) + tables[first + i1 * ny + j1] * dv
-    return low * (1.0 - du) + high * du
+    u, v = within((x - law.d) / law.f, nx - 1.0), within((y - law.e) / law.g, ny - 1.0)
+    i = int(u)
+    low = on_line(first + i * ny, ny, v, tables)
+    return low + (u - i) * (on_line(first + min(i + 1, nx - 1) * ny, ny, v, tables) - low)
+
+
+@compiled
+def on_line(first, count, u, tables):
+    """Linear between ``count`` numbers, at a place u within 0 and count - 1."""
+    i = int(u)
+    low = tables[first + i]
+    return low + (u - i) * (tables[first + min(i + 1, count - 1)] - low)
+
+
+@compiled
+def over_speed(law, first, square, tables):
+    """Linear over the logarithm of a speed, of which the square is given [m^2/s^2], and constant beyond both ends."""
+    count = int(law.b)
+    logarithm = 0.5 * math.log(max(square, SLOWEST * SLOWEST))
+    return on_line(first, count, within((logarithm - law.c) / law.d, count - 1.0), tables)
 
 
 @compiled
@@ -103,11 +119,75 @@ def friction_by_speed(laws, tables, px, py, vx, vy, spin, mu, into):
 def _by_speed(law, tables, square):
     if law.kind == FALLING:
         return 1.0 + law.a * math.exp(-square / (law.b * law.b))
-    count = int(law.b)
-    u = min(max((0.5 * math.log(max(square, SLOWEST * SLOWEST)) - law.c) / law.d, 0.0), count - 1.0)
-    i = min(int(u), max(count - 2, 0))
-    j, first = min(i + 1, count - 1), int(law.a)
-    return tables[first + i] * (1.0 - (u - i)) + tables[first + j] * (u - i)
+    return over_speed(law, int(law.a), square, tables)
+
+
+@compiled
+def has(laws, kind):
+    """Whether there is a law of a kind."""
+    found = False
+    for law in laws:
+        found = found or law.kind == kind
+    return found
+
+
+@compiled
+def friction_by_heading(laws, tables, px, py, vx, vy, spin, yaw, mu, along, across, stiff):
+    """What the laws make of the coefficients (n,) of points by the heading of their slip.
+
+    Args:
+        laws, tables: records, numbers.
+        px, py: (n,) points from Bcm in B [m].
+        vx, vy, spin: of Bcm in B [m/s, rad/s].
+        yaw: of B in W [rad].
+        mu: (n,) without them.
+        along, across: (n,) of the friction that brakes, and of that which turns to the left of it; filled in.
+        stiff: (n,) of what resists a change of velocity across the slip; filled in.
+    """
+    copied(mu, along)
+    copied(mu, stiff)
+    across[:] = 0.0
+    for law in laws:
+        if law.kind == HEADING_TABLE:
+            first, count = int(law.a), int(law.b)
+            for i in range(len(px)):
+                heading = yaw + math.atan2(vy + spin * px[i], vx - spin * py[i])
+                factor, turn, bend = _by_heading(tables, first, count, heading / (2.0 * math.pi))
+                along[i], across[i] = along[i] * factor - across[i] * turn, along[i] * turn + across[i] * factor
+                along[i] = max(along[i], 0.0)
+                stiff[i] *= max(factor + bend, SOFTEST * factor)
+
+
+@compiled_inside
+def _by_heading(tables, first, count, turns):
+    """A factor, its slope, and that slope's own, at an angle in W of so many whole turns."""
+    u = within((turns - math.floor(turns)) * count, float(count))
+    part = u - int(u)
+    i = int(u) if u < count else 0
+    j = i + 1 if i + 1 < count else 0
+    factor, turn = tables[first + i], tables[first + count + i]
+    bend = tables[first + count + j] - turn
+    return factor + part * (tables[first + j] - factor), turn + part * bend, bend * count / (2.0 * math.pi)
+
+
+@compiled
+def least_friction(laws, tables):
+    """The least factor by which the laws of slip change the friction of what begins to slip."""
+    least = 1.0
+    for law in laws:
+        if law.kind == ELLIPSE:
+            least *= math.sqrt(min(law.a, 1.0 / law.a))
+        elif law.kind == FALLING:
+            least *= 1.0 + law.a
+        elif law.kind == SPEED_TABLE:
+            least *= tables[int(law.a)]
+        elif law.kind == HEADING_TABLE:
+            first = int(law.a)
+            lowest = tables[first]
+            for i in range(int(law.b)):
+                lowest = min(lowest, tables[first + i])
+            least *= lowest
+    return least
 
 
 @compiled
@@ -153,6 +233,33 @@ def force_by_place(laws, tables, x, y):
             fx += on_table(law, int(law.a), x, y, tables)
             fy += on_table(law, int(law.a + law.b * law.c), x, y, tables)
     return fx, fy
+
+
+@compiled
+def force_by_motion(laws, tables, vx, vy):
+    """Force at Bcm along its velocity and across it, and how it resists a change of that: fx, fy, xx, xy, yy.
+
+    Only brakes resist, below their slowest speed along the velocity and across it, above it across it.
+
+    Args:
+        laws, tables: records, numbers.
+        vx, vy: in any frame that is turned about the vertical [m/s].
+    """
+    fx = fy = xx = xy = yy = 0.0
+    square = vx * vx + vy * vy
+    for law in laws:
+        if law.kind == MOTION_TABLE:
+            speed = max(math.sqrt(square), law.e)
+            along = over_speed(law, int(law.a), square, tables) / speed
+            across = over_speed(law, int(law.a + law.b), square, tables) / speed
+            fx += along * vx - across * vy
+            fy += along * vy + across * vx
+            brake = max(0.0, -along)
+            bent = brake / square if square > law.e * law.e else 0.0
+            xx += brake - bent * vx * vx
+            xy -= bent * vx * vy
+            yy += brake - bent * vy * vy
+    return fx, fy, xx, xy, yy
 
 
 @compiled

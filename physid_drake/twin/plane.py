@@ -19,6 +19,12 @@ def turned_back(c, s, x, y):
     return c * x + s * y, c * y - s * x
 
 
+@compiled_inside
+def within(value, last):
+    """A place between 0 and ``last``; 0 of what is no number, so that no table is read beyond its end."""
+    return min(value, last) if value > 0.0 else 0.0
+
+
 @compiled
 def copied(values, into):
     """Copy (n,) values."""

@@ -39,6 +39,7 @@ PLACE_TABLE = 3  # bilinear: a: first number; b, c: counts along x, y; d, e: fir
 ELLIPSE = 4  # a: ratio of the coefficients on its axes; b: angle of the slippery one [rad]; c: 1: fixed in the object
 FALLING = 5  # 1 + a exp(-(slip / b)^2), b in m/s
 SPEED_TABLE = 6  # linear over ln(slip): a: first number; b: count; c: first ln(m/s); d: step
+HEADING_TABLE = 7  # by the slip's heading in W: a: first number; b: count, of factors and then of their slopes
 # Forces at Bcm in W.
 PUSH = 16  # a, b: N
 VISCOUS = 17  # -a v, and a torque -b w: N s/m, N m s
@@ -46,3 +47,4 @@ QUADRATIC = 18  # -a v |v|: N s^2/m^2
 SPRING = 19  # to b, c [m], a [N/m] times what exceeds the length d [m]
 ATTRACTION = 20  # to b, c [m]: a / (distance^2 + d^2), a in N m^2
 FORCE_TABLE = 21  # two bilinear tables over the table, of fx and then of fy [N]: numbers as of PLACE_TABLE
+MOTION_TABLE = 22  # along the velocity and then across it [N], over ln(speed): numbers as of SPEED_TABLE; e: slowest

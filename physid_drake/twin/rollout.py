@@ -8,9 +8,9 @@ import numpy as np
 
 from physid_drake.twin.compiled import compiled
 from physid_drake.twin.hand import gap_between, hand_at
-from physid_drake.twin.laws import force_by_place, friction_by_place
+from physid_drake.twin.laws import force_by_place, friction_by_place, least_friction
 from physid_drake.twin.plane import largest, length, product
-from physid_drake.twin.stage import solve_stage
+from physid_drake.twin.stage import MU, solve_stage
 from physid_drake.twin.support import CREEP, LEAVES_ALL, TURNS_WITHIN, moments
 from physid_drake.twin.swing import strongest, swing_after, swing_at_rest
 from physid_drake.twin.tip import contact_at, part, tip_after, tip_at
@@ -101,7 +101,7 @@ def _begin(body, object_, hand, start, room, state, solved, counts):
     for i in range(len(px)):
         disc8[i] = (LEAVES_ALL * radii[i]) ** 8
         body.reach = max(body.reach, length(px[i], py[i]) + TURNS_WITHIN * radii[i])
-    sums = room[-1]
+    _, sums = room
     moments(px, py, w, sums[:6])
     sums[12], sums[13] = largest(px), largest(py)
     c, s = math.cos(start[2]), math.sin(start[2])
@@ -131,8 +131,10 @@ def _rest(body, object_, hand, laws, tables, room, state, limit):
     pull = length(fx, fy) + strongest(body, state)
     if pull > 0.0:
         px, py, w, mu0, radii, _, _ = object_
-        friction_by_place(laws, tables, px, py, radii, state.x, state.y, state.yaw, mu0, room[0])
-        if pull > HELD * body.weight * product(w, room[0]) / room[-1][0]:
+        space, sums = room
+        friction_by_place(laws, tables, px, py, radii, state.x, state.y, state.yaw, mu0, space[MU])
+        held = HELD * least_friction(laws, tables)
+        if pull > held * body.weight * product(w, space[MU]) / sums[0]:
             return -1.0
     times, places, velocities = hand
     swings = body.tip_stiffness > 0.0 and len(times) > 0

@@ -8,8 +8,18 @@ import numpy as np
 
 from physid_drake.twin.compiled import compiled, compiled_inside
 from physid_drake.twin.contact import resting_contact
-from physid_drake.twin.laws import drags, ellipse, force_by_place, friction_by_place, friction_by_speed
+from physid_drake.twin.laws import (
+    drags,
+    ellipse,
+    force_by_motion,
+    force_by_place,
+    friction_by_heading,
+    friction_by_place,
+    friction_by_speed,
+    has,
+)
 from physid_drake.twin.plane import copied, differ, length, turned_back
+from physid_drake.twin.records import HEADING_TABLE
 from physid_drake.twin.support import (
     CREEP,
     MOST_CHANGES,
@@ -18,6 +28,7 @@ from physid_drake.twin.support import (
     moments,
     plane_of_loads,
     round_grips,
+    soften,
     torque_of_discs,
     unloaded_friction,
     unloading,
@@ -27,6 +38,10 @@ from physid_drake.twin.swing import pull_of, torque_of
 MOST_ROUNDS = 60  # of Newton's method
 STUCK = 12  # rounds after which it begins anew from rest
 CONVERGED = 1e-8  # m/s
+# Rows of the space for the points: friction by place, loaded weights, friction by speed, `grips`, of friction by
+# heading what is along the slip, what is across it and what of it resists, and loads.
+MU, LOADED, FAST, GRIP, SOFT, ALONG, ACROSS, STIFF, PRESSED = range(9)
+SPACES = 9
 CONTACT = np.dtype([(name, np.float64) for name in (
     "touching", "nx", "ny", "rx", "ry",  # normal from tip to object and arm from Bcm, in W
     "vx", "vy",                          # of the tip, were there no contact
@@ -55,8 +70,8 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
         body: record of object and tip.
         object_: (px, py, w, mu, radii, disc8, edges) of the support points about Bcm, and the outline.
         laws, tables: the vocabulary's.
-        room: (n,) space for friction, for loaded weights, for friction at speed and for `grips`, and (14,) for sums
-            of moments: of all points, of the loaded ones, and how far points are along x and y at most.
+        room: (SPACES, n) space for the points, and (14,) for sums of moments: of all points, of the loaded ones, and
+            how far points are along x and y at most.
         h: length of the stage [s].
         x, y, yaw: of Bcm at its end [m, rad].
         ax, ay, spin0: velocity at its start, in W.
@@ -64,15 +79,15 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
         contact: record of `CONTACT`.
         solved: record of `SOLVED`; holds the guess, and afterwards what was found.
     """
-    px, py, w, mu0, radii, _, _ = object_
-    mu, loaded, fast, grip, soft, _ = room
+    px, py, _, mu0, radii, _, _ = object_
     c, s = math.cos(yaw), math.sin(yaw)
-    friction_by_place(laws, tables, px, py, radii, x, y, yaw, mu0, mu)
+    friction_by_place(laws, tables, px, py, radii, x, y, yaw, mu0, room[0][MU])
     oval = ellipse(laws, yaw)
     wx, wy = force_by_place(laws, tables, x, y)
     swing_x, swing_y, swing_drag = pull_of(body, h, swing, spin0)
     ex, ey = turned_back(c, s, wx + swing_x, wy + swing_y)
     linear, turning_drag, quadratic = drags(laws)
+    headed = has(laws, HEADING_TABLE)
     arms = turned_back(c, s, body.swing_load * swing[0], body.swing_load * swing[1])
     vx, vy = turned_back(c, s, solved.vx, solved.vy)
     spin = solved.spin
@@ -84,27 +99,20 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
     full, before, pn, again, rounds = 1.0, np.inf, 0.0, False, 0
     solved.converged = 0.0
     for rounds in range(1, MOST_ROUNDS + 1):
-        turns8 = spin**8 if vx * vx + vy * vy < (spin * body.reach) ** 2 else 0.0
-        now = fast if friction_by_speed(laws, tables, px, py, vx, vy, spin, mu, fast) else mu
-        _grips(object_, vx, vy, spin, turns8, oval, grip, soft)
-        _balance(body, object_, room, now, vx, vy, spin, oval, hx, hy, arms, solved)
-        carrying = loaded if solved.partly > 0.0 else w
-        fx, fy, torque, xx, xy, yy, xw, yw, ww = friction(
-            px, py, carrying, now, grip, soft, vx, vy, spin, oval[0], oval[1], oval[2],
-            solved.p0, solved.px, solved.py, full,
-        )  # fmt: skip
-        if turns8 > 0.0:
-            torque -= _torque_within(body, object_, now, carrying, vx, vy, spin, solved)
+        fx, fy, torque, xx, xy, yy, xw, yw, ww = _friction(
+            body, object_, laws, tables, room, headed, yaw, vx, vy, spin, oval, hx, hy, arms, solved, full
+        )
         torque += torque_of(body, swing, c * vx - s * vy, s * vx + c * vy, spin)
         drag = linear + quadratic * length(vx, vy) + swing_drag
+        mx, my, mxx, mxy, myy = force_by_motion(laws, tables, vx, vy)
         inverse = _inverse(
-            body.mass + h * (xx + drag), h * xy, h * xw, body.mass + h * (yy + drag), h * yw,
+            body.mass + h * (xx + mxx + drag), h * (xy + mxy), h * xw, body.mass + h * (yy + myy + drag), h * yw,
             body.inertia + h * (ww + turning_drag),
         )  # fmt: skip
         d0, d1, d2 = _times(
             inverse,
-            h * (fx + ex - drag * vx) + body.mass * (bx - vx),
-            h * (fy + ey - drag * vy) + body.mass * (by - vy),
+            h * (fx + mx + ex - drag * vx) + body.mass * (bx - vx),
+            h * (fy + my + ey - drag * vy) + body.mass * (by - vy),
             h * (torque - turning_drag * spin) + body.inertia * (spin0 - spin),
         )  # fmt: skip
         fhx = fhy = 0.0
@@ -131,6 +139,42 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
 
 
 @compiled_inside
+def _friction(body, object_, laws, tables, room, headed, yaw, vx, vy, spin, oval, hx, hy, arms, solved, full):
+    """`friction` at a velocity in B, under the plane of loads that balances it and a tip's force (hx, hy) there.
+
+    ``headed`` says whether friction is by the heading of the slip; ``arms`` and ``full`` are as of `_balance` and
+    `friction`.
+    """
+    px, py, w, _, _, _, _ = object_
+    space, _ = room
+    turns8 = spin**8 if vx * vx + vy * vy < (spin * body.reach) ** 2 else 0.0
+    mu = space[FAST] if friction_by_speed(laws, tables, px, py, vx, vy, spin, space[MU], space[FAST]) else space[MU]
+    stiff = mu
+    if headed:
+        friction_by_heading(laws, tables, px, py, vx, vy, spin, yaw, mu, space[ALONG], space[ACROSS], space[STIFF])
+        mu, stiff = space[ALONG], space[STIFF]
+    _grips(object_, vx, vy, spin, turns8, oval, space[GRIP], space[SOFT])
+    if headed:
+        soften(px, py, vx, vy, spin, oval[0], oval[1], oval[2], mu, stiff, space[SOFT])
+    _balance(body, object_, room, headed, mu, vx, vy, spin, oval, hx, hy, arms, solved)
+    carrying = space[LOADED] if solved.partly > 0.0 else w
+    fx, fy, torque, xx, xy, yy, xw, yw, ww = friction(
+        px, py, carrying, stiff, space[GRIP], space[SOFT], vx, vy, spin, oval[0], oval[1], oval[2],
+        solved.p0, solved.px, solved.py, full,
+    )  # fmt: skip
+    if headed:
+        fx, fy, torque, _, _, _, _, _, _ = friction(
+            px, py, carrying, mu, space[GRIP], space[SOFT], vx, vy, spin, oval[0], oval[1], oval[2],
+            solved.p0, solved.px, solved.py, full,
+        )  # fmt: skip
+        left_x, left_y, left_torque = _friction_to_the_left(object_, space, carrying, vx, vy, spin, oval, solved)
+        fx, fy, torque = fx + left_x, fy + left_y, torque + left_torque
+    if turns8 > 0.0:
+        torque -= _torque_within(body, object_, mu, carrying, vx, vy, spin, solved)
+    return fx, fy, torque, xx, xy, yy, xw, yw, ww
+
+
+@compiled_inside
 def _grips(object_, vx, vy, spin, turns8, oval, grip, soft):
     """`grips`, or those of a circle that does not turn about a place near."""
     px, py, _, _, _, disc8, _ = object_
@@ -138,6 +182,27 @@ def _grips(object_, vx, vy, spin, turns8, oval, grip, soft):
         round_grips(px, py, vx, vy, spin, grip, soft)
     else:
         grips(px, py, vx, vy, spin, disc8, turns8, oval[0], oval[1], oval[2], grip, soft)
+
+
+@compiled_inside
+def _friction_to_the_left(object_, space, carrying, vx, vy, spin, oval, solved):
+    """Force and torque of what friction has to the left of where it brakes, under the plane of loads."""
+    px, py, _, _, _, _, _ = object_
+    pressed = space[PRESSED]
+    for i in range(len(px)):
+        pressed[i] = carrying[i] * (solved.p0 + solved.px * px[i] + solved.py * py[i])
+    gx0, _, gx2, gy0, gy1, _ = _unloaded_to_the_left(object_, space, pressed, vx, vy, spin, oval)
+    return -gx0, -gy0, gx2 - gy1
+
+
+@compiled_inside
+def _unloaded_to_the_left(object_, space, carrying, vx, vy, spin, oval):
+    """The same per load: as `unloaded_friction`."""
+    px, py, _, _, _, _, _ = object_
+    gx0, gx1, gx2, gy0, gy1, gy2 = unloaded_friction(
+        px, py, carrying, space[ACROSS], space[GRIP], vx, vy, spin, oval[0], oval[1], oval[2]
+    )
+    return -gy0, -gy1, -gy2, gx0, gx1, gx2
 
 
 @compiled_inside
@@ -149,18 +214,22 @@ def _torque_within(body, object_, mu, carrying, vx, vy, spin, solved):
 
 
 @compiled_inside
-def _balance(body, object_, room, mu, vx, vy, spin, oval, hx, hy, arms, solved):
+def _balance(body, object_, room, headed, mu, vx, vy, spin, oval, hx, hy, arms, solved):
     """The plane of loads for a velocity and a tip's force (hx, hy) in B: into ``solved``, and which points carry.
 
-    ``arms`` are the moments of a weight that has moved [N m].
+    ``arms`` are the moments of a weight that has moved [N m]; ``headed`` says whether friction is by heading.
     """
     px, py, w, _, _, _, _ = object_
-    _, loaded, _, grip, _, sums = room
+    space, sums = room
+    loaded = space[LOADED]
     partly = solved.partly > 0.0
     solved.tipped = 1.0
     for _ in range(MOST_CHANGES):
         carrying = loaded if partly else w
-        g = unloaded_friction(px, py, carrying, mu, grip, vx, vy, spin, oval[0], oval[1], oval[2])
+        g = unloaded_friction(px, py, carrying, mu, space[GRIP], vx, vy, spin, oval[0], oval[1], oval[2])
+        if headed:
+            a = _unloaded_to_the_left(object_, space, carrying, vx, vy, spin, oval)
+            g = (g[0] + a[0], g[1] + a[1], g[2] + a[2], g[3] + a[3], g[4] + a[4], g[5] + a[5])
         stands, p0, p1, p2 = plane_of_loads(
             sums[6:12] if partly else sums[:6],
             g,

@@ -12,6 +12,7 @@ from physid_drake.twin.compiled import compiled, compiled_inside, compiled_sum
 CREEP = 1e-5  # m/s: slip at which friction fades
 MOST_CHANGES = 25  # of the set of points that carry something
 SINGULAR = 1e-12
+NO_SLIP2 = 1e-30  # m^2/s^2: of slip that has no direction
 # Slip that turns about a place within what a point stands for: see physid_drake.cell.turning.
 LEAVES_ALL, OWN_ARM, OWN_TORQUE = 1.1, 0.35, 1.2
 TURNS_WITHIN = 2.0  # of the radius of what a point stands for, beyond the outermost points
@@ -61,6 +62,22 @@ def grips(x, y, vx, vy, spin, disc8, turns8, mxx, mxy, myy, grip, soft):
         d8 = disc8[i] * turns8 + s8
         grip[i] = math.sqrt(s2 / (u2 * math.sqrt(math.sqrt(d8))))
         soft[i] = s8 / (d8 * u2)
+
+
+@compiled
+def soften(x, y, vx, vy, spin, mxx, mxy, myy, mu, stiff, soft):
+    """Correct `grips` so that friction with coefficients ``stiff`` has the slope along the slip of that with ``mu``.
+
+    Args:
+        x, y, vx, vy, spin, mxx, mxy, myy, soft: as of `grips`.
+        mu: (n,) coefficients of what brakes [-].
+        stiff: (n,) of what resists a change across the slip [-].
+    """
+    for i in range(len(x)):
+        if stiff[i] != mu[i]:
+            sx, sy = vx - spin * y[i], vy + spin * x[i]
+            u2 = mxx * sx * sx + 2.0 * mxy * sx * sy + myy * sy * sy
+            soft[i] = (1.0 - (1.0 - soft[i] * u2) * mu[i] / stiff[i]) / max(u2, NO_SLIP2)
 
 
 @compiled_sum

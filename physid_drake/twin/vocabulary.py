@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
@@ -12,23 +13,34 @@ from physid_drake.cell.laws import (
     Attraction,
     Ellipse,
     Falling,
+    ForceTable,
     Gradient,
+    HeadingTable,
     Law,
+    MotionTable,
     Patch,
+    PlaceTable,
     Quadratic,
+    SpeedTable,
     Spring,
     Tilt,
     Viscous,
 )
+from physid_drake.cell.tables import Places, Speeds
 from physid_drake.twin.records import (
     ATTRACTION,
     ELLIPSE,
     FALLING,
+    FORCE_TABLE,
     GRADIENT,
+    HEADING_TABLE,
     LAW,
+    MOTION_TABLE,
     PATCH,
+    PLACE_TABLE,
     PUSH,
     QUADRATIC,
+    SPEED_TABLE,
     SPRING,
     VISCOUS,
 )
@@ -48,8 +60,28 @@ _KINDS: Final[dict[type, tuple[int, Callable[[Any], tuple[float, ...]]]]] = {
 }
 
 
+def _of_places(law: PlaceTable | ForceTable) -> tuple[float, ...]:
+    places: Places = law.places
+    return (*law.numbers.shape, places.x, places.y, places.step_x, places.step_y)
+
+
+def _of_speeds(law: SpeedTable | MotionTable) -> tuple[float, ...]:
+    speeds: Speeds = law.speeds
+    return len(law.numbers), math.log(speeds.slowest), speeds.step(len(law.numbers)), speeds.slowest
+
+
+_TABLES: Final[dict[type, tuple[int, Callable[[Any], tuple[float, ...]]]]] = {
+    PlaceTable: (PLACE_TABLE, _of_places),
+    ForceTable: (FORCE_TABLE, _of_places),
+    SpeedTable: (SPEED_TABLE, _of_speeds),
+    MotionTable: (MOTION_TABLE, _of_speeds),
+    HeadingTable: (HEADING_TABLE, lambda law: (len(law.numbers),)),
+}
+"""What their records hold behind the place of their first number."""
+
+
 def by_place(law: Law) -> bool:
-    """Whether friction changes within the base by where it is on the table."""
+    """Whether friction changes within the base by where it is on the table: at an edge, and not smoothly."""
     return isinstance(law, Patch)
 
 
@@ -59,14 +91,40 @@ def records_of(sets: Sequence[tuple[Sequence[Law], float]]) -> tuple[NDArray[np.
     Args:
         sets: the laws of each rollout, and the weight on the table [N].
     """
-    rows = [_row(law, weight) for laws, weight in sets for law in laws]
+    numbers = _Numbers()
+    rows = [_row(law, weight, numbers) for laws, weight in sets for law in laws]
     padded = [(kind, *values, *(0.0,) * (8 - len(values))) for kind, values in rows]
-    return np.array(padded, dtype=LAW), np.cumsum([0, *(len(laws) for laws, _ in sets)]), np.zeros(1)
+    return np.array(padded, dtype=LAW), np.cumsum([0, *(len(laws) for laws, _ in sets)]), numbers.together()
 
 
-def _row(law: Law, weight: float) -> tuple[int, tuple[float, ...]]:
+class _Numbers:
+    """The numbers of tables, one after the other; of a table that several rollouts share, once."""
+
+    def __init__(self) -> None:
+        self._parts, self._count = [np.zeros(1)], 1
+        self._firsts: dict[int, int] = {}
+
+    def first_of(self, table: Any) -> int:
+        """Where a table's numbers begin; of complex ones the real parts, then the imaginary ones."""
+        if id(table) not in self._firsts:
+            values = table.numbers.ravel()
+            parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
+            self._firsts[id(table)] = self._count
+            self._parts += parts
+            self._count += sum(map(len, parts))
+        return self._firsts[id(table)]
+
+    def together(self) -> Array:
+        """All of them; at least one."""
+        return np.concatenate(self._parts) if len(self._parts) > 1 else self._parts[0]
+
+
+def _row(law: Law, weight: float, numbers: _Numbers) -> tuple[int, tuple[float, ...]]:
     if isinstance(law, Tilt):  # the one that is in shares of the weight
         return PUSH, (weight * law.x, weight * law.y)
+    if type(law) in _TABLES:
+        kind, values = _TABLES[type(law)]
+        return kind, (numbers.first_of(law), *values(law))
     try:
         kind, values = _KINDS[type(law)]
     except KeyError:
