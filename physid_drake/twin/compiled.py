@@ -19,6 +19,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _SUMS: Final = {"nnan", "contract", "reassoc", "arcp", "nsz", "afn"}
 """What sums over support points may do for speed: change the order of terms. No number in them is infinite."""
+_WITHIN: Final = {"_nrt": False, "no_cfunc_wrapper": True}
+"""Of functions that compiled ones call: they count no users of arrays, and C cannot call them."""
 REVISION: Final = re.compile("[0-9a-f]{16}")
 _KEPT: Final = 3  # revisions whose machine code is kept
 
@@ -33,17 +35,17 @@ def compiled(function: F) -> F:
 
     A division by zero gives what IEEE says, so that loops can use vectors.
     """
-    return _compiled(function, error_model="numpy", _nrt=False)
+    return _compiled(function, error_model="numpy", **_WITHIN)
 
 
 def compiled_inside(function: F) -> F:
     """The same of what is called often: it becomes a part of what calls it, which hands over no tuples of arrays."""
-    return _compiled(function, error_model="numpy", _nrt=False, forceinline=True)
+    return _compiled(function, error_model="numpy", forceinline=True, **_WITHIN)
 
 
 def compiled_sum(function: F) -> F:
     """The same of a sum over points, whose terms may be added in another order."""
-    return _compiled(function, error_model="numpy", _nrt=False, fastmath=_SUMS)
+    return _compiled(function, error_model="numpy", fastmath=_SUMS, **_WITHIN)
 
 
 @cache

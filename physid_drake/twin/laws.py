@@ -132,14 +132,12 @@ def has(laws, kind):
 
 
 @compiled
-def friction_by_heading(laws, tables, px, py, vx, vy, spin, yaw, mu, along, across, stiff):
+def friction_by_heading(laws, tables, turns, mu, along, across, stiff):
     """What the laws make of the coefficients (n,) of points by the heading of their slip.
 
     Args:
         laws, tables: records, numbers.
-        px, py: (n,) points from Bcm in B [m].
-        vx, vy, spin: of Bcm in B [m/s, rad/s].
-        yaw: of B in W [rad].
+        turns: (n,) headings in W, in whole turns.
         mu: (n,) without them.
         along, across: (n,) of the friction that brakes, and of that which turns to the left of it; filled in.
         stiff: (n,) of what resists a change of velocity across the slip; filled in.
@@ -150,9 +148,8 @@ def friction_by_heading(laws, tables, px, py, vx, vy, spin, yaw, mu, along, acro
     for law in laws:
         if law.kind == HEADING_TABLE:
             first, count = int(law.a), int(law.b)
-            for i in range(len(px)):
-                heading = yaw + math.atan2(vy + spin * px[i], vx - spin * py[i])
-                factor, turn, bend = _by_heading(tables, first, count, heading / (2.0 * math.pi))
+            for i in range(len(turns)):
+                factor, turn, bend = _by_heading(tables, first, count, turns[i])
                 along[i], across[i] = along[i] * factor - across[i] * turn, along[i] * turn + across[i] * factor
                 along[i] = max(along[i], 0.0)
                 stiff[i] *= max(factor + bend, SOFTEST * factor)

@@ -60,7 +60,8 @@ def roll(body, object_, hand, start, laws, tables, times, poses, forces, counts,
         room, contact, solved, state: space for the work.
     """
     _begin(body, object_, hand, start, room, state, solved, counts)
-    knots, done, knot, loops = hand[0], 0, 0, 0
+    knots, knot, loops = hand[0], 0, 0
+    done = np.int64(0)  # of a plain 0, which has a type of its own, `_step` would be compiled once more
     while done < len(times) and state.t < body.end + AT_KNOT:
         loops += 1
         if loops > MOST_STEPS:

@@ -25,6 +25,7 @@ from physid_drake.twin.support import (
     MOST_CHANGES,
     friction,
     grips,
+    headings,
     moments,
     plane_of_loads,
     round_grips,
@@ -39,9 +40,9 @@ MOST_ROUNDS = 60  # of Newton's method
 STUCK = 12  # rounds after which it begins anew from rest
 CONVERGED = 1e-8  # m/s
 # Rows of the space for the points: friction by place, loaded weights, friction by speed, `grips`, of friction by
-# heading what is along the slip, what is across it and what of it resists, and loads.
-MU, LOADED, FAST, GRIP, SOFT, ALONG, ACROSS, STIFF, PRESSED = range(9)
-SPACES = 9
+# heading these, what is along the slip, what is across it and what of it resists, and loads.
+MU, LOADED, FAST, GRIP, SOFT, TURNS, ALONG, ACROSS, STIFF, PRESSED = range(10)
+SPACES = 10
 CONTACT = np.dtype([(name, np.float64) for name in (
     "touching", "nx", "ny", "rx", "ry",  # normal from tip to object and arm from Bcm, in W
     "vx", "vy",                          # of the tip, were there no contact
@@ -151,7 +152,8 @@ def _friction(body, object_, laws, tables, room, headed, yaw, vx, vy, spin, oval
     mu = space[FAST] if friction_by_speed(laws, tables, px, py, vx, vy, spin, space[MU], space[FAST]) else space[MU]
     stiff = mu
     if headed:
-        friction_by_heading(laws, tables, px, py, vx, vy, spin, yaw, mu, space[ALONG], space[ACROSS], space[STIFF])
+        headings(px, py, vx, vy, spin, yaw, space[TURNS])
+        friction_by_heading(laws, tables, space[TURNS], mu, space[ALONG], space[ACROSS], space[STIFF])
         mu, stiff = space[ALONG], space[STIFF]
     _grips(object_, vx, vy, spin, turns8, oval, space[GRIP], space[SOFT])
     if headed:
