@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +33,18 @@ class HandPath:
     pieces: int = 1
 
     def knot_positions(self) -> Array:
-        """Positions (k, 2) at the knots [m]."""
+        """Positions (k, 2) at the knots [m]; not to be written to."""
+        return self._knot_positions
+
+    @cached_property
+    def _knot_positions(self) -> Array:
         steps: Array = np.diff(self.times)[:, None] * 0.5 * (self.velocities[1:] + self.velocities[:-1])
         positions: Array = self.start + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
         return positions
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what was kept for speed: equal paths have equal pickles, which name their rollouts."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def heading(self) -> float:

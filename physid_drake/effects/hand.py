@@ -182,16 +182,22 @@ def _velocities(path: HandPath, times: Array) -> Array:
 
 def _lagged(times: Array, values: Array, constant: float) -> Array:
     """First-order lag of values (n, k) that are linear between times (n,): exact over each piece."""
-    result = values.copy()
     if constant <= 0.0:
-        return result
-    for k in range(1, len(times)):
-        h = times[k] - times[k - 1]
-        decay = math.exp(-h / constant)
-        slope = (values[k] - values[k - 1]) / h
-        # y' = (u - y) / T with u linear: y = u - T u' + (y0 - u0 + T u') exp(-h / T).
-        result[k] = values[k] - constant * slope + decay * (result[k - 1] - values[k - 1] + constant * slope)
-    return result
+        return values.copy()
+    spans = np.diff(times)[:, None]
+    decays = np.exp(-spans / constant)
+    # y' = (u - y) / T with u linear: y = u - T u' + (y0 - u0 + T u') exp(-h / T).
+    behind = constant * np.diff(values, axis=0) / spans
+    fresh = values[1:] - behind - decays * (values[:-1] - behind)
+    # One number after the other, which plain floats do faster than arrays.
+    columns = []
+    for first, column in zip(values[0].tolist(), fresh.T.tolist(), strict=True):
+        column_of, last = [first], first
+        for decay, new in zip(decays[:, 0].tolist(), column, strict=True):
+            last = decay * last + new
+            column_of.append(last)
+        columns.append(column_of)
+    return np.array(columns).T
 
 
 def _path_through(times: Array, start: Array, velocities: Array) -> HandPath:

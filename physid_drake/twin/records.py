@@ -26,6 +26,9 @@ BODY: Final = np.dtype([(name, np.float64) for name in (
     "swing_load",        # of the weight that moves with it [N]
     "reach",             # from Bcm, within which slip may turn about a place [m]; the rollout fills it in
     "begin", "end",      # [s]
+    "wander_middle", "wander_width",   # when frictions differ most, and how long before and after at all [s]
+    "wander_support", "wander_hand",   # by which share then: with the table, and at the tip
+    "rough", "grip",     # those frictions' factors in a stage; the rollout fills them in
 )])  # fmt: skip
 """The object and the hand's tip in one rollout."""
 

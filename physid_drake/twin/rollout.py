@@ -251,6 +251,7 @@ def _two_stages(body, object_, hand, laws, tables, counts, room, contact, solved
     ya = state.y + g * (vy + 0.5 * g * state.ay)
     yawa = state.yaw + g * (spin + 0.5 * g * state.aspin)
     tip0 = (state.ex, state.ey, state.ux, state.uy)
+    _wander(body, state.t + g)
     contact_at(body, edges, hand, state.t + g, g, xa, ya, yawa, tip0, state.ux, state.uy, touching, contact)
     swing0 = (state.dx, state.dy, state.wx, state.wy)
     solve_stage(body, object_, laws, tables, room, g, xa, ya, yawa, vx, vy, spin, swing0, contact, solved)
@@ -274,6 +275,7 @@ def _two_stages(body, object_, hand, laws, tables, counts, room, contact, solved
         state.wx + rest / g * (swinga[2] - state.wx), state.wy + rest / g * (swinga[3] - state.wy),
     )  # fmt: skip
     later_x, later_y = state.ux + (tipa[2] - state.ux) / GAMMA, state.uy + (tipa[3] - state.uy) / GAMMA
+    _wander(body, state.t + h)
     contact_at(body, edges, hand, state.t + h, g, xb, yb, yawb, tips, later_x, later_y, touching, contact)
     solve_stage(
         body, object_, laws, tables, room, g, xb, yb, yawb,
@@ -300,6 +302,13 @@ def _two_stages(body, object_, hand, laws, tables, counts, room, contact, solved
         swingb,
         error,
     )
+
+
+@compiled
+def _wander(body, t):
+    """Frictions at a time [s]: a share more or less in the middle of a while, less before and after."""
+    share = max(0.0, 1.0 - abs(t - body.wander_middle) / body.wander_width)
+    body.rough, body.grip = 1.0 + share * body.wander_support, 1.0 + share * body.wander_hand
 
 
 @compiled

@@ -83,6 +83,9 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
     px, py, _, mu0, radii, _, _ = object_
     c, s = math.cos(yaw), math.sin(yaw)
     friction_by_place(laws, tables, px, py, radii, x, y, yaw, mu0, room[0][MU])
+    if body.rough != 1.0:
+        for i in range(len(px)):
+            room[0][MU, i] *= body.rough
     oval = ellipse(laws, yaw)
     wx, wy = force_by_place(laws, tables, x, y)
     swing_x, swing_y, swing_drag = pull_of(body, h, swing, spin0)
@@ -119,7 +122,7 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
         fhx = fhy = 0.0
         if touching:
             d0, d1, d2, pn, pt = _held(
-                tip, inverse, vx + d0, vy + d1, spin + d2, d0, d1, d2, contact.gives, body.hand_friction
+                tip, inverse, vx + d0, vy + d1, spin + d2, d0, d1, d2, contact.gives, body.grip * body.hand_friction
             )
             fhx, fhy = (tip[0] * pn - tip[1] * pt) / h, (tip[1] * pn + tip[0] * pt) / h
         moved = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2 * size * size)

@@ -25,15 +25,34 @@ from physid_drake.twin.batch import roll_all
 from physid_drake.twin.compiled import drop_cache
 from physid_drake.twin.records import BODY
 from physid_drake.twin.rollout import COUNTS, DIVERGED, STUCK
-from physid_drake.twin.vocabulary import by_place, records_of
+from physid_drake.twin.vocabulary import records_of
 
 Array = NDArray[np.float64]
 
 LIGHTEST_TIP = 1e-6  # kg
-POINTS, POINTS_BY_PLACE = 36, 144
-"""Under the object; more where friction depends on the place: its edges cross the base point by point."""
+POINTS = 100
+"""Under the object, about: the edge of a patch crosses the base point by point."""
 AT_ONCE = 8  # numbers in a vector of the machine
 NO_TIMES, NO_VELOCITIES, NOWHERE = np.zeros(0), np.zeros((0, 2)), np.zeros(2)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wander:
+    """Frictions that differ for a while: a hat over time, a unit of what real frictions do along their way.
+
+    Attributes:
+        middle: when they differ most [s].
+        width: how long before and after at all [s].
+        support, hand: by which share then, with the table and at the tip.
+    """
+
+    middle: float
+    width: float
+    support: float = 0.0
+    hand: float = 0.0
+
+
+STEADY = Wander(middle=0.0, width=1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +69,7 @@ class TwinPush:
         laws: of the vocabulary: forces and frictions.
         swing: what swings inside; None where nothing does.
         mount: what holds a tip that gives way; None for one that is moved as the path says.
+        wander: frictions that differ for a while.
     """
 
     body: Body
@@ -62,6 +82,7 @@ class TwinPush:
     laws: Sequence[Law] = ()
     swing: Swing | None = None
     mount: Mount | None = None
+    wander: Wander = STEADY
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +125,7 @@ class Twin:
         grid: friction cells of ``body.support_friction``.
         pressure: under the object, where it is not even.
         gravity: m/s^2.
-        points: support points, about; None takes what the laws need.
+        points: support points, about.
     """
 
     solid: Solid
@@ -112,8 +133,7 @@ class Twin:
     grid: FrictionGrid = field(default_factory=FrictionGrid)
     pressure: PressureGrid | None = None
     gravity: float = GRAVITY
-    points: int | None = None
-    _bases: dict[int, _Base] = field(default_factory=dict, init=False, repr=False, compare=False)
+    points: int = POINTS
 
     def __post_init__(self) -> None:
         if self.solid.rolling_radius is not None:
@@ -122,20 +142,11 @@ class Twin:
     @property
     def polar(self) -> float:
         """Mean square distance of the underside from Bo [m^2]."""
-        return self._base(POINTS).polar
+        return self._base.polar
 
     def rollouts(self, pushes: Sequence[TwinPush]) -> list[Trace]:
         """Simulate all pushes, each as if it were alone."""
-        fine = [k for k, push in enumerate(pushes) if any(by_place(law) for law in push.laws)]
-        coarse = sorted(set(range(len(pushes))).difference(fine))
-        traces: dict[int, Trace] = {}
-        for which, count in ((coarse, POINTS), (fine, POINTS_BY_PLACE)):
-            if which:
-                traces |= zip(which, self._rolled([pushes[k] for k in which], self._base(count)), strict=True)
-        return [traces[k] for k in range(len(pushes))]
-
-    def _rolled(self, pushes: Sequence[TwinPush], base: _Base) -> list[Trace]:
-        """Those that need the same support points."""
+        base = self._base
         ends = _ends([len(push.times) for push in pushes])
         poses, forces = np.zeros((ends[-1], 3)), np.zeros((ends[-1], 2))
         counts = np.zeros(len(pushes), COUNTS)
@@ -160,12 +171,9 @@ class Twin:
             for k in range(len(pushes))
         ]  # fmt: skip
 
-    def _base(self, count: int) -> _Base:
-        count = self.points or count
-        if count not in self._bases:
-            support = support_of(self.solid.underside, self.grid, count, pressure=self.pressure)
-            self._bases[count] = _base_of(support)
-        return self._bases[count]
+    @cached_property
+    def _base(self) -> _Base:
+        return _base_of(support_of(self.solid.underside, self.grid, self.points, pressure=self.pressure))
 
     @cached_property
     def _edges(self) -> Array:
@@ -173,7 +181,7 @@ class Twin:
 
     def _record(self, push: TwinPush) -> tuple[float, ...]:
         """The numbers of `BODY`, in their order."""
-        body, solid = push.body, self.solid
+        body, solid, wander = push.body, self.solid, push.wander
         com_x, com_y = body.p_BBcm.tolist()
         height = 0.5 * solid.height if push.hand_height is None else push.hand_height
         return (
@@ -181,6 +189,7 @@ class Twin:
             com_x, com_y, 0.5 * solid.height, solid.outline.radius if isinstance(solid.outline, Disc) else 0.0,
             self.hand_radius or 0.0, height - 0.5 * solid.height, body.hand_friction, body.restitution,
             *_tip_of(push.mount), *_swing_of(push.swing), 0.0, push.begin, push.end,
+            wander.middle, wander.width, wander.support, wander.hand, 1.0, 1.0,
         )  # fmt: skip
 
 

@@ -80,11 +80,6 @@ _TABLES: Final[dict[type, tuple[int, Callable[[Any], tuple[float, ...]]]]] = {
 """What their records hold behind the place of their first number."""
 
 
-def by_place(law: Law) -> bool:
-    """Whether friction changes within the base by where it is on the table: at an edge, and not smoothly."""
-    return isinstance(law, Patch)
-
-
 def records_of(sets: Sequence[tuple[Sequence[Law], float]]) -> tuple[NDArray[np.void], NDArray[np.int64], Array]:
     """Records of all laws, where each set's end, and the numbers of their tables.
 

@@ -40,9 +40,11 @@ def stiff(geometry):
 
 @cache
 def twin_of(geometry):
+    # On as many points as the cell has, so that laws are compared and not quadratures.
     return Twin(
-        solid=solid_of(geometry.shape), hand_radius=0.01, pressure=geometry.pressure, gravity=geometry.gravity
-    )
+        solid=solid_of(geometry.shape), hand_radius=0.01, pressure=geometry.pressure, gravity=geometry.gravity,
+        points=STIFF.contact.support_points,
+    )  # fmt: skip
 
 
 def in_cell(*effects):
