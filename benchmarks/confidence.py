@@ -39,13 +39,10 @@ from worlds import POINTS, POSITION_STD, ROTATION_STD, TIME_STEP, pushes_of, rec
 
 from physid_drake.cell import HandPath as CellPath
 from physid_drake.cell.solid import solid_of
-from physid_drake.identify import Identification, Identifier, SearchConfig, ThetaConfig
+from physid_drake.identify import Identification, Identifier, SearchConfig
 from physid_drake.identify.identify import estimates_of
 from physid_drake.identify.linearise import prior_slope
-from physid_drake.identify.misfit import Whitener
-from physid_drake.identify.nuisance import FIRST_SCATTER
 from physid_drake.identify.polish import ROUNDS, SCATTER_PUSHES, Polished, new_scatter, scatter_freedom
-from physid_drake.identify.theta import theta_map
 from physid_drake.model import Model
 from physid_drake.model_reading import load_model
 from physid_drake.plan import DistanceToGoal, Situation, plan
@@ -53,6 +50,10 @@ from physid_drake.plan.draws import draws_of
 from physid_drake.plan.story import Spread, spread_of
 from physid_drake.plan.system import identified_model
 from physid_drake.plan.task import policy_for
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.misfit import Whitener
+from physid_drake.pushes.nuisance import FIRST_SCATTER
+from physid_drake.pushes.theta import theta_map
 from physid_drake.recording import ObjectModel
 
 NAMES = ("eraser", "box", "book")

@@ -17,7 +17,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from reference.scenes import OBJECTS, Noise, draw_push, draw_theta, write_reference_recording
 
 from physid_drake.cell import CellConfig
-from physid_drake.identify import Identification, Identifier, SearchConfig, ThetaConfig
+from physid_drake.identify import Identification, Identifier, SearchConfig
+from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import read_recording
 
 NAMES = ("eraser", "box", "book", "can")

@@ -18,13 +18,14 @@ from rich.console import Console
 from rich.table import Table
 from scipy import signal
 
-from physid_drake.diagnose import case_of, cell_config, diagnose
-from physid_drake.identify.config import ThetaConfig
+from physid_drake.diagnose import diagnose
 from physid_drake.prove.knobs import draw_knob
 from physid_drake.prove.make import simulate
 from physid_drake.prove.scene import DrawnPush, Rng, Scene, draw_scene
 from physid_drake.prove.sensing import record, recording_of
 from physid_drake.prove.world_plan import HandPath
+from physid_drake.pushes.case import case_of, cell_config
+from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import PoseStream, Push, Recording
 
 SPEEDS = (0.01, 0.06)  # m/s, of slow hands

@@ -10,7 +10,8 @@ from rich.console import Console
 from rich.table import Table
 
 from physid_drake.cell import CellConfig
-from physid_drake.identify import OnlineIdentifier, SearchConfig, ThetaConfig
+from physid_drake.identify import OnlineIdentifier, SearchConfig
+from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import read_recording
 from physid_drake.resources import shipped
 

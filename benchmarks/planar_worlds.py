@@ -22,8 +22,9 @@ from reference.planar import Hand, simulate_planar
 from reference.scenes import OBJECTS, TIME_STEP, draw_push, draw_theta
 from twin import shape_of
 
-from physid_drake.diagnose import case_of, cell_config, diagnose
-from physid_drake.identify.config import ThetaConfig
+from physid_drake.diagnose import diagnose
+from physid_drake.pushes.case import case_of, cell_config
+from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import Hand as Tip
 from physid_drake.recording import ObjectModel, Push, Recording, Sensors, planar_poses
 from physid_drake.recording import Table as TableTop

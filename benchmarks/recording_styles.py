@@ -26,10 +26,10 @@ from reference.planar import Hand, simulate_planar
 from reference.scenes import OBJECTS, TIME_STEP, draw_push
 from twin import shape_of
 
-from physid_drake.diagnose import case_of, cell_config
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.plain import numerics, path_errors
-from physid_drake.identify.config import ThetaConfig
+from physid_drake.pushes.case import case_of, cell_config
+from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import Hand as Tip
 from physid_drake.recording import (
     ObjectModel,

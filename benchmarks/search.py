@@ -27,8 +27,9 @@ from rich.table import Table
 from runs import COARSE, shipped_pushes
 
 from physid_drake.belief import Belief
-from physid_drake.identify import Identifier, SearchConfig, ThetaConfig
-from physid_drake.identify.misfit import whitened_residual
+from physid_drake.identify import Identifier, SearchConfig
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.misfit import whitened_residual
 from physid_drake.search import SEARCHES, Search, search_minimum, search_named
 from physid_drake.space import Parameter, ParameterSpace
 

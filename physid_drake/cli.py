@@ -56,8 +56,8 @@ def _register_inspect(subparsers: Subparsers) -> None:
 
 def _run_inspect(arguments: argparse.Namespace) -> int:
     # Matplotlib takes half a second to import and Drake a second, which the other commands need not wait for.
-    from physid_drake.identify.doubts import doubts  # noqa: PLC0415
-    from physid_drake.identify.refusals import refusals  # noqa: PLC0415
+    from physid_drake.pushes.doubts import doubts  # noqa: PLC0415
+    from physid_drake.pushes.refusals import refusals  # noqa: PLC0415
     from physid_drake.report.inspection import draw_pushes, inspection_table, warning_lines  # noqa: PLC0415
     from physid_drake.report.picture import check_picture, write_picture  # noqa: PLC0415
     from physid_drake.report.terminal import terminal  # noqa: PLC0415

@@ -18,8 +18,8 @@ from physid_drake.cell.config import ContactConfig, SolverConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.effects import Effect, effect_named
 from physid_drake.errors import CellError, ConfigError, PhysidError, RecordingError
-from physid_drake.identify.theta import RANGES
 from physid_drake.model import AS_W, COMPLETE, FORMAT, SHAPES, Correlation, Model
+from physid_drake.pushes.theta import RANGES
 from physid_drake.ranges import ANY, NOT_NEGATIVE, POSITIVE, Range
 from physid_drake.recording import Shape
 from physid_drake.wording import named, one_line, shown

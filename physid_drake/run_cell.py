@@ -13,21 +13,22 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from rich.console import Console
 
-from physid_drake.diagnose import Diagnosis, case_of, model_of
+from physid_drake.diagnose import Diagnosis, model_of
 from physid_drake.door import DONE, Parser, enter, path
 from physid_drake.errors import ConfigError
 from physid_drake.identify import Identification, Identifier, OnlineIdentifier
-from physid_drake.identify.doubts import doubts
-from physid_drake.identify.kept_rollouts import KeptRollouts
-from physid_drake.identify.nuisance import nuisance_of
-from physid_drake.identify.problem import HandUse
-from physid_drake.identify.rollouts import simulate
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
-from physid_drake.identify.task import Task
 from physid_drake.model import Model
 from physid_drake.plan import Hindsight, Plan, caveat_of, outcome_under
 from physid_drake.plan.system import Planner, PolicySystem, identified_model, planner_of
 from physid_drake.progress import Progress
+from physid_drake.pushes.case import case_of
+from physid_drake.pushes.doubts import doubts
+from physid_drake.pushes.kept_rollouts import KeptRollouts
+from physid_drake.pushes.nuisance import nuisance_of
+from physid_drake.pushes.problem import HandUse
+from physid_drake.pushes.rollouts import simulate
+from physid_drake.pushes.task import Task
 from physid_drake.recording import Recording, digest_of, read_recording
 from physid_drake.report.cells import cells_table
 from physid_drake.report.inspection import warning_lines

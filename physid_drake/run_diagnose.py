@@ -12,13 +12,14 @@ from pydrake.geometry import Meshcat
 from rich.console import Console
 from rich.text import Text
 
-from physid_drake.diagnose import Case, Diagnosis, Evidence, case_of, cell_config, diagnose, model_of
+from physid_drake.diagnose import Diagnosis, Evidence, diagnose, model_of
 from physid_drake.diagnose.leaving import fit_that_leaves
 from physid_drake.effects import effect_named
 from physid_drake.errors import ConfigError
-from physid_drake.identify.config import ThetaConfig
-from physid_drake.identify.kept_rollouts import KeptRollouts
-from physid_drake.identify.rollouts import simulate
+from physid_drake.pushes.case import Case, case_of, cell_config
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.kept_rollouts import KeptRollouts
+from physid_drake.pushes.rollouts import simulate
 from physid_drake.recording import digest_of, read_recording
 from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
 from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes

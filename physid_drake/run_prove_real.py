@@ -12,14 +12,14 @@ import numpy as np
 
 from physid_drake.cell import Outcome
 from physid_drake.errors import ConfigError, ParameterError, PhysidError
-from physid_drake.identify.noise import noise_of
-from physid_drake.identify.problem import PushProblem, problems_of
 from physid_drake.model import ModelCell
 from physid_drake.model_reading import load_model
 from physid_drake.prove.diagnosing import DIAGNOSE, FRESH_ERRORS, Task, attempt_of, diagnose_command
 from physid_drake.prove.real import RealCase, chosen_cases, prepare
 from physid_drake.prove.real_score import RealOutcome, real_outcome
 from physid_drake.prove.shapes import height_of
+from physid_drake.pushes.noise import noise_of
+from physid_drake.pushes.problem import PushProblem, problems_of
 from physid_drake.recording import MeshShape, read_recording
 from physid_drake.report.real import pressure_picture, real_json, real_markdown, real_table
 from physid_drake.report.svg import drawn, png_of

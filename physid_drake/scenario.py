@@ -15,8 +15,8 @@ from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
 from physid_drake.cell.checks import check_config
 from physid_drake.errors import ConfigError
-from physid_drake.identify.rollouts import INTEGRATORS
 from physid_drake.policies import POLICIES
+from physid_drake.pushes.rollouts import INTEGRATORS
 from physid_drake.ranges import Range
 from physid_drake.resources import shipped
 from physid_drake.run_folder import named_after

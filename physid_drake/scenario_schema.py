@@ -3,8 +3,9 @@
 import dataclasses as dc
 
 from physid_drake.cell.config import CellConfig
-from physid_drake.identify import SearchConfig, ThetaConfig
+from physid_drake.identify import SearchConfig
 from physid_drake.plan.config import PlanConfig
+from physid_drake.pushes.config import ThetaConfig
 
 
 @dc.dataclass

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from physid_drake.identify.noise import Noise
-from physid_drake.identify.problem import problems_of
+from physid_drake.pushes.noise import Noise
+from physid_drake.pushes.problem import problems_of
 from physid_drake.recording import PoseStream
 
 QUIET = Noise(

@@ -8,7 +8,8 @@ import yaml
 
 from physid_drake import run_cell
 from physid_drake.cell import CellConfig, ContactConfig, SolverConfig
-from physid_drake.identify import Identifier, SearchConfig, ThetaConfig
+from physid_drake.identify import Identifier, SearchConfig
+from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import Recording, read_recording, write_recording
 from physid_drake.resources import shipped
 
@@ -35,8 +36,8 @@ def laid_over(base: dict, more: dict) -> dict:
     }
 
 
-def shipped_pushes(count: int) -> Recording:
-    return read_recording(SHIPPED).subset(range(count))
+def shipped_pushes(count: int, name: str = SHIPPED.name) -> Recording:
+    return read_recording(SHIPPED.with_name(name)).subset(range(count))
 
 
 def write_small(folder: Path, count: int = 3, **changes: object) -> Path:

@@ -1,9 +1,8 @@
 """Diagnosis: where simulation and recording part, and what physics is missing."""
 
-from physid_drake.diagnose.case import Case, case_of, cell_config
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.leaving import model_of
 from physid_drake.diagnose.story import diagnose
 from physid_drake.diagnose.values import Diagnosis
 
-__all__ = ["Case", "Diagnosis", "Evidence", "case_of", "cell_config", "diagnose", "model_of"]
+__all__ = ["Diagnosis", "Evidence", "diagnose", "model_of"]

@@ -14,7 +14,6 @@ from physid_drake.diagnose.candidate import (
     push_scores,
     standard_error,
 )
-from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.classes import class_beside, others_than, probability_of
 from physid_drake.diagnose.estimates import parameters_of, smallest, theta_of
 from physid_drake.diagnose.evidence import (
@@ -39,8 +38,9 @@ from physid_drake.diagnose.values import (
 )
 from physid_drake.diagnose.verdict import FEWEST_PUSHES, is_own_error, p_value_of, verdict_of
 from physid_drake.identify.identify import MOST_SCATTER
-from physid_drake.identify.misfit import diverged
-from physid_drake.identify.stated import quieter_by
+from physid_drake.pushes.case import UNIT_SCATTER, Case
+from physid_drake.pushes.misfit import diverged
+from physid_drake.pushes.stated import quieter_by
 
 Array = NDArray[np.float64]
 

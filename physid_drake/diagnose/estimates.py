@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.model import EffectPoint, Fitted
 from physid_drake.diagnose.screen import (
@@ -25,7 +24,8 @@ from physid_drake.diagnose.values import (
 from physid_drake.effects import Effect
 from physid_drake.effects.effect import Coordinate
 from physid_drake.identify.cells import TOLD
-from physid_drake.identify.theta import CELL_ERROR, cell_error
+from physid_drake.pushes.case import Case
+from physid_drake.pushes.theta import CELL_ERROR, cell_error
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from physid_drake.diagnose.candidate import Candidate
-from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.foils import Foil
 from physid_drake.diagnose.linear import LinearPush, Whitened, solve
@@ -19,6 +18,7 @@ from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.screen import Screening, Signature
 from physid_drake.diagnose.values import NextPush
 from physid_drake.identify.identify import MOST_SCATTER
+from physid_drake.pushes.case import UNIT_SCATTER, Case
 
 Array = NDArray[np.float64]
 

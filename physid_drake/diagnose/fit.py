@@ -8,9 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.linear import (
-    Bounds,
     LinearPush,
     Whitened,
     best_scatter,
@@ -21,9 +19,11 @@ from physid_drake.diagnose.linear import (
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.steps import Step, effect_steps, own_steps, theta_steps, with_theta
 from physid_drake.effects import Effect
-from physid_drake.identify.misfit import FAILED, diverged
-from physid_drake.identify.prediction import Prediction
-from physid_drake.identify.task import Task
+from physid_drake.inference.bounded import Bounds
+from physid_drake.pushes.case import Case
+from physid_drake.pushes.misfit import FAILED, diverged
+from physid_drake.pushes.prediction import Prediction
+from physid_drake.pushes.task import Task
 
 Array = NDArray[np.float64]
 

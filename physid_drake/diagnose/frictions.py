@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.linear import told_frictions
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import speed_of
+from physid_drake.pushes.case import Case
 
 FEWEST = 6  # pushes that tell their friction
 CHANCE = 0.05  # of the best of all looks

@@ -11,8 +11,8 @@ from physid_drake.diagnose.estimates import correlation_of, theta_intervals
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import Diagnosis
-from physid_drake.identify.problem import HandUse, PushProblem
 from physid_drake.model import AS_W, Axes, Correlation, Model, turned
+from physid_drake.pushes.problem import HandUse, PushProblem
 
 Array = NDArray[np.float64]
 

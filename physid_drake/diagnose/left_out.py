@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.estimates import rms
+from physid_drake.pushes.case import Case
 
 Array = NDArray[np.float64]
 

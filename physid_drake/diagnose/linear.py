@@ -12,10 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.optimize import lsq_linear
+
+from physid_drake.inference.bounded import Bounds, bounded
+from physid_drake.inference.scatter import SCATTERS, log_prior_of_scatter
 
 Array = NDArray[np.float64]
-Bounds = tuple[Array, Array]
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -114,37 +115,6 @@ def solve(white: Whitened, prior_mean: Array, prior_std: Array, bounds: Bounds |
     left = white.y - white.x @ beta
     chi2 = float(left @ left) + float(weight @ (beta - prior_mean) ** 2)
     return Solution(beta=beta, precision=precision, chi2=chi2, log_likelihood=-0.5 * (chi2 + white.log_determinant))
-
-
-def bounded(precision: Array, right: Array, bounds: Bounds | None) -> Array:
-    """The beta (d,) that is likeliest within bounds: no rollout can be made beyond.
-
-    Args:
-        precision: (d, d).
-        right: (d,) precision times the estimate.
-        bounds: as in ``solve``.
-    """
-    beta = np.asarray(np.linalg.solve(precision, right), dtype=np.float64) if len(right) else np.zeros(0)
-    if bounds is None:
-        return beta
-    free = len(right) - len(bounds[0])
-    least, most = np.append(bounds[0], [-np.inf] * free), np.append(bounds[1], [np.inf] * free)
-    if np.all((least <= beta) & (beta <= most)):
-        return beta
-    values, vectors = np.linalg.eigh(precision)
-    roots = np.sqrt(np.maximum(values, 1e-14 * values[-1]))
-    root = roots[:, None] * vectors.T
-    within: Array = lsq_linear(root, (vectors.T @ right) / roots, (least, most), method="bvls").x
-    return within
-
-
-SCATTERS = tuple(np.geomspace(0.15, 8.0, 16).tolist())  # times the unit scatter
-SCATTER_PRIOR = (1.0, 0.6)  # median, in units of it, and standard deviation of the logarithm
-
-
-def log_prior_of_scatter(scatter: float) -> float:
-    """Of the friction's scatter from push to push, but for a constant."""
-    return -0.5 * float(np.log(scatter / SCATTER_PRIOR[0]) / SCATTER_PRIOR[1]) ** 2
 
 
 def best_scatter(

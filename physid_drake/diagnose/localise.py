@@ -19,11 +19,11 @@ from scipy.linalg import cho_factor, cho_solve
 from physid_drake.cell.forces import ForceLaw, Wrench
 from physid_drake.cell.object_state import ObjectState
 from physid_drake.cell.solid import solid_of
-from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import Fitted
 from physid_drake.effects import Effect, PushFacts
-from physid_drake.identify.misfit import difference
+from physid_drake.pushes.case import Case
+from physid_drake.pushes.misfit import difference
 
 Array = NDArray[np.float64]
 

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.linear import LinearPush, Whitened
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.screen import projected
 from physid_drake.diagnose.values import Location, Window
+from physid_drake.pushes.case import Case
 
 Array = NDArray[np.float64]
 

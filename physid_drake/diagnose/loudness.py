@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.linalg import solve_triangular
 
-from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.estimates import rms
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.linear import own_unknowns
 from physid_drake.diagnose.model import Fitted
-from physid_drake.diagnose.noise import FORCE_SCATTER, ForceNoise
+from physid_drake.pushes.case import Case
+from physid_drake.pushes.tracker_noise import FORCE_SCATTER, ForceNoise
 
 Array = NDArray[np.float64]
 

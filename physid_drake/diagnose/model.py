@@ -7,9 +7,11 @@ import dataclasses as dc
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.case import Case
-from physid_drake.diagnose.linear import Bounds, LinearPush, Solution, Whitened, log_prior_of_scatter
+from physid_drake.diagnose.linear import LinearPush, Solution, Whitened
 from physid_drake.effects import Coordinate, Effect
+from physid_drake.inference.bounded import Bounds
+from physid_drake.inference.scatter import log_prior_of_scatter
+from physid_drake.pushes.case import Case
 
 Array = NDArray[np.float64]
 

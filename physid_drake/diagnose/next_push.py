@@ -13,16 +13,16 @@ from scipy import stats
 
 from physid_drake.cell import HandPath, Start
 from physid_drake.cell.solid import solid_of
-from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.leaving import hand_frame
 from physid_drake.diagnose.model import State
 from physid_drake.diagnose.values import NextPush
-from physid_drake.identify.frames import reach_of
-from physid_drake.identify.problem import PushProblem
-from physid_drake.identify.rollouts import RolloutPool
-from physid_drake.identify.task import Task
 from physid_drake.model import turned
+from physid_drake.pushes.case import Case
+from physid_drake.pushes.frames import reach_of
+from physid_drake.pushes.problem import PushProblem
+from physid_drake.pushes.rollouts import RolloutPool
+from physid_drake.pushes.task import Task
 
 Array = NDArray[np.float64]
 

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from physid_drake.cell import CellConfig
 from physid_drake.diagnose.candidate import FAR_OFF
-from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
-from physid_drake.identify.misfit import DIVERGED, difference, diverged
-from physid_drake.identify.problem import spec_of
 from physid_drake.progress import Progress
+from physid_drake.pushes.case import Case
+from physid_drake.pushes.misfit import DIVERGED, difference, diverged
+from physid_drake.pushes.problem import spec_of
 from physid_drake.search import GreedyEntropySearch, search_minimum
 
 Array = NDArray[np.float64]

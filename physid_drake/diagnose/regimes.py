@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from physid_drake.diagnose.candidate import push_scores, standard_error
-from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.values import RegimeGain
-from physid_drake.identify.problem import push_speed
+from physid_drake.pushes.case import Case
+from physid_drake.pushes.problem import push_speed
 
 FEWEST = 3  # pushes of a regime
 FASTER = 2.0  # the median of the fast over that of the slow pushes: less is one regime

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.case import UNIT_SCATTER, Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve, told_frictions
 from physid_drake.diagnose.model import Fitted
 from physid_drake.effects import Effect, Family
-from physid_drake.identify.misfit import difference
-from physid_drake.identify.task import Task
+from physid_drake.pushes.case import UNIT_SCATTER, Case
+from physid_drake.pushes.misfit import difference
+from physid_drake.pushes.task import Task
 
 Array = NDArray[np.float64]
 Tick = Callable[[int, int], None]

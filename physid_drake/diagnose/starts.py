@@ -13,11 +13,11 @@ from itertools import product, zip_longest
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint, Fitted, State
 from physid_drake.diagnose.screen import Score, empty_signature, filled, score
 from physid_drake.effects import Effect
+from physid_drake.pushes.case import Case
 
 Array = NDArray[np.float64]
 

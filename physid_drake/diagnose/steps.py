@@ -8,9 +8,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.model import State
-from physid_drake.identify.misfit import difference
+from physid_drake.pushes.case import Case
+from physid_drake.pushes.misfit import difference
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.diagnose.candidate import EXPLAINED, Candidate
-from physid_drake.diagnose.case import Case
 from physid_drake.diagnose.classes import class_beside
 from physid_drake.diagnose.conclude import conclude
 from physid_drake.diagnose.confirm import WORTH_A_TRY
@@ -30,8 +29,9 @@ from physid_drake.diagnose.screen import (
 )
 from physid_drake.diagnose.values import Diagnosis
 from physid_drake.effects import Effect, applicable, tolerated
-from physid_drake.identify.kept_rollouts import KeptRollouts
 from physid_drake.progress import Progress
+from physid_drake.pushes.case import Case
+from physid_drake.pushes.kept_rollouts import KeptRollouts
 
 Array = NDArray[np.float64]
 

@@ -13,12 +13,13 @@ from scipy.optimize import least_squares
 
 from physid_drake.cell import CellConfig, SolverConfig
 from physid_drake.identify import Identifier
-from physid_drake.identify.config import SearchConfig, ThetaConfig
-from physid_drake.identify.misfit import FAILED, whitened_residual
-from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
-from physid_drake.identify.prediction import Prediction
-from physid_drake.identify.problem import PushProblem
-from physid_drake.identify.task import Task
+from physid_drake.identify.config import SearchConfig
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.misfit import FAILED, whitened_residual
+from physid_drake.pushes.nuisance import FIRST_SCATTER, nuisance_of
+from physid_drake.pushes.prediction import Prediction
+from physid_drake.pushes.problem import PushProblem
+from physid_drake.pushes.task import Task
 from physid_drake.recording import Recording
 from physid_drake.search import EntropySearch, GreedyEntropySearch, RandomSearch, Search, search_minimum
 from physid_drake.space import ParameterSpace

@@ -39,10 +39,10 @@ from physid_drake.experiments.learning import (
 )
 from physid_drake.experiments.values import Entry, Panel, Record, Result, Table, mean_and_deviation, series_of
 from physid_drake.files import read_text
-from physid_drake.identify import ThetaConfig
-from physid_drake.identify.problem import PushProblem
-from physid_drake.identify.rollouts import predict
 from physid_drake.progress import Progress
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.problem import PushProblem
+from physid_drake.pushes.rollouts import predict
 from physid_drake.recording import Recording
 from physid_drake.recording.adapters import convert_mit
 from physid_drake.space import Parameter, ParameterSpace

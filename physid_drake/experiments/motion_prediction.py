@@ -15,8 +15,8 @@ import numpy as np
 from physid_drake.experiments.learning import GREEDY, METHODS, EndErrors, Learner, Trials
 from physid_drake.experiments.values import Panel, Record, Result, Series, Table, mean_and_deviation, series_of
 from physid_drake.experiments.worlds import ERASER, HiddenRobot, draw_world, record_pushes
-from physid_drake.identify.problem import PushProblem
 from physid_drake.progress import Progress
+from physid_drake.pushes.problem import PushProblem
 
 SPEEDS = (0.05, 0.4)  # m/s
 FRICTIONS = (0.12, 0.4)

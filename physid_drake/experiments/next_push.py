@@ -32,11 +32,11 @@ from physid_drake.experiments.worlds import (
     draw_world,
     record_pushes,
 )
-from physid_drake.identify import ThetaConfig
 from physid_drake.identify.linearise import prior_slope
 from physid_drake.plan import most_informative_push
 from physid_drake.policies import PlannedPush
 from physid_drake.progress import Progress
+from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import Push, Recording
 
 SPEEDS: Final = (0.05, 0.4)  # m/s

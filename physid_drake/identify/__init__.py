@@ -3,7 +3,6 @@
 from physid_drake.identify.cells import CellsTold as CellsTold
 from physid_drake.identify.cells import Combination as Combination
 from physid_drake.identify.config import SearchConfig as SearchConfig
-from physid_drake.identify.config import ThetaConfig as ThetaConfig
 from physid_drake.identify.identify import Accuracy as Accuracy
 from physid_drake.identify.identify import Estimate as Estimate
 from physid_drake.identify.identify import Identification as Identification

@@ -13,9 +13,9 @@ from scipy.spatial.distance import cdist
 
 from physid_drake.cell.outline import Outline
 from physid_drake.errors import ConfigError
-from physid_drake.identify.config import ThetaConfig
 from physid_drake.identify.polish import Polished
-from physid_drake.identify.theta import ThetaMap, friction_names
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.theta import ThetaMap, friction_names
 
 Array = NDArray[np.float64]
 

@@ -17,18 +17,19 @@ from physid_drake.cell import CellConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
 from physid_drake.identify.cells import TOLD, CellsTold, cells_told, tied_cells
-from physid_drake.identify.config import SearchConfig, ThetaConfig
-from physid_drake.identify.misfit import DIVERGED, whitened_residual
-from physid_drake.identify.noise import Noise, noise_of
-from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
+from physid_drake.identify.config import SearchConfig
 from physid_drake.identify.polish import Polished, Polisher
-from physid_drake.identify.prediction import Prediction
-from physid_drake.identify.problem import PushProblem, problems_of, spec_of
-from physid_drake.identify.refusals import refuse
-from physid_drake.identify.rollouts import RolloutPool
-from physid_drake.identify.task import Task
-from physid_drake.identify.theta import ThetaMap, cell_error, range_of, theta_map
 from physid_drake.progress import Progress
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.misfit import DIVERGED, whitened_residual
+from physid_drake.pushes.noise import Noise, noise_of
+from physid_drake.pushes.nuisance import FIRST_SCATTER, nuisance_of
+from physid_drake.pushes.prediction import Prediction
+from physid_drake.pushes.problem import PushProblem, problems_of, spec_of
+from physid_drake.pushes.refusals import refuse
+from physid_drake.pushes.rollouts import RolloutPool
+from physid_drake.pushes.task import Task
+from physid_drake.pushes.theta import ThetaMap, cell_error, range_of, theta_map
 from physid_drake.recording import Recording, thinned
 from physid_drake.run_folder import part_of
 from physid_drake.search import SearchResult, search_minimum, search_named
@@ -169,7 +170,7 @@ class Identifier:
             state: a file in which the search's belief is kept, to go on from.
 
         Raises:
-            RecordingError: if the recording cannot be identified from; ``identify/refusals.py`` has all reasons.
+            RecordingError: if the recording cannot be identified from; ``pushes/refusals.py`` has all reasons.
         """
         refuse(recording)
         solid = solid_of(recording.object.shape)

@@ -12,12 +12,9 @@ from scipy.optimize import lsq_linear
 from physid_drake.cell import CellConfig
 from physid_drake.cell.solid import solid_of
 from physid_drake.identify.cells import cells_told, tied_cells
-from physid_drake.identify.config import SearchConfig, ThetaConfig
+from physid_drake.identify.config import SearchConfig
 from physid_drake.identify.identify import Accuracy, Identification, accuracy_of, estimates_of, pooled
 from physid_drake.identify.linearise import PushTerm, linearised, prior_slope
-from physid_drake.identify.misfit import whitened_residual
-from physid_drake.identify.noise import Noise, noise_of
-from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
 from physid_drake.identify.polish import (
     SCATTER_PUSHES,
     Polished,
@@ -26,13 +23,17 @@ from physid_drake.identify.polish import (
     prior_rows,
     scatter_of,
 )
-from physid_drake.identify.prediction import Prediction
-from physid_drake.identify.problem import PushProblem, problems_of, spec_of
-from physid_drake.identify.refusals import refuse
-from physid_drake.identify.rollouts import RolloutPool
-from physid_drake.identify.task import Task
-from physid_drake.identify.theta import ThetaMap, theta_map
 from physid_drake.progress import Progress
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.misfit import whitened_residual
+from physid_drake.pushes.noise import Noise, noise_of
+from physid_drake.pushes.nuisance import FIRST_SCATTER, nuisance_of
+from physid_drake.pushes.prediction import Prediction
+from physid_drake.pushes.problem import PushProblem, problems_of, spec_of
+from physid_drake.pushes.refusals import refuse
+from physid_drake.pushes.rollouts import RolloutPool
+from physid_drake.pushes.task import Task
+from physid_drake.pushes.theta import ThetaMap, theta_map
 from physid_drake.recording import Push, Recording, thinned
 from physid_drake.search import SearchResult, search_minimum, search_named
 from physid_drake.space import ParameterSpace
@@ -134,7 +135,7 @@ class OnlineIdentifier:
             progress: told stage, steps done, steps in all.
 
         Raises:
-            RecordingError: if the recording cannot be learned from; ``identify/refusals.py`` has all reasons.
+            RecordingError: if the recording cannot be learned from; ``pushes/refusals.py`` has all reasons.
         """
         refuse(recording)
         solid = solid_of(recording.object.shape)

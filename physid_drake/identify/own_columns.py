@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.identify.misfit import difference, model_error_columns
-from physid_drake.identify.noise import Noise
-from physid_drake.identify.nuisance import Nuisance
-from physid_drake.identify.problem import PushProblem
-from physid_drake.identify.task import Task
+from physid_drake.pushes.misfit import difference, model_error_columns
+from physid_drake.pushes.noise import Noise
+from physid_drake.pushes.nuisance import Nuisance
+from physid_drake.pushes.problem import PushProblem
+from physid_drake.pushes.task import Task
 
 Array = NDArray[np.float64]
 

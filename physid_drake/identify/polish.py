@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from physid_drake.identify.misfit import Whitener, difference, diverged, whitened_residual
-from physid_drake.identify.noise import Noise
-from physid_drake.identify.nuisance import Nuisance, nuisance_of
 from physid_drake.identify.own_columns import own_columns, own_tasks
-from physid_drake.identify.problem import PushProblem
-from physid_drake.identify.rollouts import RolloutPool
-from physid_drake.identify.task import Task
+from physid_drake.pushes.misfit import Whitener, difference, diverged, whitened_residual
+from physid_drake.pushes.noise import Noise
+from physid_drake.pushes.nuisance import Nuisance, nuisance_of
+from physid_drake.pushes.problem import PushProblem
+from physid_drake.pushes.rollouts import RolloutPool
+from physid_drake.pushes.task import Task
 from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]

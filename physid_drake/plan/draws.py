@@ -14,9 +14,9 @@ from scipy.stats import qmc
 
 from physid_drake.cell import Body
 from physid_drake.errors import ConfigError
-from physid_drake.identify.theta import RANGES, friction_names
 from physid_drake.model import Model
 from physid_drake.plan.trajectory import Situation
+from physid_drake.pushes.theta import RANGES, friction_names
 from physid_drake.ranges import POSITIVE, Range
 from physid_drake.wording import shown
 

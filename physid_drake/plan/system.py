@@ -13,7 +13,6 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 
 from physid_drake.identify import Identification
 from physid_drake.identify.polish import scatter_freedom
-from physid_drake.identify.problem import UNKNOWN_HAND, CellSpec, HandUse, PushProblem
 from physid_drake.identify.system import PUSH_PERIOD
 from physid_drake.model import Correlation, Model
 from physid_drake.plan.config import PlanConfig
@@ -25,6 +24,7 @@ from physid_drake.plan.trajectory import Situation
 from physid_drake.policies import PlannedPush, policy_named
 from physid_drake.policies.policy import Reach
 from physid_drake.progress import Progress
+from physid_drake.pushes.problem import UNKNOWN_HAND, CellSpec, HandUse, PushProblem
 from physid_drake.recording import Push
 
 Array = NDArray[np.float64]

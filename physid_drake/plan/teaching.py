@@ -13,13 +13,13 @@ from physid_drake.cell import Start
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
 from physid_drake.identify.linearise import linearised, prior_slope
-from physid_drake.identify.noise import Noise
-from physid_drake.identify.nuisance import FIRST_SCATTER, nuisance_of
-from physid_drake.identify.problem import PushProblem, first_motion
-from physid_drake.identify.rollouts import RolloutPool
-from physid_drake.identify.task import Task
 from physid_drake.policies import PlannedPush
 from physid_drake.policies.planned_push import LEAD
+from physid_drake.pushes.noise import Noise
+from physid_drake.pushes.nuisance import FIRST_SCATTER, nuisance_of
+from physid_drake.pushes.problem import PushProblem, first_motion
+from physid_drake.pushes.rollouts import RolloutPool
+from physid_drake.pushes.task import Task
 
 Array = NDArray[np.float64]
 Pose = tuple[float, float, float]

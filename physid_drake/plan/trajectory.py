@@ -15,10 +15,10 @@ from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.effects import PushFacts
 from physid_drake.effects.rollout import Geometry, Rollout, aimed, geometry_with, roll, tracked, true_pose
 from physid_drake.errors import ConfigError, ParameterError
-from physid_drake.identify.problem import CellSpec
-from physid_drake.identify.rollouts import cell_of
 from physid_drake.model import Model
 from physid_drake.policies import PlannedPush
+from physid_drake.pushes.problem import CellSpec
+from physid_drake.pushes.rollouts import cell_of
 from physid_drake.recording import Shape
 
 Array = NDArray[np.float64]

@@ -16,9 +16,9 @@ from physid_drake.diagnose import Evidence
 from physid_drake.diagnose.leaving import predicted
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.looks import SAID
-from physid_drake.diagnose.noise import UNKNOWN
 from physid_drake.diagnose.values import Detectable, Diagnosis, EffectFinding, ParameterEstimate, ThetaEstimate
 from physid_drake.effects import effect_named
+from physid_drake.pushes.tracker_noise import UNKNOWN
 from physid_drake.recording import Recording
 from physid_drake.report.diagnosis import held_out_figures
 from physid_drake.report.diagnosis_figures import (

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from physid_drake.identify import Accuracy, CellsTold, Identification
-from physid_drake.identify.doubts import doubts
+from physid_drake.pushes.doubts import doubts
 from physid_drake.recording import Recording
 from physid_drake.report.inspection import warning_lines
 

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from physid_drake.identify import Accuracy, Identification
 from physid_drake.identify.identify import EXPLAINED
-from physid_drake.identify.stated import FAR_BELOW, quieter_by
+from physid_drake.pushes.stated import FAR_BELOW, quieter_by
 
 
 def estimates_table(result: Identification, title: str) -> Table:

@@ -17,7 +17,7 @@ from fuzz.case import Case, WrongError
 from fuzz.damage import damaged, replaced
 from fuzz.trees import json_text, mutated
 from physid_drake.belief import Belief
-from physid_drake.identify.kept_rollouts import KeptRollouts, key_of
+from physid_drake.pushes.kept_rollouts import KeptRollouts, key_of
 from physid_drake.run_folder import RunFolder
 from physid_drake.run_plan import _learnt
 

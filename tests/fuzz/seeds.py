@@ -133,8 +133,8 @@ def belief() -> bytes:
 @cache
 def rollouts() -> bytes:
     """A file of kept rollouts."""
-    from physid_drake.identify.kept_rollouts import KeptRollouts, key_of
-    from physid_drake.identify.prediction import Prediction
+    from physid_drake.pushes.kept_rollouts import KeptRollouts, key_of
+    from physid_drake.pushes.prediction import Prediction
 
     with tempfile.TemporaryDirectory() as scratch:
         file = Path(scratch) / "rollouts.bin"

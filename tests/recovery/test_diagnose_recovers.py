@@ -12,13 +12,14 @@ from rich.console import Console
 from worlds import endpoints, pushes_of, recorded, slides
 
 from physid_drake import load_model
-from physid_drake.diagnose import case_of, cell_config, diagnose, model_of
+from physid_drake.diagnose import diagnose, model_of
 from physid_drake.diagnose.evidence import mismatch
 from physid_drake.errors import RecordingError
-from physid_drake.identify.config import ThetaConfig
-from physid_drake.identify.kept_rollouts import KeptRollouts
 from physid_drake.plan import Situation
 from physid_drake.plan.draws import draws_of
+from physid_drake.pushes.case import case_of, cell_config
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.kept_rollouts import KeptRollouts
 from physid_drake.recording import Sensors
 from physid_drake.report.diagnosis import diagnosis_json
 from physid_drake.run_diagnose import show

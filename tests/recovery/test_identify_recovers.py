@@ -14,8 +14,9 @@ from twin import shape_of
 from worlds import POINTS, endpoints, pushes_of, recorded, slides
 
 from physid_drake.cell import CellConfig, ContactConfig
-from physid_drake.identify import Identification, SearchConfig, ThetaConfig
-from physid_drake.identify.theta import CELL_ERROR, UNWEIGHED
+from physid_drake.identify import Identification, SearchConfig
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.theta import CELL_ERROR, UNWEIGHED
 from physid_drake.recording import read_recording, write_recording
 from physid_drake.report.result import result_json
 

@@ -10,13 +10,14 @@ from pydrake.systems.framework import DiagramBuilder
 from runs import COARSE, shipped_pushes
 from twin import body_of
 
-from physid_drake.identify import OnlineIdentifier, SearchConfig, ThetaConfig
+from physid_drake.identify import OnlineIdentifier, SearchConfig
 from physid_drake.identify.system import PUSH_PERIOD, IdentificationSystem
 from physid_drake.model import Model
 from physid_drake.plan import DistanceToGoal, SimulatedRobot, Situation, plan
 from physid_drake.plan.system import PolicySystem, RobotSystem, identified_model
 from physid_drake.plan.task import policy_for
 from physid_drake.policies import PlannedPush
+from physid_drake.pushes.config import ThetaConfig
 
 pytestmark = pytest.mark.slow
 

@@ -12,11 +12,12 @@ from runs import COARSE, shipped_pushes
 from worlds import POINTS, pushes_of, recorded, slides
 
 from physid_drake.errors import RecordingError
-from physid_drake.identify import OnlineIdentifier, SearchConfig, ThetaConfig
+from physid_drake.identify import OnlineIdentifier, SearchConfig
 from physid_drake.identify.linearise import linearised, prior_slope
 from physid_drake.identify.online import _solved
 from physid_drake.identify.polish import Polisher, prior_rows
 from physid_drake.identify.system import PUSH_PERIOD, IdentificationSystem, RecordingPlayer
+from physid_drake.pushes.config import ThetaConfig
 from physid_drake.report.cells import cells_figure, cells_table, cells_verdict
 from physid_drake.report.result import result_json
 

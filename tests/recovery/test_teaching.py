@@ -9,11 +9,12 @@ from worlds import recorded
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
-from physid_drake.identify import OnlineIdentifier, SearchConfig, ThetaConfig
+from physid_drake.identify import OnlineIdentifier, SearchConfig
 from physid_drake.identify.linearise import prior_slope
-from physid_drake.identify.noise import noise_of
 from physid_drake.plan import most_informative_push, teaching
 from physid_drake.policies import PlannedPush
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.noise import noise_of
 
 pytestmark = pytest.mark.slow
 
@@ -91,7 +92,7 @@ def test_the_chosen_push_leaves_less_open_than_random_ones_when_they_are_made(ta
 
     A push that is only planned has no noisy stream: its hand's path is exact, and so it is in what is learned here.
     """
-    monkeypatch.setattr("physid_drake.identify.problem.NOTABLE_ERROR", np.inf)
+    monkeypatch.setattr("physid_drake.pushes.problem.NOTABLE_ERROR", np.inf)
     one, pushes, lesson = taught
     order = np.argsort(-lesson.gains)
     some = [int(order[0]), int(order[3]), int(order[-1])]

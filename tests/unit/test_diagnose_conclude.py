@@ -9,10 +9,10 @@ import pytest
 
 from physid_drake.diagnose import classes, conclude, ranking, verdict
 from physid_drake.diagnose.candidate import Candidate
-from physid_drake.diagnose.features import PushFeatures
 from physid_drake.diagnose.foils import Foil
 from physid_drake.diagnose.sentence import sentence
-from physid_drake.identify.misfit import FAILED
+from physid_drake.pushes.features import PushFeatures
+from physid_drake.pushes.misfit import FAILED
 
 PUSHES, WINDOWS = 6, 5
 SIGMAS = np.array([1e-3, 1e-3, 1e-2])

@@ -14,7 +14,7 @@ from physid_drake.effects.body import Restitution, UnevenSupport
 from physid_drake.effects.drag import QuadraticDrag
 from physid_drake.effects.fields import TableTilt
 from physid_drake.effects.friction import FrictionPatch
-from physid_drake.identify.theta import CELL_ERROR
+from physid_drake.pushes.theta import CELL_ERROR
 from physid_drake.space import Parameter, ParameterSpace
 
 AROUND = Surroundings(

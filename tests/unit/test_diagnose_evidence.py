@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from physid_drake.diagnose.case import UNIT_SCATTER
 from physid_drake.diagnose.evidence import MOST_SCATTER, mismatch, scatter_p_value, unexplained
 from physid_drake.diagnose.frictions import friction_trend
 from physid_drake.diagnose.linear import LinearPush, Whitened, best_scatter, solve
 from physid_drake.diagnose.model import Fitted, State
+from physid_drake.pushes.case import UNIT_SCATTER
 
 NOTHING = np.zeros(0)
 

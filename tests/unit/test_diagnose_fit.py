@@ -9,7 +9,6 @@ from runs import shipped_pushes
 
 from physid_drake.cell import CellConfig
 from physid_drake.cell.hand_path import PathError
-from physid_drake.diagnose import case_of
 from physid_drake.diagnose.fit import Fitter
 from physid_drake.diagnose.model import EffectPoint
 from physid_drake.diagnose.plain import coarse, path_errors, search_theta
@@ -19,8 +18,9 @@ from physid_drake.effects.body import ComOffset
 from physid_drake.effects.drag import QuadraticDrag
 from physid_drake.effects.fields import Tether
 from physid_drake.effects.friction import FrictionDrift
-from physid_drake.identify.config import ThetaConfig
-from physid_drake.identify.misfit import FAILED, difference
+from physid_drake.pushes.case import case_of
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.misfit import FAILED, difference
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from physid_drake.diagnose.features import PushFeatures
 from physid_drake.diagnose.left_out import comes_nearer, errors_of, least_motion, shown_by_several
+from physid_drake.pushes.features import PushFeatures
 
 RNG = np.random.default_rng(4)
 SIGMAS = np.array([3e-4, 3e-4, 3e-3])

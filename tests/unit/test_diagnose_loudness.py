@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from physid_drake.diagnose.features import PushFeatures
 from physid_drake.diagnose.linear import LinearPush
 from physid_drake.diagnose.loudness import _left_over, quieter
-from physid_drake.diagnose.noise import ForceNoise
+from physid_drake.pushes.features import PushFeatures
+from physid_drake.pushes.tracker_noise import ForceNoise
 
 PUSHES = 40
 

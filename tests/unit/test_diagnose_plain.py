@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from physid_drake.diagnose import plain
-from physid_drake.identify.misfit import FAILED
+from physid_drake.pushes.misfit import FAILED
 from physid_drake.space import Parameter, ParameterSpace
 
 SPACE = ParameterSpace(

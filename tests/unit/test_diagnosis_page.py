@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from physid_drake.diagnose.localise import MissingWrench
-from physid_drake.diagnose.noise import UNKNOWN
 from physid_drake.diagnose.values import (
     Detectable,
     Diagnosis,
@@ -23,6 +22,7 @@ from physid_drake.diagnose.values import (
     ThetaEstimate,
     Window,
 )
+from physid_drake.pushes.tracker_noise import UNKNOWN
 from physid_drake.recording import Box, Cylinder, Hand, ObjectModel, PoseStream, Push, Recording, Sensors, Table
 from physid_drake.report import effect_laws
 from physid_drake.report.diagnosis_page import ShownPush, diagnosis_page

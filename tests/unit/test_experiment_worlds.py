@@ -25,8 +25,8 @@ from physid_drake.experiments.worlds import (
     draw_world,
     record_pushes,
 )
-from physid_drake.identify import ThetaConfig
 from physid_drake.policies import PlannedPush
+from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import Box, Hand, ObjectModel, PoseStream, Push, Recording, Sensors, Table
 from physid_drake.run_experiment import write
 

@@ -17,7 +17,7 @@ import os, resource, signal, sys
 
 from physid_drake import run_folder
 from physid_drake.belief import Belief
-from physid_drake.identify.kept_rollouts import KeptRollouts
+from physid_drake.pushes.kept_rollouts import KeptRollouts
 
 writes, largest, *argv = sys.argv[1:]
 left, most = int(writes), int(largest)

@@ -9,11 +9,11 @@ from physid_drake.belief import Belief
 from physid_drake.cell.outline import rectangle
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError, ParameterError
-from physid_drake.identify import ThetaConfig
 from physid_drake.identify.cells import LEVEL_STD, cells_told, tied_cells
 from physid_drake.identify.linearise import prior_slope
 from physid_drake.identify.polish import Polished
-from physid_drake.identify.theta import theta_map
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.theta import theta_map
 from physid_drake.recording import Box, ObjectModel
 from physid_drake.report.cells import cells_verdict
 from physid_drake.space import Parameter, ParameterSpace

@@ -8,10 +8,11 @@ from runs import coarse_identifier, shipped_pushes
 
 from physid_drake.belief import Belief
 from physid_drake.errors import ConfigError
-from physid_drake.identify import Identifier, SearchConfig, ThetaConfig
+from physid_drake.identify import Identifier, SearchConfig
 from physid_drake.identify.identify import split_pushes
-from physid_drake.identify.nuisance import nuisance_of
-from physid_drake.identify.task import Task
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.nuisance import nuisance_of
+from physid_drake.pushes.task import Task
 from physid_drake.report.result import result_json
 
 FRICTION = ThetaConfig(parameters=["support_friction"])

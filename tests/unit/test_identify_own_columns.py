@@ -7,10 +7,10 @@ import pytest
 from runs import coarse_identifier, shipped_pushes
 
 from physid_drake.cell.hand_path import PathError
-from physid_drake.identify.misfit import whitened_residual
-from physid_drake.identify.nuisance import SPEED_STD, nuisance_of
 from physid_drake.identify.own_columns import NUISANCE_STEP, own_columns, own_tasks
 from physid_drake.identify.polish import Polisher
+from physid_drake.pushes.misfit import whitened_residual
+from physid_drake.pushes.nuisance import SPEED_STD, nuisance_of
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,8 @@ from runs import shipped_pushes
 
 from physid_drake.cell import CellConfig
 from physid_drake.cell.solid import solid_of
-from physid_drake.identify import Identifier, SearchConfig, ThetaConfig
+from physid_drake.identify import Identifier, SearchConfig
 from physid_drake.identify.identify import _may_lie_beyond, estimates_of
-from physid_drake.identify.misfit import FAILED, Whitener, diverged, whitened_residual
 from physid_drake.identify.polish import (
     THETA_STEP,
     Polished,
@@ -17,7 +16,9 @@ from physid_drake.identify.polish import (
     new_scatter,
     scatter_of,
 )  # fmt: skip
-from physid_drake.identify.theta import theta_map
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.misfit import FAILED, Whitener, diverged, whitened_residual
+from physid_drake.pushes.theta import theta_map
 from physid_drake.recording import Box, ObjectModel
 
 SHAPE = Box(size=(0.12, 0.05, 0.03))

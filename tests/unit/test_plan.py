@@ -18,7 +18,7 @@ from physid_drake.effects.hand import HandOffset
 from physid_drake.effects.rollout import true_pose
 from physid_drake.effects.tracker import TrackerBias, TrackerScale
 from physid_drake.errors import ConfigError, RobotError
-from physid_drake.identify import SearchConfig, ThetaConfig
+from physid_drake.identify import SearchConfig
 from physid_drake.plan import DistanceToGoal, Ending, SimulatedRobot, Situation, plan
 from physid_drake.plan.draws import draws_of
 from physid_drake.plan.story import outcome_under, spread_of
@@ -26,6 +26,7 @@ from physid_drake.plan.system import PolicySystem, identified_model
 from physid_drake.plan.task import Choices, default_goal, policy_for
 from physid_drake.plan.trajectory import _paced, path_of, trajectory_of
 from physid_drake.policies import PlannedPush
+from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import Hand, ObjectModel, Recording, Sensors, Table
 
 

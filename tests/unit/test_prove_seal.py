@@ -344,8 +344,8 @@ def note(event, arguments):
         seen.append(os.path.realpath(os.fsdecode(arguments[0])))
 sys.addaudithook(note)
 from pathlib import Path
-from physid_drake.diagnose import case_of, cell_config
-from physid_drake.identify.config import ThetaConfig
+from physid_drake.pushes.case import case_of, cell_config
+from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import read_recording
 recording = read_recording(Path(sys.argv[1]))
 case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=1)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from runs import shipped_pushes
 
-from physid_drake.diagnose.case import case_of, cell_config
 from physid_drake.errors import RecordingError
-from physid_drake.identify.config import ThetaConfig
-from physid_drake.identify.doubts import doubts
-from physid_drake.identify.refusals import refusals, refuse
+from physid_drake.pushes.case import case_of, cell_config
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.pushes.doubts import doubts
+from physid_drake.pushes.refusals import refusals, refuse
 from physid_drake.recording import ForceStream, PoseStream, estimate_noise, read_recording, thinned, write_recording
 from physid_drake.recording.clocks import check_seconds, samples_within
 from physid_drake.recording.reading import MOST_ROWS
@@ -166,7 +166,7 @@ def test_what_is_refused_is_refused_before_a_path_is_fitted(recording, monkeypat
     def fitted(*_, **__):
         raise AssertionError("a path was fitted")
 
-    monkeypatch.setattr("physid_drake.identify.problem.fit_uncertain_paths", fitted)
+    monkeypatch.setattr("physid_drake.pushes.problem.fit_uncertain_paths", fitted)
     for wrong in (
         with_times(recording, lambda t: 1e3 * t),
         with_times(recording, lambda t: t + 1e4, "hand"),
@@ -181,7 +181,7 @@ def test_what_is_refused_is_refused_before_a_path_is_fitted(recording, monkeypat
 
 
 def test_an_object_that_never_moves_is_refused_before_a_path_is_fitted(recording, monkeypatch):
-    monkeypatch.delattr("physid_drake.identify.problem.fit_uncertain_paths")
+    monkeypatch.delattr("physid_drake.pushes.problem.fit_uncertain_paths")
 
     def still(push):
         stream = push.object

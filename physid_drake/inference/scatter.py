@@ -1,0 +1,13 @@
+"""The scatter of friction from push to push: the values that are looked at, and what is known of it beforehand."""
+
+from __future__ import annotations
+
+import numpy as np
+
+SCATTERS = tuple(np.geomspace(0.15, 8.0, 16).tolist())  # times the unit scatter
+SCATTER_PRIOR = (1.0, 0.6)  # median, in units of it, and standard deviation of the logarithm
+
+
+def log_prior_of_scatter(scatter: float) -> float:
+    """Of the friction's scatter from push to push, but for a constant."""
+    return -0.5 * float(np.log(scatter / SCATTER_PRIOR[0]) / SCATTER_PRIOR[1]) ** 2
