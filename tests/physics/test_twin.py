@@ -14,7 +14,7 @@ from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.solid import solid_of
 from physid_drake.effects.liquid import Swing
 from physid_drake.recording import Box, Cylinder
-from physid_drake.twin.twin import Twin, TwinPush
+from physid_drake.twin.twin import STEADY, Twin, TwinPush, Wander
 
 G = 9.81
 MU, SPEED = 0.3, 0.5
@@ -22,12 +22,15 @@ BOX = Twin(solid=solid_of(Box(size=(0.10, 0.08, 0.02))), hand_radius=0.01)
 DISC = Twin(solid=solid_of(Cylinder(radius=0.04, length=0.02, axis="z")), hand_radius=0.01)
 
 
-def slide(*laws, twin=BOX, mu=MU, mass=0.4, velocity=(SPEED, 0.0, 0.0), end=2.0, pose=(0.0, 0.0, 0.0), times=None):
+def slide(
+    *laws, twin=BOX, mu=MU, mass=0.4, velocity=(SPEED, 0.0, 0.0), end=2.0, pose=(0.0, 0.0, 0.0), times=None,
+    wander=STEADY,
+):  # fmt: skip
     """A free slide."""
     times = np.linspace(0.0, end, 201) if times is None else times
     push = TwinPush(
         body=body_of(mass, mu), start=Start(pose=pose, velocity=velocity), path=None, begin=0.0, end=end, times=times,
-        laws=laws,
+        laws=laws, wander=wander,
     )  # fmt: skip
     (trace,) = twin.rollouts([push])
     assert trace.outcome is Outcome.COMPLETED
@@ -73,6 +76,18 @@ def test_pushes_go_where_the_fine_integrator_has_them(points, furthest, worst):
 def test_a_slide_ends_after_v_squared_over_two_mu_g(twin, mu):
     way = slide(twin=twin, mu=mu).poses[-1]
     assert way == pytest.approx([SPEED**2 / (2 * mu * G), 0.0, 0.0], abs=3e-7)
+
+
+@pytest.mark.parametrize("share", [-0.2, 0.3])
+def test_a_friction_that_differs_for_a_while_changes_the_speed_by_the_area_of_its_hat(share):
+    """While the object slides on, v(t) = v0 - mu g (t + share A(t)), with A the area of a hat up to t."""
+    middle, width, mu = 0.1, 0.06, 0.2
+    plain, other = (
+        slide(mu=mu, wander=w).poses[-1, 0] for w in (STEADY, Wander(middle=middle, width=width, support=share))
+    )
+    lost, late = mu * G * share * width, SPEED - mu * G * (middle + width)  # m/s: within the hat, and left after it
+    apart = width * lost + (late**2 - (late - lost) ** 2) / (2 * mu * G)
+    assert plain - other == pytest.approx(apart, rel=1e-3)
 
 
 def test_mass_cancels_in_a_free_slide():

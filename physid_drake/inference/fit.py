@@ -1,0 +1,348 @@
+"""Fits of many hypotheses at once: bounded Levenberg-Marquardt over z and all pushes' own unknowns."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.inference.bounded import bounded
+from physid_drake.inference.hypothesis import Hypothesis
+from physid_drake.inference.predictions import Ask, Physics, Predictor
+from physid_drake.inference.push import (
+    NO_TAIL,
+    TAIL,
+    LinearPush,
+    Weighed,
+    cost_of,
+    held_out,
+    loudness_of,
+    weighed,
+)
+from physid_drake.inference.scatter import SCATTERS, log_prior_of_scatter
+from physid_drake.pushes.case import Case
+
+Array = NDArray[np.float64]
+Own = tuple[Array, ...]
+
+OWN_STEP = 0.5  # of the prior's standard deviation, for differences
+MOST_OWN, MOST_FRICTION = 3.0, 8.0  # standard deviations: unknowns go no further out
+MOST_THETA_MOVE = 0.25  # of the unit cube in one step
+RENEWED = 5.0  # of the cost, per push: a step that gained as much has left the place of its derivatives
+SETTLED = 0.3  # of the cost: a step that gained less is the last
+FIRST_DAMPING, EASED, HARDENED, HARDEST = 1e-3, 0.2, 8.0, 1e4
+LOUDEST_UNKNOWN = 1e-3  # a noise that nobody knows may be as small as this share of what is taken for it
+MIDDLE = int(np.argmin(np.abs(np.log(SCATTERS))))  # of the scatters: the prior's median
+
+
+@dc.dataclass(frozen=True, kw_only=True, eq=False)
+class Point:
+    """Where a fit is, and what it predicts there.
+
+    Attributes:
+        z: (n,).
+        own: each push's unknowns (k,).
+        predicted: each push's whitened features (m,).
+    """
+
+    z: Array
+    own: Own
+    predicted: tuple[Array, ...]
+
+
+@dc.dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """A hypothesis at a point, linearised there.
+
+    Attributes:
+        hypothesis: what is fitted.
+        point: where.
+        pushes: linearised at it.
+        scatter: of friction, push to push, in units of the columns'.
+        loudness: how many times as large as noise errors are; 1 of a hypothesis that explains the pushes.
+        tail: degrees of freedom of a push's errors.
+        weighed: the pushes with their unknowns integrated out.
+        cost: of the point: twice the negative log posterior of z and the pushes' unknowns, but for a constant.
+        damping: of the next step.
+        done: whether steps gain nothing any more.
+    """
+
+    hypothesis: Hypothesis
+    point: Point
+    pushes: tuple[LinearPush, ...]
+    scatter: float
+    loudness: float
+    tail: float
+    weighed: tuple[Weighed, ...]
+    cost: float
+    damping: float = FIRST_DAMPING
+    done: bool = False
+
+    @property
+    def log_likelihood(self) -> float:
+        """Marginal over the pushes' unknowns, with the priors of z and scatter."""
+        z, h = self.point.z, self.hypothesis
+        prior = -0.5 * float(np.sum(((z - h.mean) / h.std) ** 2)) + log_prior_of_scatter(self.scatter)
+        return sum(one.log_density for one in self.weighed) + prior
+
+    def again(self) -> Fit:
+        """The fit, to be stepped on from."""
+        return dc.replace(self, damping=FIRST_DAMPING, done=False)
+
+
+class Fitter:
+    """Fits hypotheses to a case's pushes."""
+
+    def __init__(self, case: Case, predictor: Predictor) -> None:
+        self.case, self.predictor = case, predictor
+        self.count = len(case.problems)
+        self.least = 1.0 if case.noise.known else LOUDEST_UNKNOWN
+        self.tolerances = tuple(np.zeros((len(y), 0)) for y in predictor.recorded)
+        self.most = [
+            np.array([MOST_FRICTION if name == "friction" else MOST_OWN for name in n.names]) for n in case.nuisances
+        ]
+
+    def shared_by_all(self, columns: Sequence[Array]) -> None:
+        """Let predictions have N(0, 1) multiples of columns (m_i, t), the same for all pushes."""
+        self.tolerances = tuple(columns)
+
+    def priors(self, scatter: float) -> list[Array]:
+        """Standard deviations (k,) of each push's unknowns."""
+        return [np.where(np.array(n.names) == "friction", scatter, 1.0) for n in self.case.nuisances]
+
+    def at_rest(self) -> Own:
+        """All pushes' unknowns at zero."""
+        return tuple(np.zeros(len(n.names)) for n in self.case.nuisances)
+
+    def points(
+        self, hypotheses: Sequence[Hypothesis], zs: Sequence[Array], owns: Sequence[Own]
+    ) -> list[Point | None]:
+        """What hypotheses predict at z with the pushes' unknowns; None where the twin cannot say it of a push."""
+        asks = []
+        for h, z, own in zip(hypotheses, zs, owns, strict=True):
+            physics = Physics(h.theta(z), h.effects(z))
+            asks += [Ask(i, physics, own[i]) for i in range(self.count)]
+        vectors = iter(self.predictor.vectors(asks))
+        points: list[Point | None] = []
+        for h, z, own in zip(hypotheses, zs, owns, strict=True):
+            found = [next(vectors) for _ in range(self.count)]
+            predicted = tuple(
+                vector + more @ z[h.simulated :]
+                for vector, more in zip(found, self.tolerances, strict=True)
+                if vector is not None
+            )
+            points.append(Point(z=z, own=own, predicted=predicted) if len(predicted) == self.count else None)
+        return points
+
+    def cost(self, hypothesis: Hypothesis, point: Point, scatter: float, loudness: float, tail: float) -> float:
+        """Twice the negative log posterior of z and the pushes' unknowns, but for a constant."""
+        total = float(np.sum(((point.z - hypothesis.mean) / hypothesis.std) ** 2))
+        for i, prior in enumerate(self.priors(scatter)):
+            total += self.cost_of_push(i, point.own[i], point.predicted[i], prior, loudness, tail)
+        return total
+
+    def cost_of_push(self, i: int, own: Array, predicted: Array, prior: Array, loudness: float, tail: float) -> float:
+        """The part of the cost that is push i's."""
+        error = self.predictor.recorded[i] - predicted
+        return cost_of(float(error @ error), len(error), loudness, tail) + float(np.sum((own / prior) ** 2))
+
+    def roughly(self, point: Point) -> float:
+        """How far a point is from the recording, for rankings: pushes that are far off count by their logarithm."""
+        total = 0.0
+        for y, f in zip(self.predictor.recorded, point.predicted, strict=True):
+            total += len(y) * math.log1p(float((y - f) @ (y - f)) / len(y))
+        return total
+
+    # Linearisation.
+
+    def started(
+        self,
+        hypotheses: Sequence[Hypothesis],
+        points: Sequence[Point],
+        like: Sequence[Fit | None],
+        tail: float = NO_TAIL,
+    ) -> list[Fit]:
+        """Fits at points, with derivatives by differences.
+
+        Args:
+            hypotheses: of each point.
+            points: where.
+            like: fits whose derivatives by the pushes' own unknowns are near enough; None takes them anew.
+            tail: degrees of freedom of a push's errors.
+        """
+        asks: list[Ask] = []
+        for h, point, near in zip(hypotheses, points, like, strict=True):
+            asks += self._asks(h, point, own=near is None)
+        vectors = iter(self.predictor.vectors(asks))
+        return [
+            self._found(h, point, self._linear(h, point, vectors, near), near, tail)
+            for h, point, near in zip(hypotheses, points, like, strict=True)
+        ]
+
+    def renewed(self, fits: Sequence[Fit]) -> list[Fit]:
+        """The fits, all with the same tail, with all derivatives anew."""
+        hypotheses, points = [fit.hypothesis for fit in fits], [fit.point for fit in fits]
+        return self.started(hypotheses, points, [None] * len(fits), fits[0].tail) if fits else []
+
+    def robust(self, fits: Sequence[Fit]) -> list[Fit]:
+        """The fits with pushes that have heavy tails."""
+        return [self._found(fit.hypothesis, fit.point, fit.pushes, fit, TAIL) for fit in fits]
+
+    def _asks(self, h: Hypothesis, point: Point, *, own: bool) -> list[Ask]:
+        """One rollout per push for a step of each coordinate that is simulated, and for each of its own unknowns."""
+        moved = []
+        for step in np.diag(h.steps(point.z)):
+            z = point.z.copy()
+            z[: h.simulated] += step
+            moved.append(Physics(h.theta(z), h.effects(z)))
+        here = Physics(h.theta(point.z), h.effects(point.z))
+        asks = []
+        for i in range(self.count):
+            asks += [Ask(i, physics, point.own[i]) for physics in moved]
+            asks += [Ask(i, here, seat) for seat in own_steps(point.own[i])] if own else []
+        return asks
+
+    def _linear(
+        self, h: Hypothesis, point: Point, vectors: Iterator[Array | None], near: Fit | None
+    ) -> tuple[LinearPush, ...]:
+        """All pushes from the rollouts of ``_asks``."""
+        pushes = []
+        for i, (whole, more) in enumerate(zip(point.predicted, self.tolerances, strict=True)):
+            base = whole - more @ point.z[h.simulated :]
+            shared = np.column_stack([*(slope(base, next(vectors), s) for s in h.steps(point.z)), more])
+            own = near.pushes[i].own if near is not None else own_slopes(base, point.own[i], vectors)
+            residual = self.predictor.recorded[i] - whole + own @ point.own[i]
+            pushes.append(LinearPush(residual=residual, shared=shared, own=own))
+        return tuple(pushes)
+
+    def _found(
+        self, h: Hypothesis, point: Point, pushes: tuple[LinearPush, ...], near: Fit | None, tail: float
+    ) -> Fit:
+        """The fit with its scatter, searched for from that of a fit that is near, and its loudness."""
+        counts = [len(push.residual) for push in pushes]
+        errors = [push.residual - push.own @ own for push, own in zip(pushes, point.own, strict=True)]
+        loudness = loudness_of([float(e @ e) for e in errors], counts, self.least, tail)
+        best = MIDDLE if near is None else SCATTERS.index(near.scatter)
+        for _ in range(2):
+            best, found = self._scattered(h, point, pushes, best, loudness, tail)
+            loudness = loudness_of([one.square for one in found], counts, self.least, tail)
+        scatter = SCATTERS[best]
+        return Fit(
+            hypothesis=h, point=point, pushes=pushes, scatter=scatter, loudness=loudness, tail=tail,
+            weighed=self._weighed(pushes, scatter, loudness, tail),
+            cost=self.cost(h, point, scatter, loudness, tail),
+        )  # fmt: skip
+
+    def _scattered(
+        self, h: Hypothesis, point: Point, pushes: Sequence[LinearPush], start: int, loudness: float, tail: float
+    ) -> tuple[int, tuple[Weighed, ...]]:
+        """The likeliest scatter's place in the grid, uphill from a start, and the pushes weighed with it."""
+        values: dict[int, tuple[float, tuple[Weighed, ...]]] = {}
+        best, last = start, -1
+        while best != last:
+            last = best
+            for k in (best - 1, best, best + 1):
+                if 0 <= k < len(SCATTERS) and k not in values:
+                    found = self._weighed(pushes, SCATTERS[k], loudness, tail)
+                    precision, right = normal_equations(found, h.mean - point.z, h.std)
+                    gained = 0.5 * float(right @ bounded(precision, right, None))  # when z has moved
+                    likelihood = sum(one.log_density for one in found)
+                    values[k] = likelihood + gained + log_prior_of_scatter(SCATTERS[k]), found
+            best = max(values, key=lambda k: values[k][0])
+        return best, values[best][1]
+
+    def _weighed(
+        self, pushes: Sequence[LinearPush], scatter: float, loudness: float, tail: float
+    ) -> tuple[Weighed, ...]:
+        return tuple(
+            weighed(push.residual, push.shared, push.own, prior, loudness, tail)
+            for push, prior in zip(pushes, self.priors(scatter), strict=True)
+        )
+
+    # Iteration.
+
+    def fitted(self, fits: Sequence[Fit], rounds: int) -> list[Fit]:
+        """The fits after so many steps at most, all of them in one batch."""
+        now = list(fits)
+        for _ in range(rounds):
+            going = [k for k, fit in enumerate(now) if not fit.done]
+            for k, fit in zip(going, self._stepped([now[k] for k in going]), strict=True):
+                now[k] = fit
+        return now
+
+    def _stepped(self, fits: Sequence[Fit]) -> list[Fit]:
+        """One step of each fit: the better point, linearised, or the same fit with shorter steps to come."""
+        steps = [self._step(fit) for fit in fits]
+        points = self.points([f.hypothesis for f in fits], [z for z, _ in steps], [own for _, own in steps])
+        results, better = list(fits), list[tuple[int, Point, Fit | None]]()
+        for k, (fit, point) in enumerate(zip(fits, points, strict=True)):
+            cost = math.inf if point is None else self._cost_as(fit, point)
+            if point is not None and fit.cost - cost > SETTLED:
+                better.append((k, point, None if fit.cost - cost > RENEWED * self.count else fit))
+            else:
+                damping = fit.damping * HARDENED
+                results[k] = dc.replace(fit, damping=damping, done=cost <= fit.cost or damping > HARDEST)
+        for tail in {fits[k].tail for k, _, _ in better}:
+            some = [one for one in better if fits[one[0]].tail == tail]
+            hypotheses = [fits[k].hypothesis for k, _, _ in some]
+            again = self.started(hypotheses, [point for _, point, _ in some], [near for *_, near in some], tail)
+            for (k, _, _), fit in zip(some, again, strict=True):
+                results[k] = dc.replace(fit, damping=fits[k].damping * EASED)
+        return results
+
+    def _cost_as(self, fit: Fit, point: Point) -> float:
+        """Of another point, with a fit's scatter and loudness."""
+        return self.cost(fit.hypothesis, point, fit.scatter, fit.loudness, fit.tail)
+
+    def _step(self, fit: Fit) -> tuple[Array, Own]:
+        """Where a damped Gauss-Newton step leads, within bounds."""
+        h, point = fit.hypothesis, fit.point
+        precision, right = normal_equations(fit.weighed, h.mean - point.z, h.std)
+        damped = precision + np.diag(fit.damping * np.diag(precision))
+        of_theta, free = np.full(h.space.dimension, MOST_THETA_MOVE), np.full(h.tolerances, np.inf)
+        # Coordinates of shape (a place, a speed) go no further in a step than their prior says they are unsure.
+        reach = np.concatenate([of_theta, [c.std for c in h.coordinates], free])
+        least, most = np.maximum(h.bounds[0] - point.z, -reach), np.minimum(h.bounds[1] - point.z, reach)
+        dz = bounded(damped, right, (least, most))
+        own = tuple(
+            np.clip(one.own + one.to_own @ dz, -furthest, furthest)
+            for one, furthest in zip(fit.weighed, self.most, strict=True)
+        )
+        return np.clip(point.z + dz, *h.bounds), own
+
+    def held_out(self, fit: Fit) -> Array:
+        """Log predictive density (n,) of each push given the others."""
+        h = fit.hypothesis
+        return held_out(
+            fit.pushes, self.priors(fit.scatter), h.mean - fit.point.z, h.std, fit.loudness, fit.weighed, fit.tail
+        )  # fmt: skip
+
+
+def normal_equations(found: Sequence[Weighed], mean: Array, std: Array) -> tuple[Array, Array]:
+    """Precision (n, n) of dz, and precision times estimate (n,), with its prior."""
+    precision = sum((one.precision for one in found), np.diag(std**-2.0))
+    right = sum((one.right for one in found), mean * std**-2.0)
+    ridge = 1e-12 * float(np.trace(precision)) * np.eye(len(right))
+    return np.asarray(precision + ridge), np.asarray(right)
+
+
+def own_steps(own: Array) -> list[Array]:
+    """Each of a push's unknowns (k,) stepped, towards its middle."""
+    return [own + step for step in np.diag(_own_sizes(own))]
+
+
+def own_slopes(base: Array, own: Array, vectors: Iterator[Array | None]) -> Array:
+    """Derivatives (m, k) by a push's unknowns, from the rollouts of ``own_steps``."""
+    return np.column_stack([slope(base, next(vectors), size) for size in _own_sizes(own)])
+
+
+def _own_sizes(own: Array) -> Array:
+    return np.where(own <= 0.0, OWN_STEP, -OWN_STEP)
+
+
+def slope(base: Array, moved: Array | None, step: float) -> Array:
+    """Of a prediction (m,); none where the step cannot be rolled out."""
+    return np.zeros_like(base) if moved is None else (moved - base) / step

@@ -1,0 +1,118 @@
+"""The same recording without any effect, many times: how large the best held-out gain of the catalogue is by chance.
+
+Replicates are drawn from a fitted model at this recording's pushes, with its noise and scatter, refitted and searched
+by linear algebra on the score tests' columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+from scipy.linalg import cho_factor, cho_solve
+
+from physid_drake.inference.fit import Fit, Fitter
+from physid_drake.inference.scatter import SCATTERS, log_prior_of_scatter
+from physid_drake.inference.scores import Column, by_family
+
+Array = NDArray[np.float64]
+
+REPLICATES = 300
+NEIGHBOURS = 2  # of the scatter's grid, on either side, that a refit may come to
+TAIL_SHARE = 0.15  # of the replicates: whose excesses give the tail beyond the largest
+
+
+def largest_gains(fitter: Fitter, fit: Fit, found: Sequence[Column], rng: np.random.Generator) -> tuple[float, Array]:
+    """The largest held-out gain of any family, linearly: of the recording, and (REPLICATES,) where the model is true.
+
+    A push that is odd in the fit is as loud in all.
+    """
+    drawn = [
+        np.column_stack([push.residual, _drawn(push.own, prior, one.weight**-0.5, rng)])
+        for push, prior, one in zip(fit.pushes, fitter.priors(fit.scatter), fit.weighed, strict=True)
+    ]
+    k = SCATTERS.index(fit.scatter)
+    grid = SCATTERS[max(0, k - NEIGHBOURS) : k + NEIGHBOURS + 1]
+    tables = [_Table(fitter, fit, found, drawn, scatter) for scatter in grid]
+    null = _best([table.scored([]) for table in tables])
+    largest = np.full(1 + REPLICATES, -np.inf)
+    for members in by_family(found):
+        largest = np.maximum(largest, _best([table.scored(members) for table in tables]) - null)
+    return float(largest[0]), largest[1:]
+
+
+def p_value(seen: float, replicates: Array) -> float:
+    """Chance that a replicate has as large a value; beyond the replicates by an exponential tail."""
+    count = len(replicates)
+    above = int((replicates >= seen).sum())
+    if above >= 10:
+        return (1.0 + above) / (1.0 + count)
+    start = float(np.quantile(replicates, 1.0 - TAIL_SHARE))
+    excesses = replicates[replicates > start] - start
+    return TAIL_SHARE * float(stats.expon.sf(max(0.0, seen - start), scale=float(excesses.mean())))
+
+
+def _drawn(own: Array, prior: Array, loudness: float, rng: np.random.Generator) -> Array:
+    """Residuals (m, REPLICATES) of a push."""
+    noise = loudness * rng.standard_normal((len(own), REPLICATES))
+    return np.asarray(noise + own @ (prior[:, None] * rng.standard_normal((own.shape[1], REPLICATES))))
+
+
+def _best(scored: Sequence[tuple[Array, Array]]) -> Array:
+    """Held-out densities at the scatter that is likeliest, replicate by replicate."""
+    values = np.array([value for value, _ in scored])
+    held = np.array([one for _, one in scored])
+    return np.asarray(held[np.argmax(values, axis=0), np.arange(held.shape[1])])
+
+
+class _Table:
+    """Normal equations of all columns, push by push, at one scatter, for drawn residuals (m_i, r) of each."""
+
+    def __init__(
+        self, fitter: Fitter, fit: Fit, found: Sequence[Column], drawn: Sequence[Array], scatter: float
+    ) -> None:
+        self.found, self.n = found, fit.hypothesis.dimension
+        self.std = np.concatenate([fit.hypothesis.std, [c.coordinate.std for c in found]])
+        self.log_prior = log_prior_of_scatter(scatter)
+        self.precisions, self.rights, self.squares, self.log_dets = [], [], [], []
+        for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(scatter), strict=True)):
+            shared = np.column_stack([push.shared, *(c.pushes[i] for c in found)])
+            own = push.own * prior
+            factor = cho_factor(np.eye(len(own)) / fit.weighed[i].weight + own @ own.T, lower=True)
+            solved = cho_solve(factor, shared)
+            self.precisions.append(shared.T @ solved)
+            self.rights.append(solved.T @ drawn[i])
+            self.squares.append(np.einsum("ij,ij->j", drawn[i], cho_solve(factor, drawn[i])))
+            self.log_dets.append(2.0 * float(np.log(np.diag(factor[0])).sum()))
+
+    def scored(self, members: Sequence[int]) -> tuple[Array, Array]:
+        """Log likelihood and sum of held-out log densities (r,) of the model with some of the columns.
+
+        Where the only coordinate of a family would go below its bound, it is none.
+        """
+        index = [*range(self.n), *(self.n + j for j in members)]
+        blocks, rights = [p[np.ix_(index, index)] for p in self.precisions], [r[index] for r in self.rights]
+        whole, right = sum(blocks, np.diag(self.std[index] ** -2.0)), sum(rights, np.zeros_like(rights[0]))
+        whole = whole + 1e-12 * float(np.trace(whole)) * np.eye(len(index))
+        beta, log_det = np.linalg.solve(whole, right), np.linalg.slogdet(whole)[1]
+        value = self.log_prior + 0.5 * (_dot(right, beta) - sum(self.squares) - sum(self.log_dets))
+        held = np.zeros(len(value))
+        for block, r, square, own in zip(blocks, rights, self.squares, self.log_dets, strict=True):
+            others = whole - block
+            b = np.linalg.solve(others, right - r)
+            left = r - block @ b
+            held -= 0.5 * (square - _dot(b, 2.0 * r - block @ b) - _dot(left, np.linalg.solve(whole, left)))
+            held -= 0.5 * (own + log_det - np.linalg.slogdet(others)[1])
+        if len(members) == 1:
+            c = self.found[members[0]]
+            wrong = beta[-1] < c.coordinate.lower - c.null
+            value, held = np.where(wrong, -np.inf, value), np.where(wrong, -np.inf, held)
+        return value, held
+
+
+def _dot(first: NDArray[Any], second: NDArray[Any]) -> Array:
+    """Of each column."""
+    return np.asarray((first * second).sum(axis=0), dtype=np.float64)

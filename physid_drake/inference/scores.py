@@ -1,0 +1,162 @@
+"""Score tests: what effects would change at a fitted model, and how much of what is left that explains, linearly."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.effects import Coordinate, Effect, Family
+from physid_drake.inference.bounded import bounded
+from physid_drake.inference.fit import Fit, Fitter, slope
+from physid_drake.inference.predictions import Ask, Physics
+from physid_drake.inference.push import weighed
+
+Array = NDArray[np.float64]
+
+
+@dc.dataclass(frozen=True, kw_only=True, eq=False)
+class Column:
+    """What one coordinate of an effect changes, where a family of its score tests leaves the null.
+
+    Attributes:
+        kind, family: the effect, and where in its chart.
+        index: of the coordinate in the chart.
+        coordinate: itself.
+        pushes: derivative (m_i,) of each push, in units of noise.
+    """
+
+    kind: type[Effect]
+    family: Family
+    index: int
+    coordinate: Coordinate
+    pushes: tuple[Array, ...]
+
+    @property
+    def null(self) -> float:
+        """The coordinate's value where the family is null."""
+        return self.family.point[self.index]
+
+
+@dc.dataclass(frozen=True, kw_only=True, eq=False)
+class Score:
+    """How much a family explains.
+
+    Attributes:
+        kind, family: which.
+        gain: in log likelihood.
+        point: (k,) of the chart, where the linear fit ends.
+        dz: (n,) change of the model's own coordinates that goes with it.
+    """
+
+    kind: type[Effect]
+    family: Family
+    gain: float
+    point: Array
+    dz: Array
+
+
+def columns(fitter: Fitter, fit: Fit, kinds: Sequence[type[Effect]]) -> list[Column]:
+    """The columns of all families of effects, the model's own effects staying where they are."""
+    around = fitter.case.around
+    blank = [
+        Column(kind=kind, family=family, index=j, coordinate=kind.chart(around)[j], pushes=())
+        for kind in kinds
+        for family in kind.families(around)
+        for j in family.free
+    ]
+    simulated = _simulated(fitter, fit, [c for c in blank if not c.family.shares])
+    made = []
+    for c in blank:
+        parts = [s for s in simulated if s.kind is c.kind]
+        made.append(_added_up(c, parts) if c.family.shares else next(s for s in parts if _same(s, c)))
+    return made
+
+
+def _same(first: Column, second: Column) -> bool:
+    return first.family == second.family and first.index == second.index
+
+
+def _simulated(fitter: Fitter, fit: Fit, blank: Sequence[Column]) -> list[Column]:
+    h, point, around = fit.hypothesis, fit.point, fitter.case.around
+    theta, present = h.theta(point.z), h.effects(point.z)
+
+    def stepped(c: Column, sign: float) -> Physics:
+        at = np.array(c.family.point)
+        at[c.index] += sign * c.family.size * c.coordinate.step
+        return Physics(theta, (*present, c.kind.at(at, around)))
+
+    sides = [[stepped(c, sign) for sign in ((1.0, -1.0) if c.family.central else (1.0,))] for c in blank]
+    asks = [
+        Ask(i, physics, point.own[i]) for both in sides for physics in both for i in range(fitter.count)
+    ]  # fmt: skip
+    vectors = iter(fitter.predictor.vectors(asks))
+    plain: list[Array | None] = [
+        p - more @ point.z[h.simulated :] for p, more in zip(point.predicted, fitter.tolerances, strict=True)
+    ]
+    made = []
+    for c, both in zip(blank, sides, strict=True):
+        after = [next(vectors) for _ in range(fitter.count)]
+        before = [next(vectors) for _ in range(fitter.count)] if len(both) == 2 else plain
+        width = len(both) * c.family.size * c.coordinate.step
+        slopes = tuple(
+            np.zeros_like(point.predicted[i]) if b is None else slope(b, a, width)
+            for i, (b, a) in enumerate(zip(before, after, strict=True))
+        )
+        made.append(dc.replace(c, pushes=slopes))
+    return made
+
+
+def _added_up(blank: Column, parts: Sequence[Column]) -> Column:
+    """So much of each of an effect's simulated columns (small effects add up)."""
+    shares = np.array(blank.family.shares)
+    pushes = tuple(
+        np.column_stack([part.pushes[i] for part in parts]) @ shares for i in range(len(parts[0].pushes))
+    )  # fmt: skip
+    return dc.replace(blank, pushes=pushes)
+
+
+def by_family(found: Sequence[Column]) -> list[list[int]]:
+    """Indices of the columns of each family."""
+    families: dict[tuple[str, Family], list[int]] = {}
+    for k, c in enumerate(found):
+        families.setdefault((c.kind.name, c.family), []).append(k)
+    return list(families.values())
+
+
+def scores(fitter: Fitter, fit: Fit, found: Sequence[Column]) -> list[Score]:
+    """The score test of each family, best first: how much a model with it gains, all else refitted, linearly."""
+    h = fit.hypothesis
+    n, mean = h.dimension, h.mean - fit.point.z
+    precision, right = np.zeros((n + len(found),) * 2), np.zeros(n + len(found))
+    precision[:n, :n], right[:n] = np.diag(h.std**-2.0), mean * h.std**-2.0
+    for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(fit.scatter), strict=True)):
+        shared = np.column_stack([push.shared, *(c.pushes[i] for c in found)])
+        one = weighed(push.residual, shared, push.own, prior, fit.loudness, fit.tail)
+        precision += one.precision
+        right += one.right
+    precision += np.diag(np.concatenate([np.zeros(n), [c.coordinate.std**-2.0 for c in found]]))
+    base, _ = _solved(precision, right, list(range(n)), [])
+    made = []
+    for members in by_family(found):
+        some = [found[k] for k in members]
+        gain, beta = _solved(precision, right, [*range(n), *(n + k for k in members)], some)
+        point = np.array(some[0].family.point)
+        point[[c.index for c in some]] += beta[n:]
+        made.append(
+            Score(kind=some[0].kind, family=some[0].family, gain=gain - base, point=point, dz=beta[:n])
+        )  # fmt: skip
+    return sorted(made, key=lambda s: -s.gain)
+
+
+def _solved(precision: Array, right: Array, index: list[int], some: Sequence[Column]) -> tuple[float, Array]:
+    """Gain in log likelihood of some coordinates, the last of which are those of columns, and where they end."""
+    block, r = precision[np.ix_(index, index)], right[index]
+    block = block + 1e-12 * float(np.trace(block)) * np.eye(len(index))
+    free = [np.inf] * (len(index) - len(some))
+    least = [-one for one in free] + [c.coordinate.lower - c.null for c in some]
+    most = free + [c.coordinate.upper - c.null for c in some]
+    beta = bounded(block, r, (np.array(least), np.array(most)))
+    return float(r @ beta - 0.5 * beta @ block @ beta), beta

@@ -1,0 +1,59 @@
+"""A push may have two ways to go: its own unknowns, looked for from many starts."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.inference.fit import Fit, Fitter, own_slopes, own_steps
+from physid_drake.inference.predictions import Ask, Physics
+from physid_drake.inference.push import weighed
+
+Array = NDArray[np.float64]
+
+DRAWN, STEPS = 4, 4  # starts of a push's unknowns that are drawn; steps from each
+
+
+def reseated(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
+    """The fit with each push's unknowns where they are likeliest; z stays where it is.
+
+    An object that is about to slip off the hand goes one way or the other. Given z, a push's cost depends on its own
+    unknowns alone, so that all pushes are looked at in one batch.
+    """
+    h, point = fit.hypothesis, fit.point
+    physics, priors = Physics(h.theta(point.z), h.effects(point.z)), fitter.priors(fit.scatter)
+    added = [more @ point.z[h.simulated :] for more in fitter.tolerances]
+
+    def cost(i: int, own: Array, predicted: Array) -> float:
+        return fitter.cost_of_push(i, own, predicted, priors[i], fit.loudness, fit.tail)
+
+    owns = list(point.own)
+    best = [cost(i, own, predicted) for i, (own, predicted) in enumerate(zip(owns, point.predicted, strict=True))]
+    seats = [(i, seat) for i, own in enumerate(owns) for seat in _starts(own, fitter.most[i], rng)]
+    for _ in range(STEPS):
+        asks = [Ask(i, physics, one) for i, seat in seats for one in (seat, *own_steps(seat))]
+        vectors, again = iter(fitter.predictor.vectors(asks)), []
+        for i, seat in seats:
+            base = next(vectors)
+            if base is None:
+                for _ in seat:
+                    next(vectors)
+                continue
+            here = cost(i, seat, base + added[i])
+            if here < best[i]:
+                best[i], owns[i] = here, seat
+            own = own_slopes(base, seat, vectors)
+            residual = fitter.predictor.recorded[i] - base - added[i] + own @ seat
+            none = np.zeros((len(residual), 0))
+            step = weighed(residual, none, own, priors[i], fit.loudness, fit.tail)
+            again.append((i, np.clip(step.own, -fitter.most[i], fitter.most[i])))
+        seats = again
+    if all(new is old for new, old in zip(owns, point.own, strict=True)):
+        return fit
+    moved = fitter.points([h], [point.z], [tuple(owns)])[0]
+    return fit if moved is None else fitter.started([h], [moved], [None], fit.tail)[0]
+
+
+def _starts(own: Array, most: Array, rng: np.random.Generator) -> list[Array]:
+    """Where the unknowns (k,) are, zero, and draws."""
+    return [own, np.zeros(len(own)), *np.clip(rng.standard_normal((DRAWN, len(own))), -most, most)]
