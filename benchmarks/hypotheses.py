@@ -2,8 +2,10 @@
 
 PROOF is a folder of ``python -m physid_drake.prove.make`` whose truth lies open. For each world: the p-value of the
 baseline from replicates, the hypotheses whose held-out pushes are likeliest with their gain over the baseline in nats
-(its spread over pushes) and loudness, which is 1 where noise explains what is left, and CPU seconds. Pairs of effects
-are fitted where replicates of the best single one say that something else is missing.
+(its spread over pushes) and loudness, which is 1 where noise explains what is left, and CPU seconds of the baseline
+and of all that follows. Pairs of effects are fitted where replicates of the best single one say that something else
+is missing. ``--chance`` takes only the worlds without an effect, fits no effect, and says how often p is below some
+values: as often as they say, at best.
 """
 
 import argparse
@@ -27,17 +29,23 @@ from physid_drake.recording.reading import read_recording
 ALPHA = 0.01
 SINGLES = 4  # effects, beside each of which a second one is looked for
 SHOWN = 4
+LEVELS = (0.001, 0.01, 0.05, 0.1, 0.5)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("proof", type=Path)
     parser.add_argument("worlds", nargs="*", metavar="WORLD")
+    parser.add_argument("--chance", action="store_true")
     given = parser.parse_args()
     folders = sorted((given.proof / "recordings").iterdir())
-    for folder in folders:
-        if not given.worlds or folder.name in given.worlds:
-            print(line(folder, truth_of(given.proof, folder.name)), flush=True)
+    truths = {f: truth_of(given.proof, f.name) for f in folders if not given.worlds or f.name in given.worlds}
+    if given.chance:
+        values = np.array([chance(folder) for folder, truth in truths.items() if truth == "none"])
+        print(", ".join(f"below {a:g}: {np.sum(values < a)} of {len(values)}" for a in LEVELS))
+        return
+    for folder, truth in truths.items():
+        print(line(folder, truth), flush=True)
 
 
 def truth_of(proof, name):
@@ -45,16 +53,26 @@ def truth_of(proof, name):
     return ", ".join(f"{e['name']} {e['calibrated_size_sigma']:.1f}" for e in sealed["effects"]) or "none"
 
 
-def line(folder, truth):
-    begin = time.process_time()
+def plain_of(folder, rng):
+    """The fitter of a recording, the baseline fitted, the catalogue's columns beside it, and its p-value."""
     recording = read_recording(folder)
     case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=1)
-    ready = time.process_time()
-    predictor = Predictor(case)
-    fitter, rng = Fitter(case, predictor), np.random.default_rng(0)
+    fitter = Fitter(case, Predictor(case))
     plain = baseline(fitter, Hypothesis(space=case.thetas.space, around=case.around), rng)
     plain, found = with_tolerances(fitter, plain)
-    p = p_value(*largest_gains(fitter, plain, found, rng))
+    return fitter, plain, found, p_value(*largest_gains(fitter, plain, found, rng))
+
+
+def chance(folder):
+    p = plain_of(folder, np.random.default_rng(0))[-1]
+    print(f"{folder.name} p {p:.2g}", flush=True)
+    return p
+
+
+def line(folder, truth):
+    begin, rng = time.process_time(), np.random.default_rng(0)
+    fitter, plain, found, p = plain_of(folder, rng)
+    case, ready = fitter.case, time.process_time()
     fits = ranked(fitter, with_one_more(fitter, plain, found))
     left = None
     if p < ALPHA:
@@ -69,7 +87,7 @@ def line(folder, truth):
         gains = fitter.held_out(fit) - before
         spread = gains.std() * len(gains) ** 0.5
         shown.append(f"{fit.hypothesis.name} {gains.sum():.1f}+-{spread:.1f} ({fit.loudness:.2f})")
-    seconds = f"{ready - begin:.1f} + {time.process_time() - ready:.1f} s, {predictor.count} rollouts"
+    seconds = f"{ready - begin:.1f} + {time.process_time() - ready:.1f} s, {fitter.predictor.count} rollouts"
     beside = "" if left is None else f", p beside the best {left:.2g}"
     return f"{folder.name} [{truth}] {len(case.problems)} pushes, p {p:.2g}{beside}: {'; '.join(shown)} | {seconds}"
 

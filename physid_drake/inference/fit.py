@@ -34,7 +34,7 @@ MOST_THETA_MOVE = 0.25  # of the unit cube in one step
 RENEWED = 5.0  # of the cost, per push: a step that gained as much has left the place of its derivatives
 SETTLED = 0.3  # of the cost: a step that gained less is the last
 FIRST_DAMPING, EASED, HARDENED, HARDEST = 1e-3, 0.2, 8.0, 1e4
-LOUDEST_UNKNOWN = 1e-3  # a noise that nobody knows may be as small as this share of what is taken for it
+QUIETEST = 1e-3  # a noise that nobody knows may be as small as this share of what is taken for it
 MIDDLE = int(np.argmin(np.abs(np.log(SCATTERS))))  # of the scatters: the prior's median
 
 
@@ -99,7 +99,7 @@ class Fitter:
     def __init__(self, case: Case, predictor: Predictor) -> None:
         self.case, self.predictor = case, predictor
         self.count = len(case.problems)
-        self.least = 1.0 if case.noise.known else LOUDEST_UNKNOWN
+        self.least = 1.0 if case.noise.known else QUIETEST
         self.tolerances = tuple(np.zeros((len(y), 0)) for y in predictor.recorded)
         self.most = [
             np.array([MOST_FRICTION if name == "friction" else MOST_OWN for name in n.names]) for n in case.nuisances
