@@ -88,7 +88,7 @@ class HandPath:
             begin: as of ``last_brake`` [s].
             end: the same.
         """
-        brake = self.last_brake(begin, end) if share else None
+        brake = self.last_brake(begin, end)
         if brake is None:
             return self
         first, last = (knot // self.pieces for knot in brake)
