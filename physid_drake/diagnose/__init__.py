@@ -4,5 +4,6 @@ from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.leaving import model_of
 from physid_drake.diagnose.story import diagnose
 from physid_drake.diagnose.values import Diagnosis
+from physid_drake.pushes.case import Case, case_of, cell_config
 
-__all__ = ["Diagnosis", "Evidence", "diagnose", "model_of"]
+__all__ = ["Case", "Diagnosis", "Evidence", "case_of", "cell_config", "diagnose", "model_of"]

@@ -9,3 +9,4 @@ from physid_drake.identify.identify import Identification as Identification
 from physid_drake.identify.identify import Identifier as Identifier
 from physid_drake.identify.online import OnlineBelief as OnlineBelief
 from physid_drake.identify.online import OnlineIdentifier as OnlineIdentifier
+from physid_drake.pushes.config import ThetaConfig as ThetaConfig
