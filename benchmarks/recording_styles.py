@@ -2,7 +2,7 @@
 
 Six pushes of a box in the planar integrator of the tests, 0.06 to 0.57 m/s, without an effect, and with a friction
 that does not scatter. They are sampled, rounded, stamped and cut as people's recordings are, written and read back,
-and the plain cell is fitted to them from the true theta, as a diagnosis does it. What costs much more than the plain
+and the plain cell is fitted to them as a diagnosis does it. What costs much more than the plain
 style (0.3 mm, 3 mrad, a hand of 0.1 mm, 100 Hz), also with what the hand's path and the cell itself may be off by,
 would be called missing physics.
 """
@@ -26,8 +26,10 @@ from reference.planar import Hand, simulate_planar
 from reference.scenes import OBJECTS, TIME_STEP, draw_push
 from twin import shape_of
 
-from physid_drake.diagnose.fit import Fitter
-from physid_drake.diagnose.plain import numerics, path_errors
+from physid_drake.diagnose.hypotheses import baseline, with_tolerances
+from physid_drake.inference.fit import Fitter
+from physid_drake.inference.hypothesis import Hypothesis
+from physid_drake.inference.predictions import Predictor
 from physid_drake.pushes.case import case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import Hand as Tip
@@ -173,19 +175,18 @@ def row(name, style, jobs):
         write_recording(recorded(style), Path(folder) / "styles")
         recording = read_recording(Path(folder) / "styles")
     case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=jobs)
-    space, true = case.thetas.space, {"mass": BODY.mass, "support_friction": FRICTION, "hand_friction": HAND_FRICTION}
-    fitter = Fitter(case)
-    fitted = fitter.fit(fitter.start(np.asarray(space.to_unit(np.array([true[p.name] for p in space.parameters])))))
-    friction = dict(zip(space.names, space.from_unit(fitted.state.u), strict=True))["support_friction"]
-    costs = [f"{cost:.2f}" for cost in (fitted.reduced_chi2, guarded(case, fitted.state))]
+    space = case.thetas.space
+    fitter = Fitter(case, Predictor(case))
+    fits = [baseline(fitter, Hypothesis(space=space, around=case.around), np.random.default_rng(0))]
+    fits.append(with_tolerances(fitter, fits[0], ())[0])
+    friction = dict(zip(space.names, fits[0].hypothesis.theta(fits[0].point.z), strict=True))["support_friction"]
+    costs = [f"{left(fit):.2f}" for fit in fits]
     return name, *costs, f"{friction:.4f}", "; ".join(w[:60] for w in case.warnings)
 
 
-def guarded(case, state):
-    """The cost with what path and cell may be off by."""
-    extra = zip(numerics(case, state), path_errors(case, state, lambda *_: None), strict=True)
-    fitter = Fitter(case, [np.column_stack(pair) for pair in extra])
-    return fitter.guard(Fitter(case).linearise(state)).reduced_chi2
+def left(fit):
+    """Squares that a model leaves, in units of noise, per number."""
+    return sum(one.square for one in fit.weighed) / sum(len(push.residual) for push in fit.pushes)
 
 
 def main():

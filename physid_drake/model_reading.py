@@ -16,7 +16,8 @@ from physid_drake.cell import Body, CellConfig
 from physid_drake.cell.checks import MOST_CELLS, check_config
 from physid_drake.cell.config import ContactConfig, SolverConfig
 from physid_drake.cell.solid import solid_of
-from physid_drake.effects import Effect, effect_named
+from physid_drake.effects import OF_MODELS, Effect, effect_named
+from physid_drake.effects.unnamed import FRICTIONS, OVER_PLACES, UnnamedForce
 from physid_drake.errors import CellError, ConfigError, PhysidError, RecordingError
 from physid_drake.model import AS_W, COMPLETE, FORMAT, SHAPES, Correlation, Model
 from physid_drake.pushes.theta import RANGES
@@ -29,6 +30,7 @@ LARGEST = 1e9  # of any number, in SI units
 LONGEST = 10.0  # m: of a tip, or of a place on the object
 FURTHEST = 1100.0  # m: of a table's corner
 FASTEST = 1000.0  # m/s: of a hand
+MOST_LOG = 10.0  # of a friction's factor
 LIGHTEST, HEAVIEST = 1e-6, 1e6  # kg: of an object
 UNIT = Range(least=-1.001, most=1.001)  # of a unit vector's components, with round-off
 
@@ -208,19 +210,53 @@ def _effects(found: Any) -> tuple[Effect, ...]:
 
 
 def _effect(content: Mapping[str, Any]) -> Effect:
-    kind = effect_named(_text("effects.name", _given(content, "name", "effects.")))
+    kind = effect_named(_text("effects.name", _given(content, "name", "effects.")), OF_MODELS)
     nulls, ranges = {f.name: f.default for f in dc.fields(kind)}, kind.ranges()
     place = f"effects.{kind.name}"
     parameters: dict[str, Any] = {}
     for name, value in _mapping(place, _given(content, "parameters", f"{place}."), nulls).items():
         key = f"{place}.{name}"
-        if isinstance(nulls[name], tuple):
+        if kind is UnnamedForce:
+            parameters[name] = _table_of(key, name, value)
+        elif isinstance(nulls[name], tuple):
             parameters[name] = _grid(key, value)
         else:
             parameters[name] = _number(key, value, ranges.get(name, ANY))
     for name in nulls:
         _given(parameters, name, f"{place}.")
+    if kind is UnnamedForce:
+        _refuse_uneven(place, parameters)
     return kind(**parameters)
+
+
+def _table_of(key: str, name: str, value: Any) -> Any:
+    """Rows of numbers, a row, or none, of what has no name; or where they stand."""
+    if name == "places":
+        x, y, step_x, step_y = _numbers(key, value, 4, Range(least=-FURTHEST, most=FURTHEST))
+        return (x, y, *(_number(key, step, POSITIVE) for step in (step_x, step_y)))
+    if name == "speeds":
+        slowest, fastest = _numbers(key, value, 2, POSITIVE)
+        return slowest, _number(key, fastest, Range(above=slowest))
+    if not isinstance(value, list) or len(value) > MOST_CELLS:
+        raise ConfigError(f"key '{key}': must be a list of at most {MOST_CELLS}, but is {shown(value)}.")
+    allowed = Range(least=-MOST_LOG, most=MOST_LOG) if name in FRICTIONS else ANY
+    if name not in OVER_PLACES:
+        return tuple(_numbers(key, value, len(value), allowed))
+    if not all(isinstance(row, list) and 0 < len(row) == len(value[0]) <= MOST_CELLS for row in value):
+        raise ConfigError(f"key '{key}': must be rows of one length, at most {MOST_CELLS}, but is {shown(value)}.")
+    return tuple(tuple(_numbers(key, row, len(row), allowed)) for row in value)
+
+
+def _refuse_uneven(place: str, parameters: Mapping[str, Any]) -> None:
+    """Two components of one force have as many numbers.
+
+    Raises:
+        ConfigError: if they have not.
+    """
+    for first, second in (("force_x", "force_y"), ("along", "across")):
+        a, b = parameters.get(first, ()), parameters.get(second, ())
+        if a and b and np.shape(a) != np.shape(b):
+            raise ConfigError(f"keys '{place}.{first}' and '{place}.{second}': must have as many numbers.")
 
 
 def _grid(key: str, rows: Any) -> tuple[tuple[float, ...], ...]:

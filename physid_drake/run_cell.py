@@ -205,7 +205,7 @@ def _diagnose(
     write(folder, diagnosis, evidence, page=DIAGNOSIS_PAGE)
     show(console, diagnosis)
     console.print(f"written: diagnosis.json, diagnosis.html, scene.html and model.yaml in {folder.path}")
-    return diagnosis, model_of(diagnosis, evidence)
+    return diagnosis, model_of(evidence)
 
 
 def _planned_again(

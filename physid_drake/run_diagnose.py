@@ -8,18 +8,19 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from pydrake.geometry import Meshcat
 from rich.console import Console
 from rich.text import Text
 
 from physid_drake.diagnose import Diagnosis, Evidence, diagnose, model_of
-from physid_drake.diagnose.leaving import fit_that_leaves
 from physid_drake.effects import effect_named
 from physid_drake.errors import ConfigError
 from physid_drake.pushes.case import Case, case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.pushes.kept_rollouts import KeptRollouts
 from physid_drake.pushes.rollouts import simulate
+from physid_drake.pushes.task import Task
 from physid_drake.recording import digest_of, read_recording
 from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
 from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
@@ -157,20 +158,25 @@ def write(
     pushes = shown_pushes(diagnosis, evidence)
     folder.forget("diagnosis.json")  # an earlier one's belongs to another model
     folder.write(page, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches, scene=scene))
-    folder.write("model.yaml", model_of(diagnosis, evidence).dump())
-    stage = staged(diagnosis, evidence).StaticHtml()
+    folder.write("model.yaml", model_of(evidence).dump())
+    stage = staged(evidence).StaticHtml()
     folder.write(scene, scene_page(stage, diagnosis, evidence.wrenches, unit_force_of(evidence)))
     folder.write("diagnosis.json", diagnosis_json(diagnosis))  # last: where it is, all is
 
 
-def staged(diagnosis: Diagnosis, evidence: Evidence, meshcat: Meshcat | None = None) -> Meshcat:
+def staged(evidence: Evidence, meshcat: Meshcat | None = None) -> Meshcat:
     """The pushes in Meshcat: recorded, and as the model that leaves has them, with what the plain cell lacks."""
-    case, state = evidence.case, fit_that_leaves(diagnosis, evidence).state
+    case, fit = evidence.case, evidence.leaving
+    h, z = fit.hypothesis, fit.point.z
     stage = Stage(case.recording, meshcat)
-    as_told = evidence.fitter.start(state.u, state.effects)  # nothing known of the pushes themselves
     scenes = []
     for i in range(min(SHOWN, len(case.problems))):
-        task = evidence.fitter.task(as_told, i)
+        problem, nuisance = case.problems[i], case.nuisances[i]
+        task = Task(
+            problem=problem, theta=h.theta(z), nuisance=nuisance,
+            values=np.zeros(len(nuisance.names)),  # nothing known of the pushes themselves
+            effects=h.effects(z),
+        )  # fmt: skip
         scenes.append(ShownMotion(push=case.recording.pushes[i], motion=simulate(case.pool.spec, case.thetas, task)))
     stage.play(scenes)
     stage.show_missing(evidence.wrenches, unit_force_of(evidence))

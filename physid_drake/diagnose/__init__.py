@@ -1,7 +1,7 @@
 """Diagnosis: where simulation and recording part, and what physics is missing."""
 
 from physid_drake.diagnose.evidence import Evidence
-from physid_drake.diagnose.leaving import model_of
+from physid_drake.diagnose.exported import model_of
 from physid_drake.diagnose.story import diagnose
 from physid_drake.diagnose.values import Diagnosis
 from physid_drake.pushes.case import Case, case_of, cell_config

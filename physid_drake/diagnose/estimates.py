@@ -10,20 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.evidence import Evidence
-from physid_drake.diagnose.model import EffectPoint, Fitted
-from physid_drake.diagnose.screen import (
-    log_probability,
-    projected,
-)
-from physid_drake.diagnose.values import (
-    Detectable,
-    ParameterEstimate,
-    ThetaEstimate,
-)
-from physid_drake.effects import Effect
-from physid_drake.effects.effect import Coordinate
+from physid_drake.diagnose.search import Found
+from physid_drake.diagnose.values import Detectable, ParameterEstimate, ThetaEstimate
+from physid_drake.effects import Coordinate, Effect
 from physid_drake.identify.cells import TOLD
+from physid_drake.inference.fit import Fit, Fitter
+from physid_drake.inference.hypothesis import Hypothesis, Part
+from physid_drake.inference.push import weighed
+from physid_drake.inference.scores import Column
 from physid_drake.pushes.case import Case
 from physid_drake.pushes.theta import CELL_ERROR, cell_error
 
@@ -36,31 +30,28 @@ JOINT_SAMPLES = 2000  # of theta and all charts, for how the estimates vary toge
 DOUBTFUL = 0.5
 
 
-def shared_covariance(fitted: Fitted) -> Array:
-    """Covariance (d, d) of theta and the effects' coordinates, widened where the model does not fit."""
-    covariance: Array = np.asarray(np.linalg.pinv(fitted.solution.precision), dtype=np.float64)
-    widened: Array = covariance * max(1.0, fitted.reduced_chi2)
-    return widened
-
-
-def _t_factor(fitted: Fitted) -> float:
+def _t_factor(fit: Fit) -> float:
     """How much wider than a normal interval one is with so few pushes; the cell's own error does not grow with it."""
-    free = max(2, len(fitted.pushes) - fitted.own_dimension)
+    free = max(2, len(fit.pushes) - fit.hypothesis.simulated)
     return float(stats.t.ppf(0.95, free)) / Z90
 
 
-def parameters_of(evidence: Evidence, k: int) -> dict[str, ParameterEstimate]:
+def coordinates_of(h: Hypothesis, k: int) -> slice:
+    """Where in z the free coordinates of effect k are."""
+    begin = h.space.dimension + sum(len(part.free) for part in h.parts[:k])
+    return slice(begin, begin + len(h.parts[k].free))
+
+
+def parameters_of(fitter: Fitter, fit: Fit, k: int) -> dict[str, ParameterEstimate]:
     """Values and intervals of the k-th effect, by drawing its chart point."""
-    final, case = evidence.final, evidence.case
-    here = final.state.effects[k]
-    at = len(final.state.u) + sum(len(e.free) for e in final.state.effects[:k])
-    part = slice(at, at + len(here.free))
-    seen = _t_factor(final) ** 2 * shared_covariance(final)[part, part]
-    covariance = seen + np.diag(_own_error(here, case) ** 2)
+    h, part = fit.hypothesis, fit.hypothesis.parts[k]
+    here, some = h.points(fit.point.z)[k], coordinates_of(h, k)
+    seen = _t_factor(fit) ** 2 * fitter.covariance(fit)[some, some]
+    covariance = seen + np.diag(_own_error(part, here, h) ** 2)
     rng = np.random.default_rng(0)
-    draws = rng.multivariate_normal(np.zeros(len(here.free)), covariance, SAMPLES, method="eigh")
-    drawn = [here.moved(case, d).effect(case) for d in _more_than_nothing(here, case, draws)]
-    effect = here.effect(case)
+    draws = rng.multivariate_normal(np.zeros(len(part.free)), covariance, SAMPLES, method="eigh")
+    drawn = [_moved(part, here, h, d) for d in _more_than_nothing(part, here, h, draws)]
+    effect = part.kind.at(here, h.around)
     return {
         name: ParameterEstimate(
             value=_plain(getattr(effect, name)),
@@ -72,14 +63,21 @@ def parameters_of(evidence: Evidence, k: int) -> dict[str, ParameterEstimate]:
     }
 
 
-def _own_error(here: EffectPoint, case: Case) -> Array:
+def _moved(part: Part, here: Array, h: Hypothesis, change: Array) -> Effect:
+    """The effect with its free coordinates moved, within their bounds."""
+    point, chart = here.copy(), part.kind.chart(h.around)
+    for j, step in zip(part.free, change.tolist(), strict=True):
+        point[j] = float(np.clip(point[j] + step, chart[j].lower, chart[j].upper))
+    return part.kind.at(point, h.around)
+
+
+def _own_error(part: Part, here: Array, h: Hypothesis) -> Array:
     """The cell's own error (k,) of free coordinates: a share of an amplitude, or of a speed, size or frequency.
 
     Of a place, that share of what lies between two places that are looked at.
     """
-    chart = here.chart(case)
-    amounts = [_amount(chart[j], float(here.point[j])) for j in here.free]
-    return CELL_ERROR * np.array(amounts)
+    chart = part.kind.chart(h.around)
+    return CELL_ERROR * np.array([_amount(chart[j], float(here[j])) for j in part.free])
 
 
 def _amount(coordinate: Coordinate, value: float) -> float:
@@ -88,16 +86,16 @@ def _amount(coordinate: Coordinate, value: float) -> float:
     return 1.0 if coordinate.log else coordinate.std
 
 
-def _more_than_nothing(here: EffectPoint, case: Case, moves: Array) -> Array:
+def _more_than_nothing(part: Part, here: Array, h: Hypothesis, moves: Array) -> Array:
     """Moves (n, k) of free coordinates; those of an amplitude that cannot be negative are made in its logarithm.
 
     An effect that is surely there is more than nothing, however little is known of its size: a drag, say, over a mass
     that nobody weighed. Little changes where an amplitude is well known, and nothing where it is doubtful.
     """
-    made = moves.copy()
-    for k, j in enumerate(here.free):
-        coordinate, value = here.chart(case)[j], here.point[j]
-        one_sided = coordinate.name in here.kind.amplitudes and coordinate.lower == 0.0 and not coordinate.log
+    made, chart = moves.copy(), part.kind.chart(h.around)
+    for k, j in enumerate(part.free):
+        coordinate, value = chart[j], here[j]
+        one_sided = coordinate.name in part.kind.amplitudes and coordinate.lower == 0.0 and not coordinate.log
         if one_sided and value > DOUBTFUL * np.std(moves[:, k]):
             made[:, k] = value * np.expm1(moves[:, k] / value)
     return made
@@ -121,17 +119,13 @@ def _interval(effect: Effect, name: str, values: Sequence[Any]) -> Any:
     return [low.tolist(), high.tolist()]
 
 
-def theta_of(evidence: Evidence, fitted: Fitted) -> dict[str, ThetaEstimate]:
-    """Theta under a model, and which of it these pushes tell."""
-    space = evidence.case.thetas.space
-    covariance = shared_covariance(fitted)
-    _, prior = evidence.fitter.priors(fitted.state)
-    before = np.asarray(space.from_unit(evidence.nearest.state.u))
-    here = np.asarray(space.from_unit(fitted.state.u))
-    intervals = theta_intervals(evidence, fitted)
-    result = {}
-    for j, parameter in enumerate(space.parameters):
-        told = math.sqrt(covariance[j, j]) < TOLD * prior[j]
+def theta_of(fitter: Fitter, fit: Fit, plain: Fit) -> dict[str, ThetaEstimate]:
+    """Theta under a model, which of it these pushes tell, and what the baseline had."""
+    h, result = fit.hypothesis, dict[str, ThetaEstimate]()
+    covariance, intervals = fitter.covariance(fit), theta_intervals(fitter, fit)
+    before, here = plain.hypothesis.theta(plain.point.z), h.theta(fit.point.z)
+    for j, parameter in enumerate(h.space.parameters):
+        told = math.sqrt(covariance[j, j]) < TOLD * h.std[j]
         result[parameter.name] = ThetaEstimate(
             value=float(here[j]) if told else None,
             unit=parameter.unit,
@@ -142,105 +136,105 @@ def theta_of(evidence: Evidence, fitted: Fitted) -> dict[str, ThetaEstimate]:
     return result
 
 
-def theta_intervals(evidence: Evidence, fitted: Fitted) -> dict[str, tuple[float, float]]:
+def theta_intervals(fitter: Fitter, fit: Fit) -> dict[str, tuple[float, float]]:
     """90 % intervals of theta, told or not, the cell's own error in them, and none wider than the prior's."""
-    space, u = evidence.case.thetas.space, fitted.state.u
-    _, prior = evidence.fitter.priors(fitted.state)
-    seen = _t_factor(fitted) * np.sqrt(np.diag(shared_covariance(fitted)))
-    here = np.asarray(space.from_unit(u))
+    h = fit.hypothesis
+    space, u, here = h.space, fit.point.z[: h.space.dimension], h.theta(fit.point.z)
+    seen = _t_factor(fit) * np.sqrt(np.diag(fitter.covariance(fit)))
     intervals = {}
     for j, name in enumerate(space.names):
         std = math.hypot(seen[j], cell_error(space, here, j))
-        along = Z90 * min(std, prior[j]) * np.eye(len(u))[j]
+        along = Z90 * min(std, h.std[j]) * np.eye(len(u))[j]
         low, high = (float(space.from_unit(np.clip(end, 0.0, 1.0))[j]) for end in (u - along, u + along))
         intervals[name] = (low, high)
     return intervals
 
 
-def correlation_of(case: Case, fitted: Fitted) -> tuple[tuple[str, ...], Array]:
+def correlation_of(fitter: Fitter, fit: Fit) -> tuple[tuple[str, ...], Array]:
     """How the estimates of a model vary together, by drawing theta and the effects' chart points.
 
     Returns:
         Names, ``theta.<name>`` and ``<effect>.<parameter>``, of what is one number and varies; and the correlation
         (n, n) of their normal scores, which does not depend on the coordinates.
     """
-    state, rng = fitted.state, np.random.default_rng(0)
-    count = fitted.own_dimension
-    covariance = shared_covariance(fitted)[:count, :count]
-    moves = rng.multivariate_normal(np.zeros(count), covariance, JOINT_SAMPLES, method="eigh") * _t_factor(fitted)
-    names = case.thetas.space.names
-    drawn: dict[str, Array] = {f"theta.{name}": moves[:, j] for j, name in enumerate(names)}
-    at = len(names)
-    for point in state.effects:
-        here = point.effect(case)
-        drawn_moves = _more_than_nothing(point, case, moves[:, at : at + len(point.free)])
-        effects = [point.moved(case, move).effect(case) for move in drawn_moves]
-        at += len(point.free)
-        for name in here.units():
-            if isinstance(getattr(here, name), float):
-                values = [getattr(effect, name) for effect in effects]
-                drawn[f"{here.name}.{name}"] = _near(here, name, values)
+    h, rng = fit.hypothesis, np.random.default_rng(0)
+    count = h.simulated
+    covariance = fitter.covariance(fit)[:count, :count]
+    moves = rng.multivariate_normal(np.zeros(count), covariance, JOINT_SAMPLES, method="eigh") * _t_factor(fit)
+    drawn: dict[str, Array] = {f"theta.{name}": moves[:, j] for j, name in enumerate(h.space.names)}
+    for k, (part, here) in enumerate(zip(h.parts, h.points(fit.point.z), strict=True)):
+        effect = part.kind.at(here, h.around)
+        some = _more_than_nothing(part, here, h, moves[:, coordinates_of(h, k)])
+        effects = [_moved(part, here, h, move) for move in some]
+        for name in effect.units():
+            if isinstance(getattr(effect, name), float):
+                drawn[f"{effect.name}.{name}"] = _near(effect, name, [getattr(one, name) for one in effects])
     varying = {name: values for name, values in drawn.items() if np.ptp(values) > 0.0}
     scores = [stats.norm.ppf((stats.rankdata(v) - 0.5) / len(v)) for v in varying.values()]
     return tuple(varying), np.atleast_2d(np.corrcoef(scores)) if scores else np.zeros((0, 0))
 
 
-def smallest(evidence: Evidence, alpha: float, least: float) -> tuple[Detectable, ...]:
-    """The smallest effect of each kind that would have been shown, in its own unit and in motion.
+def smallest(found: Found, needed: float) -> tuple[Detectable, ...]:
+    """The smallest effect of each kind that would have been seen, in its own unit and in motion.
 
     Args:
-        evidence: signatures at the plain model.
-        alpha: false-alarm rate of the score tests.
-        least: motion that left-out pushes would have to show [standard deviations].
+        found: the baseline, and columns of the catalogue beside it.
+        needed: gain in log likelihood from which one is seen [nats].
     """
-    plain, case = evidence.plain, evidence.case
-    found = list(evidence.signatures)
-    if not found:
-        return ()
-    threshold = _gain_needed(len(plain.pushes), plain.own_dimension, evidence.screening.looks, alpha)
-    _, blocks = projected(plain, [s.columns for s in found])
     best: dict[str, Detectable] = {}
-    for signature, block in zip(found, blocks, strict=True):
-        amplitudes = signature.family.free[:1] if signature.one_sided[0] else signature.family.free
-        for d, j in enumerate(amplitudes):
-            norm = float(np.linalg.norm(block[:, d]))
-            if norm < 1e-9:
-                continue
-            # Poses only: forces may follow them.
-            poses = [c[: 3 * len(f.middles), d] for c, f in zip(signature.columns, case.features, strict=True)]
-            a_step = rms(np.concatenate(poses))
-            steps = max(math.sqrt(threshold) / norm, least / max(a_step, 1e-9))
-            coordinate = signature.kind.chart(case.around)[j]
-            point = np.array(signature.family.point)
-            point[j] += steps * signature.family.size * coordinate.step
-            if not coordinate.lower <= point[j] <= coordinate.upper:
-                continue  # not even the strongest would have shown
-            one = _detectable(case, signature.kind, point, j, steps * a_step)
-            if one.name not in best or one.sigmas < best[one.name].sigmas:
-                best[one.name] = one
+    for column, information in zip(found.columns, _informations(found), strict=True):
+        if information <= 0.0 or column.family.shares:
+            continue
+        size = math.sqrt(2.0 * needed / information)  # a gain of half the information times the square
+        one = _detectable(found, column, size)
+        if one is not None and (one.name not in best or one.sigmas < best[one.name].sigmas):
+            best[one.name] = one
     return tuple(best.values())
 
 
-def _detectable(case: Case, kind: type[Effect], point: Array, j: int, sigmas: float) -> Detectable:
-    """The effect at a chart point that left its null along coordinate j."""
+def _informations(found: Found) -> list[float]:
+    """Of each column's amplitude: its precision, what theta and the pushes' own unknowns imitate taken out."""
+    fitter, fit = found.fitter, found.plain
+    n, count = fit.hypothesis.dimension, len(found.columns)
+    precision = np.zeros((n + count,) * 2)
+    precision[:n, :n] = np.diag(fit.hypothesis.std**-2.0)
+    for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(fit.scatter), strict=True)):
+        shared = np.column_stack([push.shared, *(c.pushes[i] for c in found.columns)])
+        precision += weighed(push.residual, shared, push.own, prior, fit.loudness, fit.tail).precision
+    imitated = np.linalg.pinv(precision[:n, :n])
+    return [
+        float(precision[n + k, n + k] - precision[n + k, :n] @ imitated @ precision[:n, n + k]) for k in range(count)
+    ]
+
+
+def _detectable(found: Found, column: Column, size: float) -> Detectable | None:
+    """The effect of a column's size; None where not even the strongest would have shown."""
+    case, kind, point = found.fitter.case, column.kind, np.array(column.family.point)
+    # A one-sided amplitude can only grow; the others are the same either way.
+    point[column.index] += size
+    coordinate = column.coordinate
+    if not coordinate.lower <= point[column.index] <= coordinate.upper:
+        return None
+    sigmas = size * _motion(found, column)
     chart = kind.chart(case.around)
     within = np.array([np.clip(p, c.lower, c.upper) for p, c in zip(point, chart, strict=True)])
     effect = kind.at(within, case.around)
     numbers = {n: getattr(effect, n) for n in kind.amplitudes if isinstance(getattr(effect, n), float)}
     if not numbers:
-        return Detectable(
-            name=kind.name, parameter=chart[j].name, value=float(within[j]), unit="-", sigmas=sigmas
-        )  # fmt: skip
+        value = float(within[column.index])
+        return Detectable(name=kind.name, parameter=coordinate.name, value=value, unit="-", sigmas=sigmas)
     name = max(numbers, key=lambda n: abs(numbers[n] - kind.nulls()[n]))
     return Detectable(name=kind.name, parameter=name, value=numbers[name], unit=kind.units()[name], sigmas=sigmas)
 
 
-def _gain_needed(pushes: int, spent: int, looks: float, alpha: float) -> float:
-    """Gain at which an effect of one direction is seen with even odds."""
-    wanted = math.log(alpha / (2.0 * looks))
-    gains = np.linspace(0.0, 400.0, 2001)
-    seen = [log_probability(float(g), 1, pushes, spent) <= wanted for g in gains]
-    return float(gains[int(np.argmax(seen))]) if any(seen) else float(gains[-1])
+def _motion(found: Found, column: Column) -> float:
+    """How far the object moves for a unit of a column, root mean square over all windows [standard deviations]."""
+    case: Case = found.fitter.case
+    poses = [
+        np.linalg.solve(w, pushed)[: 3 * len(f.middles)]
+        for w, pushed, f in zip(found.fitter.predictor.whitening, column.pushes, case.features, strict=True)
+    ]
+    return rms(np.concatenate(poses))
 
 
 def rms(values: Array) -> float:

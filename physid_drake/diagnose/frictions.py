@@ -5,25 +5,26 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
-from physid_drake.diagnose.linear import told_frictions
-from physid_drake.diagnose.model import Fitted
 from physid_drake.diagnose.regimes import speed_of
+from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.pushes.case import Case
 
 FEWEST = 6  # pushes that tell their friction
 CHANCE = 0.05  # of the best of all looks
 
 
-def friction_trend(case: Case, fitted: Fitted) -> str | None:
+def friction_trend(fitter: Fitter, fit: Fit) -> str | None:
     """What friction goes with from push to push, in words; None where with nothing, or no more than by chance.
 
     Looks at how far the object goes, how fast it is pushed, and which push it is, by Kendall's rank correlation.
 
     Args:
-        case: the recording.
-        fitted: the model whose pushes have frictions of their own.
+        fitter: of the recording.
+        fit: the model whose pushes have frictions of their own.
     """
-    told, frictions = told_frictions(fitted.pushes, fitted.state.scatter, fitted.solution.beta)
+    case = fitter.case
+    told = range(len(case.problems))
+    frictions = fitter.frictions(fit)
     if len(told) < FEWEST:
         return None
     looks = {

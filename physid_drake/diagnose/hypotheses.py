@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.diagnose.proposals import Proposal, proposals
-from physid_drake.effects import Effect, applicable
+from physid_drake.effects import Effect, tolerated
+from physid_drake.effects.unnamed import UnnamedForce
+from physid_drake.errors import RecordingError
 from physid_drake.inference.fit import Fit, Fitter
-from physid_drake.inference.hypothesis import Hypothesis
+from physid_drake.inference.hypothesis import Hypothesis, Part
 from physid_drake.inference.predictions import Physics
 from physid_drake.inference.push import TAIL
 from physid_drake.inference.scores import Column, columns, scores
@@ -31,7 +33,7 @@ def baseline(fitter: Fitter, hypothesis: Hypothesis, rng: np.random.Generator) -
     """The model without effects, fitted from the best of many starts.
 
     Raises:
-        ValueError: if the twin can roll out none of them.
+        RecordingError: if none of them can be rolled out.
     """
     space = hypothesis.space
     drawn = [np.asarray(space.to_unit(theta)) for theta in space.sample(rng, CANDIDATES - 1, from_prior=True)]
@@ -39,7 +41,8 @@ def baseline(fitter: Fitter, hypothesis: Hypothesis, rng: np.random.Generator) -
     points = fitter.points([hypothesis] * len(zs), zs, [fitter.at_rest()] * len(zs))
     best = sorted((p for p in points if p is not None), key=fitter.roughly)[:STARTS]
     if not best:
-        raise ValueError("the twin can roll out no point of theta")
+        name = fitter.case.recording.name
+        raise RecordingError(f"recording '{name}': at no theta that was tried can all of its pushes be simulated.")
     fits = fitter.fitted(fitter.started([hypothesis] * len(best), best, [None] * len(best)), LAST)
     fits = fitter.fitted(fitter.renewed(fitter.robust(fits)), LAST)
     return settled(fitter, max(fits, key=lambda f: f.log_likelihood), rng)
@@ -56,8 +59,8 @@ def settled(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
     return fit
 
 
-def with_tolerances(fitter: Fitter, fit: Fit) -> tuple[Fit, list[Column]]:
-    """The model with what pushes may differ by without its being physics, and the catalogue's columns beside it.
+def with_tolerances(fitter: Fitter, fit: Fit, kinds: Sequence[type[Effect]]) -> tuple[Fit, list[Column]]:
+    """The model with what pushes may differ by without its being physics, and the columns of effects beside it.
 
     Each push's hand path has the errors that its stream's noise allows; all share slight errors of size, pressure,
     centre and clocks.
@@ -65,14 +68,16 @@ def with_tolerances(fitter: Fitter, fit: Fit) -> tuple[Fit, list[Column]]:
     h, predictor = fit.hypothesis, fitter.predictor
     predictor.with_directions(predictor.path_errors(fit.point.own, Physics(h.theta(fit.point.z))))
     fit = _at(fitter, h, fit.point.z, fit)
-    found = columns(fitter, fit, applicable(fitter.case.around))
-    slight = [c for c in found if c.coordinate.tolerance > 0.0 and c.family.size == 1.0]
+    every = columns(fitter, fit, list(dict.fromkeys((*kinds, *tolerated(fitter.case.around)))))
+    slight = [c for c in every if c.coordinate.tolerance > 0.0 and c.family.size == 1.0]
     fitter.shared_by_all([
         np.column_stack([np.zeros((len(y), 0)), *(c.coordinate.tolerance * c.pushes[i] for c in slight)])
         for i, y in enumerate(predictor.recorded)
     ])  # fmt: skip
     h = dc.replace(h, tolerances=len(slight))
-    return _at(fitter, h, np.concatenate([fit.point.z, np.zeros(len(slight))]), fit), found
+    return _at(fitter, h, np.concatenate([fit.point.z, np.zeros(len(slight))]), fit), [
+        c for c in every if c.kind in kinds
+    ]
 
 
 def _at(fitter: Fitter, h: Hypothesis, z: Array, near: Fit) -> Fit:
@@ -97,6 +102,41 @@ def with_two(fitter: Fitter, singles: Sequence[Fit], kinds: Sequence[type[Effect
     return halved(fitter, singles[0], found, of_each=1)
 
 
+def freed(fitter: Fitter, fit: Fit) -> Fit:
+    """The fit with all coordinates of its effects, where some were held at first."""
+    h = fit.hypothesis
+    parts = tuple(
+        dc.replace(part, point=tuple(point.tolist()), free=tuple(range(len(point))))
+        for part, point in zip(h.parts, h.points(fit.point.z), strict=True)
+        if part.kind is not UnnamedForce
+    )
+    if not parts or all(new.free == old.free for new, old in zip(parts, h.parts, strict=True)):
+        return fit
+    more, d = dc.replace(h, parts=parts), h.space.dimension
+    effects = [x for part in parts for x in part.point]
+    z = np.concatenate([fit.point.z[:d], effects, fit.point.z[h.simulated :]])
+    again = _at(fitter, more, z, fit)
+    return again if again.log_likelihood > fit.log_likelihood else fit
+
+
+def unnamed(fitter: Fitter, fit: Fit) -> list[Fit]:
+    """The model with smooth forces and frictions that have no name: each block of them, and all together."""
+    beside = columns(fitter, fit, [UnnamedForce])
+    fits = []
+    for score in scores(fitter, fit, beside):
+        free, n = score.family.free, fit.hypothesis.simulated
+        part = Part(kind=UnnamedForce, point=score.family.point, free=free)
+        h = dc.replace(fit.hypothesis, parts=(*fit.hypothesis.parts, part))
+        moved, nothing = score.point[list(free)], np.zeros(len(free))
+        z = fit.point.z + score.dz
+        starts = [np.concatenate([z[:n], moved, z[n:]]), np.concatenate([fit.point.z[:n], nothing, fit.point.z[n:]])]
+        zs = [np.clip(one, *h.bounds) for one in starts]
+        points = [p for p in fitter.points([h] * 2, zs, [fit.point.own] * 2) if p is not None]
+        best = min(points, key=fitter.roughly)
+        fits += fitter.fitted(fitter.started([h], [best], [fit], TAIL), SECOND)
+    return fits
+
+
 def halved(fitter: Fitter, near: Fit, found: Sequence[Proposal], of_each: int = 2) -> list[Fit]:
     """The best fit of each hypothesis, by successive halving of the proposals.
 
@@ -111,10 +151,11 @@ def halved(fitter: Fitter, near: Fit, found: Sequence[Proposal], of_each: int = 
     rolled = [(h, p) for h, p in zip(hypotheses, points, strict=True) if p is not None]
     rolled.sort(key=lambda one: fitter.roughly(one[1]))
     rolled = [rolled[k] for k in _kept([h.name for h, _ in rolled], len(rolled) // 2, of_each)]
-    fits = fitter.started([h for h, _ in rolled], [p for _, p in rolled], [near] * len(rolled))
-    fits = _by_cost(fitter.fitted(fits, FIRST))
+    fits = fitter.started([h for h, _ in rolled], [p for _, p in rolled], [near] * len(rolled), theta=False)
+    fits = _by_cost(fitter.fitted(fits, FIRST, roughly=True))
     fits = [fits[k] for k in _kept([f.hypothesis.name for f in fits], len(fits) // 2, of_each - 1)]
-    fits = _by_cost(fitter.fitted(fitter.robust(fitter.fitted(fits, SECOND)), SECOND))
+    fits = fitter.robust(fitter.fitted(fits, SECOND, roughly=True))
+    fits = _by_cost(fitter.fitted(fits, SECOND, roughly=True))
     best = [fits[k] for k in _kept([f.hypothesis.name for f in fits], 0, 1)]
     last = fitter.fitted(fitter.renewed(best[:FINALISTS]), LAST)
     return sorted([*last, *best[FINALISTS:]], key=lambda f: -f.log_likelihood)

@@ -1,8 +1,8 @@
 """Where simulation and recording part: the missing wrench in short windows of every push.
 
-Small pulses of force and torque in every window of every push show what each would change; least squares then says
-which wrench is missing there, with its covariance. What the hand prescribes (the motion along its push) these pushes
-cannot tell: its covariance is large.
+Small pulses of force and torque about the middle of every window of every push show what each would change; least
+squares then says which wrench is missing there, with its covariance. What the hand prescribes (the motion along its
+push) these pushes cannot tell: its covariance is large.
 """
 
 from __future__ import annotations
@@ -10,20 +10,16 @@ from __future__ import annotations
 import dataclasses as dc
 import math
 from collections.abc import Sequence
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
-from physid_drake.cell.forces import ForceLaw, Wrench
-from physid_drake.cell.object_state import ObjectState
 from physid_drake.cell.solid import solid_of
-from physid_drake.diagnose.fit import Fitter
-from physid_drake.diagnose.model import Fitted
-from physid_drake.effects import Effect, PushFacts
+from physid_drake.inference.fit import Fit, Fitter, slope
+from physid_drake.inference.predictions import Ask, Physics
+from physid_drake.inference.push import weighed
 from physid_drake.pushes.case import Case
-from physid_drake.pushes.misfit import difference
+from physid_drake.twin.twin import Wander
 
 Array = NDArray[np.float64]
 
@@ -31,37 +27,6 @@ WINDOWS = 6  # per push, over its motion
 STEP = 4.0  # standard deviations of the tracker: what the object moves in a window at least
 PULSE = 0.05  # of the friction force: the size of a pulse
 LARGEST = 1.0  # of the friction force: prior standard deviation of what is missing
-
-
-@dc.dataclass(frozen=True, kw_only=True)
-class _Pulse(Effect):
-    """A constant wrench in W between two times: not physics, a question."""
-
-    name: ClassVar[str] = "pulse"
-    element: ClassVar[str] = "world"
-    statement: ClassVar[str] = ""
-    frame: ClassVar[str] = "world"
-    amplitudes: ClassVar[tuple[str, ...]] = ("fx", "fy", "torque")
-
-    fx: float = 0.0
-    fy: float = 0.0
-    torque: float = 0.0
-    start: float = 0.0
-    end: float = 0.0
-
-    def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
-        del facts
-        return (_PulseLaw(self),)
-
-
-@dc.dataclass(frozen=True)
-class _PulseLaw:
-    pulse: _Pulse
-
-    def wrench(self, state: ObjectState) -> Wrench:
-        p = self.pulse
-        on = p.start <= state.time < p.end
-        return Wrench(fx=p.fx * on, fy=p.fy * on, torque=p.torque * on)
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -79,7 +44,7 @@ class MissingWrench:
         yaw: of B [rad].
         place: (2,) in W [m].
         spin: mean rate of yaw [rad/s].
-        columns: (m, 3) what a unit of each component would change in the push's features.
+        columns: (m, 3) what a unit of each component would change in the push's features, in units of their noise.
     """
 
     push: int
@@ -101,29 +66,32 @@ class MissingWrench:
         return bool((np.abs(self.wrench[:2]) > 2.0 * self.std[:2]).any())
 
 
-def missing_wrenches(fitter: Fitter, plain: Fitted) -> tuple[MissingWrench, ...]:
-    """The missing wrench in all windows; ``fitter`` may be of a coarse case."""
-    case, state = fitter.case, plain.state
+def missing_wrenches(fitter: Fitter, plain: Fit) -> tuple[MissingWrench, ...]:
+    """The missing wrench in all windows of the pushes that a model can roll out."""
+    case, h, point = fitter.case, plain.hypothesis, plain.point
     force = case.around.friction * case.around.weight
     units = np.array([force, force, force * 0.5 * case.around.radius])
     windows = [_windows(case, i) for i in range(len(case.problems))]
-    tasks = [fitter.task(state, i) for i in range(len(case.problems))]
+    theta, present = h.theta(point.z), h.effects(point.z)
+    asks = [Ask(i, Physics(theta, present), point.own[i]) for i in range(len(windows))]
     for i, mine in enumerate(windows):
-        begin = case.problems[i].begin
         for spell in mine:
-            c, s = math.cos(spell.heading), math.sin(spell.heading)
-            for fx, fy, torque in ((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)):
-                pulse = _Pulse(
-                    fx=PULSE * units[0] * fx, fy=PULSE * units[1] * fy, torque=PULSE * units[2] * torque,
-                    start=spell.start - begin, end=spell.end - begin,
-                )  # fmt: skip
-                tasks.append(fitter.task(state, i, effects=[pulse]))
-    vectors = fitter.vectors(tasks)
-    base, pulses = vectors[: len(case.problems)], vectors[len(case.problems) :]
+            c, s = PULSE * math.cos(spell.heading), PULSE * math.sin(spell.heading)
+            while_ = Wander(middle=0.5 * (spell.start + spell.end), width=spell.end - spell.start)
+            pulses = (
+                dc.replace(while_, force=(c * units[0], s * units[0])),
+                dc.replace(while_, force=(-s * units[1], c * units[1])),
+                dc.replace(while_, torque=PULSE * units[2]),
+            )  # fmt: skip
+            asks += [dc.replace(asks[i], wander=pulse) for pulse in pulses]
+    vectors = fitter.predictor.vectors(asks)
+    after = iter(vectors[len(windows) :])
     found: list[MissingWrench] = []
     for i, mine in enumerate(windows):
-        columns = [difference(base[i], pulses.pop(0)) / PULSE for _ in range(3 * len(mine))]
-        found += _solved(plain, i, mine, np.column_stack(columns), units) if mine else []
+        base = vectors[i]
+        moved = [next(after) for _ in range(3 * len(mine))]
+        if mine and base is not None:
+            found += _solved(fitter, plain, i, mine, np.column_stack([slope(base, m, PULSE) for m in moved]), units)
     return tuple(found)
 
 
@@ -166,14 +134,14 @@ def _windows(case: Case, i: int) -> list[_Spell]:
     return spells
 
 
-def _solved(plain: Fitted, i: int, windows: Sequence[_Spell], columns: Array, units: Array) -> list[MissingWrench]:
+def _solved(
+    fitter: Fitter, plain: Fit, i: int, windows: Sequence[_Spell], columns: Array, units: Array
+) -> list[MissingWrench]:
     """Least squares with a wide prior, the push's own unknowns integrated out, theta held."""
-    push = plain.pushes[i]
-    factor = cho_factor(push.covariance(plain.state.scatter))
-    left = push.residual - push.shared @ plain.solution.beta
-    precision = columns.T @ cho_solve(factor, columns) + np.eye(columns.shape[1]) / LARGEST**2
-    covariance = np.linalg.inv(precision)
-    values = covariance @ (columns.T @ cho_solve(factor, left))
+    push, prior = plain.pushes[i], fitter.priors(plain.scatter)[i]
+    one = weighed(push.residual, columns, push.own, prior, plain.loudness, plain.tail)
+    covariance = np.linalg.inv(one.precision + np.eye(columns.shape[1]) / LARGEST**2)
+    values = covariance @ one.right
     stds = np.sqrt(np.diag(covariance))
     found = []
     for k, spell in enumerate(windows):

@@ -15,11 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.linear import LinearPush, Whitened
 from physid_drake.diagnose.localise import MissingWrench
-from physid_drake.diagnose.model import Fitted
-from physid_drake.diagnose.screen import projected
 from physid_drake.diagnose.values import Location, Window
+from physid_drake.inference.fit import Fit, Fitter
+from physid_drake.inference.push import LinearPush
 from physid_drake.pushes.case import Case
 
 Array = NDArray[np.float64]
@@ -33,6 +32,8 @@ DOFS = ("along_motion", "across_motion", "rotation")
 FEWEST_PUSHES = 6  # of which sign flips can tell anything: two of 2^5 patterns are 6 %
 LOUDEST = 3.0  # standard deviations that one push may speak with
 AS_GOOD = 0.8  # of the gain in one phase: the pattern holds in both
+IMITATED = 1e-9  # of a look: less is rounding
+DIGITS = 6  # of gains that are compared: of looks that theta makes the same, the first, whatever the rounding
 A_PART = 0.25  # of the most that a phase or a degree of freedom has
 SAID = {"contact": "while it is pushed", "free_slide": "in its free slide"}
 
@@ -72,8 +73,8 @@ NOWHERE = Location(
 
 
 def locate(
-    case: Case,
-    plain: Fitted,
+    fitter: Fitter,
+    plain: Fit,
     wrenches: Sequence[MissingWrench],
     rng: np.random.Generator,
     frame: str | None = None,
@@ -81,7 +82,7 @@ def locate(
     """The look that explains most; in no direction where none explains more than the best would by chance.
 
     Args:
-        case: for the pushes' names and order.
+        fitter: of the case.
         plain: the model that lacks something.
         wrenches: what it lacks, window by window.
         rng: of the sign flips.
@@ -89,6 +90,7 @@ def locate(
     """
     if not wrenches:
         return NOWHERE
+    case = fitter.case
     order = np.array([case.problems[w.push].order for w in wrenches], dtype=np.float64)
     there = tuple(p for p in PHASES if any(w.phase == p for w in wrenches))
     split = [
@@ -96,12 +98,12 @@ def locate(
         for phases in {there: None} | {(p,): None for p in there}
         for number, look in enumerate(looks_at(wrenches, order, phases))
     ]
-    gains, solutions, best_by_chance = _explained(plain, wrenches, [look for _, look, _ in split], rng)
+    gains, solutions, best_by_chance = _explained(fitter, plain, wrenches, [look for _, look, _ in split], rng)
     seen = [
         _Seen(number=number, look=look, phases=phases, gain=gain, coefficients=solution)
         for (number, look, phases), gain, solution in zip(split, gains, solutions, strict=True)
     ]
-    best = max([one for one in seen if one.look.frame == frame] or seen, key=lambda one: one.gain)
+    best = max([one for one in seen if one.look.frame == frame] or seen, key=lambda one: round(one.gain, DIGITS))
     surely = (best_by_chance >= best.gain).mean() < CHANCE
     return _location(case, wrenches, seen, best if surely else None)
 
@@ -216,19 +218,21 @@ def _axis(coefficients: Array) -> str:
 
 
 def _explained(
-    plain: Fitted, wrenches: Sequence[MissingWrench], looks: Sequence[Look], rng: np.random.Generator
+    fitter: Fitter, plain: Fit, wrenches: Sequence[MissingWrench], looks: Sequence[Look], rng: np.random.Generator
 ) -> tuple[list[float], list[Array], Array]:
     """Gains (minus logs of a chi-square's p) and coefficients of looks, and (f,) the best gain of flipped pushes."""
-    pushes = tuple(_sobered(push, len(plain.state.u)) for push in plain.pushes)
     # What differs from push to push may be what is missing, and not friction that scatters.
-    bare = dc.replace(
-        plain, pushes=pushes, state=dc.replace(plain.state, scatter=min(plain.state.scatter, 1.0)),
-        prior_std=np.full(len(plain.state.u), np.inf),
-    )  # fmt: skip
-    basis, blocks = projected(bare, [_signature(plain, wrenches, look.weights) for look in looks])
-    white = Whitened.of(bare.pushes, bare.state.scatter)
-    edges = np.cumsum([len(r) for r in white.residuals])[:-1]
-    left = np.split(white.y - basis @ (basis.T @ white.y), edges)
+    roots = [
+        _root(push, prior) for push, prior in zip(plain.pushes, fitter.priors(min(plain.scatter, 1.0)), strict=True)
+    ]
+    d, signatures = plain.hypothesis.space.dimension, [_signature(plain, wrenches, look.weights) for look in looks]
+    y = np.concatenate([root @ push.residual for root, push in zip(roots, plain.pushes, strict=True)])
+    theta = np.vstack([root @ push.shared[:, :d] for root, push in zip(roots, plain.pushes, strict=True)])
+    basis, _ = np.linalg.qr(theta)
+    stacked = [np.vstack([root @ s for root, s in zip(roots, signature, strict=True)]) for signature in signatures]
+    blocks = [_without(basis, block) for block in stacked]
+    edges = np.cumsum([len(push.residual) for push in plain.pushes])[:-1]
+    left = np.split(y - basis @ (basis.T @ y), edges)
     signs = np.vstack([np.ones(len(left)), rng.choice([-1.0, 1.0], size=(FLIPS, len(left)))])
     gains, solutions = [], []
     for block in blocks:
@@ -244,6 +248,13 @@ def _explained(
     return every[:, 0].tolist(), solutions, every[:, 1:].max(axis=0)
 
 
+def _without(basis: Array, block: Array) -> Array:
+    """A look's columns (M, k) without what theta imitates; nothing of those that it imitates but for rounding."""
+    rest = block - basis @ (basis.T @ block)
+    told = np.linalg.norm(rest, axis=0) > IMITATED * np.linalg.norm(block, axis=0)
+    return np.asarray(rest * told)
+
+
 def _share(x: Array, left: Array) -> float:
     """Times what a push says of coefficients, so that it is no louder than ``LOUDEST`` deviations."""
     told = x.T @ left
@@ -251,15 +262,16 @@ def _share(x: Array, left: Array) -> float:
     return min(1.0, LOUDEST / max(loudness, 1e-12))
 
 
-def _sobered(push: LinearPush, theta: int) -> LinearPush:
-    """A push with the derivatives of theta only, and as noisy as it is far from explained: none speaks for all."""
-    white = np.linalg.solve(np.linalg.cholesky(push.covariance(1.0)), push.residual)
+def _root(push: LinearPush, prior: Array) -> Array:
+    """Takes what is left of a push (m,) to white noise: as noisy as it is far from explained."""
+    own = push.own * prior
+    covariance = np.eye(len(own)) + own @ own.T
+    white = np.linalg.solve(np.linalg.cholesky(covariance), push.residual)
     loudness = max(1.0, float(np.mean(white**2)))
-    own = math.sqrt(loudness) * push.own
-    return dc.replace(push, shared=push.shared[:, :theta], noise=loudness * push.noise, own=own)
+    return np.linalg.inv(np.linalg.cholesky(loudness * covariance))
 
 
-def _signature(plain: Fitted, wrenches: Sequence[MissingWrench], weights: Array) -> list[Array]:
+def _signature(plain: Fit, wrenches: Sequence[MissingWrench], weights: Array) -> list[Array]:
     """What a pattern (n, 3, k) of the wrench would change, per push (m, k)."""
     columns = [np.zeros((len(push.residual), weights.shape[2])) for push in plain.pushes]
     for wrench, here in zip(wrenches, weights, strict=True):

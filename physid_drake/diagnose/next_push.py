@@ -13,15 +13,14 @@ from scipy import stats
 
 from physid_drake.cell import HandPath, Start
 from physid_drake.cell.solid import solid_of
-from physid_drake.diagnose.fit import Fitter
-from physid_drake.diagnose.leaving import hand_frame
-from physid_drake.diagnose.model import State
+from physid_drake.diagnose.exported import hand_frame
 from physid_drake.diagnose.values import NextPush
+from physid_drake.inference.predictions import Physics
 from physid_drake.model import turned
 from physid_drake.pushes.case import Case
 from physid_drake.pushes.frames import reach_of
 from physid_drake.pushes.problem import PushProblem
-from physid_drake.pushes.rollouts import RolloutPool
+from physid_drake.pushes.rollouts import TWIN, RolloutPool
 from physid_drake.pushes.task import Task
 
 Array = NDArray[np.float64]
@@ -36,32 +35,32 @@ LONGEST_TICK = 2e-3  # s, for hands as fast as these, which a recording's may no
 REPEATS = 0.02  # of the motion: how well a push repeats
 
 
-def next_push(case: Case, states: Sequence[State]) -> NextPush | None:
+def next_push(case: Case, models: Sequence[Physics]) -> NextPush | None:
     """The push, of a grid of directions, speeds and contact offsets, whose end tells the models apart best.
 
     Args:
         case: the recording.
-        states: the rival models.
+        models: the rivals.
 
     Returns:
         The push and the probability that it settles the question; None without rivals, without a hand, or where
         every push would diverge or may lose the object.
     """
-    if len(states) < 2 or case.recording.hand is None:
+    if len(models) < 2 or case.recording.hand is None:
         return None
     pushes = [_problem(case, *choice) for choice in _choices()]
-    fitter, pool = Fitter(case), brisk_pool(case)
+    pool = brisk_pool(case)
     tasks = []
-    for state in states:
+    for model in models:
         for problem in pushes:
             nuisance = case.nuisances[0]
             tasks.append(
                 Task(
                     problem=problem,
-                    theta=np.asarray(case.thetas.space.from_unit(state.u)),
+                    theta=model.theta,
                     nuisance=nuisance,
                     values=np.zeros(len(nuisance.names)),
-                    effects=tuple(e.effect(fitter.case) for e in state.effects),
+                    effects=model.effects,
                 )
             )
     ends = [None if p is None else p.poses[-1] for p in pool.run(tasks)]
@@ -75,16 +74,18 @@ def next_push(case: Case, states: Sequence[State]) -> NextPush | None:
         direction_deg=math.degrees(direction), speed_mps=speed, contact_offset_m=offset * 0.5 * _width(case),
         start_x_m=pushes[best].start.pose[0], start_y_m=pushes[best].start.pose[1],
         start_yaw_deg=math.degrees(pushes[best].start.pose[2]),
-        settles_with_probability=max(chances[best], 1.0 / len(states)),  # a guess
+        settles_with_probability=max(chances[best], 1.0 / len(models)),  # a guess
     )  # fmt: skip
 
 
 def brisk_pool(case: Case) -> RolloutPool:
-    """A pool like the case's, on ticks that suit a fast hand."""
+    """A pool like the case's, of the twin; where that does not know what happens, a cell for a fast hand does."""
     spec = case.pool.spec
     share = min(1.0, LONGEST_TICK / spec.config.solver.time_step_s)
     config = dc.replace(spec.config, solver=spec.config.solver.scaled(share))
-    return case.pool.of(dc.replace(spec, config=config))
+    pool = case.pool.of(dc.replace(spec, config=config))
+    pool.integrator = TWIN
+    return pool
 
 
 def _choices() -> list[tuple[float, float, float]]:

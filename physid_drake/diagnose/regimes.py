@@ -2,32 +2,36 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from physid_drake.diagnose.candidate import push_scores, standard_error
-from physid_drake.diagnose.model import Fitted
+import numpy as np
+from numpy.typing import NDArray
+
 from physid_drake.diagnose.values import RegimeGain
+from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.pushes.case import Case
 from physid_drake.pushes.problem import push_speed
+
+Array = NDArray[np.float64]
 
 FEWEST = 3  # pushes of a regime
 FASTER = 2.0  # the median of the fast over that of the slow pushes: less is one regime
 APART = 1.0  # rad between the mean headings of two groups: less is one direction
 
 
-def regime_gains(case: Case, before: Fitted, after: Fitted) -> tuple[RegimeGain, ...]:
+def regime_gains(fitter: Fitter, before: Fit, after: Fit) -> tuple[RegimeGain, ...]:
     """Fit both models to one half of the pushes, predict the other half, by speed and by heading.
 
     Args:
-        case: the recording.
-        before: the plain model.
+        fitter: of the recording.
+        before: the baseline.
         after: the model with effects.
     """
-    found = []
+    found, case = [], fitter.case
     for names, halves in ((("slow", "fast"), _by_speed(case)), (("one heading", "the other"), _by_heading(case))):
         if halves is None:
             continue
-        gains = push_scores(after, halves) - push_scores(before, halves)
+        gains = fitter.held_out(after, halves) - fitter.held_out(before, halves)
         for tested, fitted in ((1, 0), (0, 1)):
             own = gains[list(halves[tested])]
             found.append(
@@ -37,6 +41,11 @@ def regime_gains(case: Case, before: Fitted, after: Fitted) -> tuple[RegimeGain,
                 )
             )  # fmt: skip
     return tuple(found)
+
+
+def standard_error(values: Array) -> float:
+    """Of the sum of values (n,) over pushes; infinite for one push."""
+    return float(np.std(values, ddof=1) * np.sqrt(len(values))) if len(values) > 1 else math.inf
 
 
 Halves = tuple[tuple[int, ...], tuple[int, ...]]

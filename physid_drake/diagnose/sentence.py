@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from physid_drake.diagnose.foils import Foil
 from physid_drake.diagnose.values import EffectFinding, Partly
 
 
@@ -30,8 +29,8 @@ def sentence(
     verdict: str,
     findings: Sequence[EffectFinding],
     partly: Partly | None,
-    foil: Foil | None,
     *,
+    better: bool = False,
     fewest: int | None = None,
     known: bool = True,
     quieter: float | None = None,
@@ -42,7 +41,7 @@ def sentence(
         verdict: as in ``diagnosis.json``.
         findings: the effects that are named.
         partly: what takes a good part of a mismatch away, if something does.
-        foil: a law beside the catalogue that does better, if there is one.
+        better: whether a model without a name predicts pushes better than the plain cell.
         fewest: pushes that it takes to say anything; None where there are as many.
         known: whether the noise was stated or seen.
         quieter: how many times the noise is larger than what the plain cell leaves, where it is far larger.
@@ -54,20 +53,22 @@ def sentence(
             return (
                 "Simulation and recording differ, and nothing in the catalogue accounts for all of it:"
                 f" {' and '.join(partly.effects)} would take {_percent(partly.share)} of the squared error away."
-            )
-        case "unexplained" if foil is not None:
-            return (
-                f"Simulation and recording differ, and nothing in the catalogue accounts for it: {foil.instead_of}"
-                f" explains less than this would: {foil.statement}."
+                f"{_nameless(better)}"
             )
         case "unexplained":
-            return "Simulation and recording differ, and nothing in the catalogue accounts for it."
+            return (
+                f"Simulation and recording differ, and nothing in the catalogue accounts for it.{_nameless(better)}"
+            )
     names = [
         f"{f.name} ({f.statement})"
         + (f", or {' or '.join(f.indistinguishable_from)}" if f.indistinguishable_from else "")
         for f in findings
     ]
     return "What is missing: " + "; and ".join(names) + "."
+
+
+def _nameless(better: bool) -> str:
+    return " The model has a force without a name, with which pushes are predicted better." if better else ""
 
 
 def _percent(share: float) -> str:

@@ -1,4 +1,4 @@
-"""The story: fit, screen, grow, locate. What needs rollouts is here and in `grow`; conclusions in `conclude`."""
+"""A diagnosis from the first fit to the answer."""
 
 from __future__ import annotations
 
@@ -8,32 +8,29 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.candidate import EXPLAINED, Candidate
-from physid_drake.diagnose.classes import class_beside
 from physid_drake.diagnose.conclude import conclude
-from physid_drake.diagnose.confirm import WORTH_A_TRY
-from physid_drake.diagnose.evidence import MOST_OF_UNKNOWN, Evidence, confirmed, unexplained
-from physid_drake.diagnose.fit import Fitter
-from physid_drake.diagnose.foils import Foil, better_foil
-from physid_drake.diagnose.grow import HOPELESS, Grown, Growth, Looked
+from physid_drake.diagnose.decide import Decision, decided, kinds_of, loudest
+from physid_drake.diagnose.evidence import Evidence
+from physid_drake.diagnose.hypotheses import baseline, freed
+from physid_drake.diagnose.judge import Judge
+from physid_drake.diagnose.left_out import errors_of, is_own_error
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
-from physid_drake.diagnose.loudness import as_loud_as_left, quieter
-from physid_drake.diagnose.model import Fitted, State
 from physid_drake.diagnose.next_push import next_push
-from physid_drake.diagnose.plain import coarse, fit_plain, lost_pushes, nearest, numerics, path_errors
-from physid_drake.diagnose.screen import (
-    Screening,
-    Signature,
-    signatures,
-    tolerances,
-)
+from physid_drake.diagnose.search import Weighed, searched
 from physid_drake.diagnose.values import Diagnosis
-from physid_drake.effects import Effect, applicable, tolerated
+from physid_drake.effects import applicable
+from physid_drake.inference.fit import Fit, Fitter
+from physid_drake.inference.hypothesis import Hypothesis
+from physid_drake.inference.predictions import Ask, Physics, Predictor
+from physid_drake.inference.unknown_noise import as_loud_as_left
 from physid_drake.progress import Progress
 from physid_drake.pushes.case import Case
 from physid_drake.pushes.kept_rollouts import KeptRollouts
 
 Array = NDArray[np.float64]
+
+TRIED = 8  # thetas, and the nominal one, at which a push must fail to be left to the cell, or out
+RIVALS = 3  # at most, that a push is looked for which tells them apart
 
 
 def diagnose(
@@ -57,180 +54,75 @@ def diagnose(
     """
     say = tick or (lambda stage, done, total: None)
     case.pool.kept = KeptRollouts() if kept is None else kept
-    evidence = gather(case, seed=seed, alpha=alpha, effects=effects, tick=say)
-    evidence = _located(evidence, say)
+    evidence = gathered(case, seed=seed, alpha=alpha, effects=effects, tick=say)
     return conclude(evidence, seed=seed, alpha=alpha), evidence
 
 
-def gather(case: Case, *, seed: int, alpha: float, effects: Sequence[str] | None, tick: Progress) -> Evidence:
-    """Fit, screen, confirm: all that needs rollouts. Arguments as of ``diagnose``.
-
-    All but the last look is done on ticks twice as long, whose error is one of the guard's directions.
-    """
-    search_rng, screen_rng = (np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(2))
-    look = _Search(kinds=applicable(case.around, effects), alpha=alpha, rng=screen_rng, tick=tick)
-    rough = coarse(case)
-    lost = lost_pushes(rough)
-    if lost:
-        case, rough = case.without(lost), rough.without(lost)
-    first = _first(rough, search_rng, tick)
-    answer = (look.answer if case.noise.known else look.answer_by_ratios)(case, rough, first)
-    return _on_short_ticks(answer, tick)
-
-
-def _on_short_ticks(answer: _Answer, tick: Progress) -> Evidence:
-    """The evidence of an answer, both models taken to the case's own ticks."""
-    case, grown, fitter = answer.case, answer.grown, answer.fitter
-    plain, model = grown.base.fitted, grown.last.fitted
-    fine = Fitter(case, fitter.extra, fitter.tolerances)
-    # Shorter ticks make no difference to a model that explains nothing.
-    model_fitter = fine if grown.steps and model.reduced_chi2 <= HOPELESS else fitter
-    tick("on short ticks", 0, 0)
-    refined = fine.refine(plain)
-    final = fine.refine(model) if model_fitter is fine else model if grown.steps else refined
-    closest = nearest(fitter.case, case, plain)
+def gathered(case: Case, *, seed: int, alpha: float, effects: Sequence[str] | None, tick: Progress) -> Evidence:
+    """All that needs rollouts. Arguments as of ``diagnose``."""
+    kinds = applicable(case.around, effects)
+    case, by_cell = _rolled_by(case)
+    fitter = Fitter(case, Predictor(case, by_cell))
+    if not case.noise.known:
+        tick("how loud the noise is", 0, 0)
+        h = Hypothesis(space=case.thetas.space, around=case.around)
+        case = as_loud_as_left(fitter, baseline(fitter, h, np.random.default_rng(seed)))
+        fitter = Fitter(case, Predictor(case, by_cell))
+    found = searched(fitter, kinds, seed=seed, alpha=alpha, tick=tick)
+    decision = decided(found, most=loudest(case.noise))
+    tick("in the Drake cell", 0, 0)
+    judge = Judge(found.fitter)
+    plain = judge.judged(found.plain)
     tick("pushes left out", 0, 0)
-    before = after = fine.left_out(closest or refined)
-    best = confirmed(grown.steps, grown.rejected, final)
-    if best is not None:
-        after = model_fitter.left_out(best[1])
-    case.pool.count += fitter.case.pool.count
-    return Evidence(
-        case=case, fitter=fine, plain=refined, nearest=closest or refined, errors_before=before, errors_after=after,
-        screening=grown.base.screening, signatures=grown.base.signatures,
-        steps=grown.steps, rejected=grown.rejected, superfluous=grown.superfluous, final=final,
-        remaining=grown.last.screening, noise_share=answer.noise_share, loud=answer.loud, foil=answer.foil,
+    before = judge.left_out(plain)
+    if decision.verdict != "underpowered" and is_own_error(errors_of(case, before)):
+        decision = Decision(verdict="consistent")
+    best = None if decision.best is None else judge.judged(freed(found.fitter, decision.best.fit))
+    after = before if best is None else judge.left_out(best)
+    if decision.verdict == "unexplained" and errors_of(case, after).rms > errors_of(case, before).rms:
+        best, after = None, before  # likelier, and yet no nearer
+    evidence = Evidence(
+        case=case, found=found, decision=decision, fitter=judge.fitter, plain=plain, best=best,
+        errors_before=before, errors_after=after,
+        errors_partly=None if decision.partly is None else judge.left_out(judge.judged(decision.partly.fit)),
     )  # fmt: skip
-
-
-@dc.dataclass(frozen=True, kw_only=True)
-class _Answer:
-    """A grown model with the case it belongs to; ``fitter`` is on longer ticks. The rest as in ``Evidence``."""
-
-    case: Case
-    fitter: Fitter
-    grown: Grown
-    noise_share: float = 1.0
-    loud: tuple[Fitted, Screening] | None = None
-    foil: Foil | None = None
-
-
-def _better_foil(growth: Growth, grown: Grown) -> Foil | None:
-    """A law beside the catalogue that does better than an effect of a model that explains the pushes, or nearly."""
-    plain, model = grown.base.fitted, grown.last.fitted
-    # On short ticks, which come later, a model may leave a little less.
-    if not grown.steps or (unexplained(plain, model) and model.reduced_chi2 > EXPLAINED):
-        return None
-    for step in grown.steps:
-        name = step[0].name
-        alone = len(grown.steps) == 1
-        without = plain if alone else grown.without.get(name) or growth.without(name, model)
-        foil = better_foil(growth.fitter, without, model, name, growth.tick)
-        if foil is not None:
-            return foil
-    return None
-
-
-def _names(grown: Grown) -> set[str]:
-    return {step[0].name for step in grown.steps}
-
-
-def _in_question(grown: Grown) -> list[type[Effect]]:
-    """The effects that were found, and those whose score tests came near enough to be tried."""
-    scores = grown.base.screening.scores
-    least = WORTH_A_TRY * max(s.gain for s in scores)
-    found = _names(grown)
-    return [s.kind for s in scores if s.gain >= least or s.kind.name in found]
-
-
-@dc.dataclass(frozen=True, kw_only=True)
-class _Search:
-    """How a model is grown from a plain fit."""
-
-    kinds: Sequence[type[Effect]]
-    alpha: float
-    rng: np.random.Generator
-    tick: Progress
-
-    def answer(self, case: Case, rough: Case, first: Fitted) -> _Answer:
-        """Look at the whole catalogue, add effects, and take out what became superfluous."""
-        # What pushes may share without its being physics does not depend on what is looked for.
-        unasked = [kind for kind in tolerated(rough.around) if kind not in self.kinds]
-        guard, found = _looks(rough, first, [*self.kinds, *unasked], self.tick)
-        fitter = Fitter(rough, guard, tolerances(rough, found))
-        asked = [s for s in found if s.kind in self.kinds]
-        looked = Looked.at(fitter.guard(first), asked, self.rng)
-        growth = Growth(fitter=fitter, kinds=self.kinds, alpha=self.alpha, rng=self.rng, tick=self.tick)
-        grown = growth.grow(looked)
-        return _Answer(case=case, fitter=fitter, grown=grown, foil=_better_foil(growth, grown))
-
-    def answer_by_ratios(self, case: Case, rough: Case, first: Fitted) -> _Answer:
-        """The same where the noise is not known: as loud as the plain cell leaves, then as what was found leaves."""
-        loud = self.answer(*as_loud_as_left(case, rough, first))
-        if not loud.grown.steps:
-            return loud
-
-        def left_by(model: Fitted) -> tuple[Case, Case, float]:
-            """Both cases with the noise that a model leaves, and its share of what the plain cell leaves."""
-            quiet, quiet_rough, _ = as_loud_as_left(case, rough, Fitter(rough).linearise(model.state))
-            return quiet, quiet_rough, quieter(loud.case, quiet)
-
-        quiet, quiet_rough, share = left_by(loud.grown.last.fitted)
-        base = (loud.grown.base.fitted, loud.grown.base.screening)
-        if share > MOST_OF_UNKNOWN:
-            return dc.replace(loud, noise_share=share, loud=base)
-        # What was noise so far was missing physics: with less noise the pushes tell more.
-        self.tick("plain fit with less noise", 0, 0)
-        first = Fitter(quiet_rough).fit(loud.grown.base.fitted.state, renew=True)
-        again = dc.replace(self, kinds=_in_question(loud.grown)).answer(quiet, quiet_rough, first)
-        if again.grown.steps and _names(again.grown) != _names(loud.grown):
-            share = left_by(again.grown.last.fitted)[2]
-        return dc.replace(again, noise_share=share, loud=base)
-
-
-def _first(case: Case, rng: np.random.Generator, tick: Progress) -> Fitted:
-    """The plain fit, with all derivatives where it ended."""
-    return Fitter(case).linearise(fit_plain(case, rng, tick).state)
-
-
-def _looks(
-    case: Case, first: Fitted, kinds: Sequence[type[Effect]], tick: Progress
-) -> tuple[tuple[Array, ...], list[Signature]]:
-    """The guard's directions and the catalogue's signatures."""
-    tick("numerics guard", 0, 0)
-    own, of_path = numerics(case, first.state), path_errors(case, first.state, tick)
-    guard = tuple(np.column_stack(pair) for pair in zip(own, of_path, strict=True))
-    return guard, signatures(Fitter(case), first, kinds, lambda done, total: tick("score tests", done, total))
-
-
-def _located(evidence: Evidence, tick: Progress) -> Evidence:
-    """With the missing wrench, and the push that would tell rivals apart."""
-    rough = Fitter(coarse(evidence.case))
+    if decision.verdict in ("consistent", "underpowered"):
+        return evidence
     tick("the missing wrench", 0, 0)
-    wrenches = with_phases(evidence.case, missing_wrenches(rough, evidence.plain))
+    wrenches = with_phases(case, missing_wrenches(found.fitter, plain))
     tick("the next push", 0, 0)
-    push = next_push(rough.case, _rival_states(evidence))
-    evidence.case.pool.count += rough.case.pool.count
-    return dc.replace(evidence, wrenches=wrenches, next_push=push)
+    return dc.replace(evidence, wrenches=wrenches, next_push=next_push(case, _rivals(found.named, decision)))
 
 
-def _rival_states(evidence: Evidence) -> list[State]:
-    """The models in question: the final one, and those with another effect in the place of one of its own.
+def _rolled_by(case: Case) -> tuple[Case, tuple[int, ...]]:
+    """The case without pushes that nothing can roll out, and those that only the cell can."""
+    space = case.thetas.space
+    thetas = [space.nominal, *space.sample(np.random.default_rng(0), TRIED, from_prior=True)]
 
-    That is the first effect which these pushes cannot tell from others, else the last one and what came next to it;
-    none where the final model explains nothing.
-    """
-    steps, final = evidence.steps, evidence.final.state
-    if not steps or evidence.final.reduced_chi2 > HOPELESS:
+    def lost(predictor: Predictor, pushes: Sequence[int]) -> list[int]:
+        for theta in thetas:
+            own = [np.zeros(len(n.names)) for n in case.nuisances]
+            asks = [Ask(i, Physics(np.asarray(theta)), own[i]) for i in pushes]
+            pushes = [i for i, vector in zip(pushes, predictor.vectors(asks), strict=True) if vector is None]
+        return list(pushes)
+
+    every = range(len(case.problems))
+    by_cell = lost(Predictor(case), every)
+    gone = lost(Predictor(case, every), by_cell)
+    names = [case.problems[i].name for i in by_cell if i not in gone]
+    case = case.without(gone) if gone else case
+    return case, tuple(i for i, problem in enumerate(case.problems) if problem.name in names)
+
+
+def _rivals(named: Sequence[Weighed], decision: Decision) -> list[Physics]:
+    """The models in question: what was decided on and those it cannot be told from, or the next best instead."""
+    best = decision.best
+    if best is None or decision.verdict == "unexplained":
         return []
-    k = next((j for j in range(len(steps)) if class_beside(evidence, j)), len(steps) - 1)
-    alike = class_beside(evidence, k)
-    present = {step[0].name for step in steps}
-    rest = [c for c in steps[k][1:] if c.name not in present]
-    others = [c for c in rest if c.name in alike] or [c for c in rest if not c.degenerate][:1]
+    others = [one for one in named if one is not best and len(kinds_of(one)) == len(kinds_of(best))]
+    return [physics_of(one.fit) for one in (best, *(decision.rivals[:RIVALS] or others[:1]))]
 
-    def in_place(c: Candidate) -> State:
-        point = next(e for e in c.fitted.state.effects if e.kind.name == c.name)
-        return dc.replace(c.fitted.state, effects=(*final.effects[:k], point, *final.effects[k + 1 :]))
 
-    return [final, *(in_place(c) for c in others)]
+def physics_of(fit: Fit) -> Physics:
+    """Theta and effects of a fit."""
+    return Physics(fit.hypothesis.theta(fit.point.z), fit.hypothesis.effects(fit.point.z))

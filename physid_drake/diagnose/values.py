@@ -44,14 +44,12 @@ class Partly:
         effects: names; confirmed by pushes that were left out.
         share: of the mean square error of pushes left out that they take away, in standard deviations.
         position, rotation: root mean square errors of pushes left out with them [m, rad].
-        reduced_chi2: cost per degree of freedom with them.
     """
 
     effects: tuple[str, ...]
     share: float
     position: float
     rotation: float
-    reduced_chi2: float
 
 
 @dc.dataclass(frozen=True, kw_only=True)

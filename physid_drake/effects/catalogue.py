@@ -19,6 +19,7 @@ from physid_drake.effects.friction import (
 from physid_drake.effects.hand import ActuatorLag, HandCompliance, HandOffset
 from physid_drake.effects.liquid import Sloshing
 from physid_drake.effects.tracker import TrackerBias, TrackerLatency, TrackerScale
+from physid_drake.effects.unnamed import UnnamedForce
 from physid_drake.errors import ConfigError
 from physid_drake.wording import named
 
@@ -30,16 +31,20 @@ CATALOGUE: tuple[type[Effect], ...] = (
 )  # fmt: skip
 
 
-def effect_named(name: str) -> type[Effect]:
+OF_MODELS = (*CATALOGUE, UnnamedForce)
+"""What a model may hold."""
+
+
+def effect_named(name: str, among: Sequence[type[Effect]] = CATALOGUE) -> type[Effect]:
     """The effect of a name.
 
     Raises:
         ConfigError: if there is none.
     """
-    for kind in CATALOGUE:
+    for kind in among:
         if kind.name == name:
             return kind
-    raise ConfigError(f"effect '{named(name)}' is unknown; known are {', '.join(kind.name for kind in CATALOGUE)}.")
+    raise ConfigError(f"effect '{named(name)}' is unknown; known are {', '.join(kind.name for kind in among)}.")
 
 
 def applicable(around: Surroundings, names: Sequence[str] | None = None) -> tuple[type[Effect], ...]:

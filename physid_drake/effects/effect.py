@@ -165,6 +165,8 @@ class Effect:
     amplitudes: ClassVar[tuple[str, ...]]
     # Parameters that the catalogue does not have.
     beyond: ClassVar[tuple[str, ...]] = ()
+    # Names of effects that it is the same as in a limit: a tether far away is a tilt.
+    limits: ClassVar[tuple[str, ...]] = ()
     # Chart coordinates that change with this power of the object's mass where its motion stays the same: 1 for what
     # is in proportion to a force, since friction and inertia are. Nothing but a force can tell mass and these apart.
     mass_powers: ClassVar[Mapping[str, int]] = {}

@@ -57,6 +57,7 @@ class Tether(Effect):
     statement: ClassVar[str] = "a pull towards a point of the world that grows with the distance: a spring or a cable"
     frame: ClassVar[str] = "world"
     amplitudes: ClassVar[tuple[str, ...]] = ("stiffness",)
+    limits: ClassVar[tuple[str, ...]] = ("table_tilt",)
     mass_powers: ClassVar[Mapping[str, int]] = {"stiffness": 1, "force_x": 1, "force_y": 1}
 
     stiffness: float = parameter(0.0, "N/m", values=NOT_NEGATIVE)
@@ -117,6 +118,7 @@ class Magnet(Effect):
     statement: ClassVar[str] = "an attraction to a point of the table that fades with distance"
     frame: ClassVar[str] = "world"
     amplitudes: ClassVar[tuple[str, ...]] = ("strength",)
+    limits: ClassVar[tuple[str, ...]] = ("table_tilt",)
     mass_powers: ClassVar[Mapping[str, int]] = {"strength": 1}
 
     strength: float = parameter(0.0, "N*m^2", values=NOT_NEGATIVE)

@@ -21,6 +21,7 @@ from physid_drake.inference.push import (
     held_out,
     loudness_of,
     weighed,
+    without,
 )
 from physid_drake.inference.scatter import SCATTERS, log_prior_of_scatter
 from physid_drake.pushes.case import Case
@@ -164,6 +165,8 @@ class Fitter:
         points: Sequence[Point],
         like: Sequence[Fit | None],
         tail: float = NO_TAIL,
+        *,
+        theta: bool = True,
     ) -> list[Fit]:
         """Fits at points, with derivatives by differences.
 
@@ -172,14 +175,16 @@ class Fitter:
             points: where.
             like: fits whose derivatives by the pushes' own unknowns are near enough; None takes them anew.
             tail: degrees of freedom of a push's errors.
+            theta: take derivatives by theta anew beside such a fit, too.
         """
         asks: list[Ask] = []
-        for h, point, near in zip(hypotheses, points, like, strict=True):
-            asks += self._asks(h, point, own=near is None)
+        kept = [0 if theta or near is None else h.space.dimension for h, near in zip(hypotheses, like, strict=True)]
+        for h, point, near, skipped in zip(hypotheses, points, like, kept, strict=True):
+            asks += self._asks(h, point, skipped, own=near is None)
         vectors = iter(self.predictor.vectors(asks))
         return [
-            self._found(h, point, self._linear(h, point, vectors, near), near, tail)
-            for h, point, near in zip(hypotheses, points, like, strict=True)
+            self._found(h, point, self._linear(h, point, vectors, near, skipped), near, tail)
+            for h, point, near, skipped in zip(hypotheses, points, like, kept, strict=True)
         ]
 
     def renewed(self, fits: Sequence[Fit]) -> list[Fit]:
@@ -191,10 +196,13 @@ class Fitter:
         """The fits with pushes that have heavy tails."""
         return [self._found(fit.hypothesis, fit.point, fit.pushes, fit, TAIL) for fit in fits]
 
-    def _asks(self, h: Hypothesis, point: Point, *, own: bool) -> list[Ask]:
-        """One rollout per push for a step of each coordinate that is simulated, and for each of its own unknowns."""
+    def _asks(self, h: Hypothesis, point: Point, skipped: int, *, own: bool) -> list[Ask]:
+        """One rollout per push for a step of each coordinate that is simulated, and for each of its own unknowns.
+
+        Not for the first coordinates, so many of which are skipped.
+        """
         moved = []
-        for step in np.diag(h.steps(point.z)):
+        for step in np.diag(h.steps(point.z))[skipped:]:
             z = point.z.copy()
             z[: h.simulated] += step
             moved.append(Physics(h.theta(z), h.effects(z)))
@@ -206,13 +214,15 @@ class Fitter:
         return asks
 
     def _linear(
-        self, h: Hypothesis, point: Point, vectors: Iterator[Array | None], near: Fit | None
+        self, h: Hypothesis, point: Point, vectors: Iterator[Array | None], near: Fit | None, skipped: int
     ) -> tuple[LinearPush, ...]:
-        """All pushes from the rollouts of ``_asks``."""
+        """All pushes from the rollouts of ``_asks``; what was skipped is as in the fit that is near."""
         pushes = []
         for i, (whole, more) in enumerate(zip(point.predicted, self.tolerances, strict=True)):
             base = whole - more @ point.z[h.simulated :]
-            shared = np.column_stack([*(slope(base, next(vectors), s) for s in h.steps(point.z)), more])
+            moved = [slope(base, next(vectors), size) for size in h.steps(point.z)[skipped:]]
+            known = [] if near is None else [near.pushes[i].shared[:, :skipped]]
+            shared = np.column_stack([*known, *moved, more])
             own = near.pushes[i].own if near is not None else own_slopes(base, point.own[i], vectors)
             residual = self.predictor.recorded[i] - whole + own @ point.own[i]
             pushes.append(LinearPush(residual=residual, shared=shared, own=own))
@@ -264,31 +274,39 @@ class Fitter:
 
     # Iteration.
 
-    def fitted(self, fits: Sequence[Fit], rounds: int) -> list[Fit]:
-        """The fits after so many steps at most, all of them in one batch."""
+    def fitted(self, fits: Sequence[Fit], rounds: int, *, roughly: bool = False) -> list[Fit]:
+        """The fits after so many steps at most, all of them in one batch.
+
+        Args:
+            fits: where they are.
+            rounds: at most.
+            roughly: keep the derivatives by theta and by the pushes' own unknowns, however far a step leads.
+        """
         now = list(fits)
         for _ in range(rounds):
             going = [k for k, fit in enumerate(now) if not fit.done]
-            for k, fit in zip(going, self._stepped([now[k] for k in going]), strict=True):
+            for k, fit in zip(going, self._stepped([now[k] for k in going], roughly=roughly), strict=True):
                 now[k] = fit
         return now
 
-    def _stepped(self, fits: Sequence[Fit]) -> list[Fit]:
+    def _stepped(self, fits: Sequence[Fit], *, roughly: bool) -> list[Fit]:
         """One step of each fit: the better point, linearised, or the same fit with shorter steps to come."""
-        steps = [self._step(fit) for fit in fits]
+        steps = [self.step(fit) for fit in fits]
         points = self.points([f.hypothesis for f in fits], [z for z, _ in steps], [own for _, own in steps])
         results, better = list(fits), list[tuple[int, Point, Fit | None]]()
         for k, (fit, point) in enumerate(zip(fits, points, strict=True)):
             cost = math.inf if point is None else self._cost_as(fit, point)
             if point is not None and fit.cost - cost > SETTLED:
-                better.append((k, point, None if fit.cost - cost > RENEWED * self.count else fit))
+                far = not roughly and fit.cost - cost > RENEWED * self.count
+                better.append((k, point, None if far else fit))
             else:
                 damping = fit.damping * HARDENED
                 results[k] = dc.replace(fit, damping=damping, done=cost <= fit.cost or damping > HARDEST)
         for tail in {fits[k].tail for k, _, _ in better}:
             some = [one for one in better if fits[one[0]].tail == tail]
             hypotheses = [fits[k].hypothesis for k, _, _ in some]
-            again = self.started(hypotheses, [point for _, point, _ in some], [near for *_, near in some], tail)
+            points_of, near_of = [point for _, point, _ in some], [near for *_, near in some]
+            again = self.started(hypotheses, points_of, near_of, tail, theta=not roughly)
             for (k, _, _), fit in zip(some, again, strict=True):
                 results[k] = dc.replace(fit, damping=fits[k].damping * EASED)
         return results
@@ -297,14 +315,17 @@ class Fitter:
         """Of another point, with a fit's scatter and loudness."""
         return self.cost(fit.hypothesis, point, fit.scatter, fit.loudness, fit.tail)
 
-    def _step(self, fit: Fit) -> tuple[Array, Own]:
+    def _reach(self, h: Hypothesis) -> Array:
+        """How far (n,) a step goes: shapes (a place, a speed) no further than their prior says they are unsure."""
+        of_theta, free = np.full(h.space.dimension, MOST_THETA_MOVE), np.full(h.tolerances, np.inf)
+        return np.concatenate([of_theta, [c.std for c in h.coordinates], free])
+
+    def step(self, fit: Fit) -> tuple[Array, Own]:
         """Where a damped Gauss-Newton step leads, within bounds."""
         h, point = fit.hypothesis, fit.point
         precision, right = normal_equations(fit.weighed, h.mean - point.z, h.std)
         damped = precision + np.diag(fit.damping * np.diag(precision))
-        of_theta, free = np.full(h.space.dimension, MOST_THETA_MOVE), np.full(h.tolerances, np.inf)
-        # Coordinates of shape (a place, a speed) go no further in a step than their prior says they are unsure.
-        reach = np.concatenate([of_theta, [c.std for c in h.coordinates], free])
+        reach = self._reach(h)
         least, most = np.maximum(h.bounds[0] - point.z, -reach), np.minimum(h.bounds[1] - point.z, reach)
         dz = bounded(damped, right, (least, most))
         own = tuple(
@@ -313,12 +334,45 @@ class Fitter:
         )
         return np.clip(point.z + dz, *h.bounds), own
 
-    def held_out(self, fit: Fit) -> Array:
-        """Log predictive density (n,) of each push given the others."""
+    def held_out(self, fit: Fit, folds: Sequence[Sequence[int]] | None = None) -> Array:
+        """Log predictive density (n,) of each push given the others, or given those outside its fold.
+
+        Each bears its part of how unlikely theta, the tolerances and the scatter of friction are: where all pushes
+        agree on a centre of mass that is off by ten tolerances, the others would predict each of them at no cost.
+        """
         h = fit.hypothesis
-        return held_out(
-            fit.pushes, self.priors(fit.scatter), h.mean - fit.point.z, h.std, fit.loudness, fit.weighed, fit.tail
+        scores = held_out(
+            fit.pushes, self.priors(fit.scatter), h.mean - fit.point.z, h.std, fit.loudness, fit.weighed, fit.tail,
+            folds,
         )  # fmt: skip
+        known = h.known
+        cost = 0.5 * float(np.sum(((fit.point.z - h.mean) / h.std)[known] ** 2)) - log_prior_of_scatter(fit.scatter)
+        return np.asarray(scores - cost / len(scores))
+
+    def without(self, fit: Fit, push: int) -> Array:
+        """Where z (n,) is likeliest for all pushes but one, within bounds and no further than a step goes."""
+        h = fit.hypothesis
+        dz, _ = without([push], h.mean - fit.point.z, h.std, fit.weighed)
+        reach = self._reach(h)
+        return np.clip(fit.point.z + np.clip(dz, -reach, reach), *h.bounds)
+
+    def seen_at(self, fit: Fit, point: Point) -> Fit:
+        """A fit at another point of its hypothesis, with the derivatives that it has."""
+        pushes = tuple(
+            dc.replace(push, residual=y - f + push.own @ own)
+            for push, y, f, own in zip(fit.pushes, self.predictor.recorded, point.predicted, point.own, strict=True)
+        )
+        return self._found(fit.hypothesis, point, pushes, fit, fit.tail)
+
+    def frictions(self, fit: Fit) -> Array:
+        """Each push's own share (n,) of friction beside what all share, in units of the columns' scatter."""
+        return np.array([own[n.index("friction")] for own, n in zip(fit.point.own, self.case.nuisances, strict=True)])
+
+    def covariance(self, fit: Fit) -> Array:
+        """Of z (n, n), the pushes' unknowns integrated out."""
+        h = fit.hypothesis
+        precision, _ = normal_equations(fit.weighed, h.mean - fit.point.z, h.std)
+        return np.asarray(np.linalg.pinv(precision))
 
 
 def normal_equations(found: Sequence[Weighed], mean: Array, std: Array) -> tuple[Array, Array]:

@@ -12,6 +12,7 @@ from physid_drake.effects import Coordinate, Effect, Surroundings
 from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 
 THETA_STEP = 0.006  # of the unit cube, for differences
 THETA_WITHIN = (1e-3, 1.0 - 1e-3)  # of the unit cube
@@ -79,6 +80,11 @@ class Hypothesis:
         return np.concatenate(
             [self.space.prior_std_unit, [c.std for c in self.coordinates], np.ones(self.tolerances)]
         )
+
+    @property
+    def known(self) -> Index:
+        """Indices in z of what something is known of beforehand: theta and the tolerances."""
+        return np.concatenate([np.arange(self.space.dimension), np.arange(self.simulated, self.dimension)])
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:

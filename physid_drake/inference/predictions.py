@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses as dc
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from copy import copy
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +13,17 @@ from scipy.linalg import solve_triangular
 
 from physid_drake.cell import Outcome
 from physid_drake.effects import Effect
+from physid_drake.effects.pulse import Pulse
 from physid_drake.effects.rollout import Geometry, Rollout, geometry_with, lateness_of
 from physid_drake.inference.discrepancy import discrepancy, sensor_noise, way_of
-from physid_drake.pushes.by_twin import stays, twin_for
+from physid_drake.pushes.by_twin import say_that_it_compiles, stays, twin_for
 from physid_drake.pushes.case import Case
 from physid_drake.pushes.force_windows import offsets
 from physid_drake.pushes.nuisance import PushSetting, apply_nuisance
 from physid_drake.pushes.prediction import Prediction
 from physid_drake.pushes.problem import PushProblem, turned_as_recorded
+from physid_drake.pushes.rollouts import RolloutPool
+from physid_drake.pushes.task import Task
 from physid_drake.twin.twin import STEADY, Trace, Twin, TwinPush, Wander
 from physid_drake.twin.with_effects import as_reported, push_with
 
@@ -48,7 +52,8 @@ class Physics:
 class Ask:
     """A rollout: a push with its own unknowns (k,), in units of their priors' standard deviations.
 
-    ``path_error``, where it is not negative, is the one that its hand's path has; ``wander`` what frictions do.
+    ``path_error``, where it is not negative, is the one that its hand's path has; ``wander`` what frictions and
+    forces do for a while.
     """
 
     push: int
@@ -67,13 +72,21 @@ class Predictor:
         whitening: per push (m, m), takes features to units of the noise.
         recorded: per push (m,), in units of the noise.
         count: of rollouts.
+        by_cell: the pushes that the twin cannot roll out, whatever theta; the cell does.
     """
 
-    def __init__(self, case: Case) -> None:
-        self.case, self.count = case, 0
+    def __init__(self, case: Case, by_cell: Collection[int] = ()) -> None:
+        self.case, self.count, self.by_cell = case, 0, frozenset(by_cell)
         self.noise = [sensor_noise(f) + discrepancy(p, f) for f, p in zip(case.features, case.problems, strict=True)]
         self.with_directions([np.zeros((len(f.recorded), 0)) for f in case.features])
         self._settings: dict[tuple[int, int, bytes], PushSetting] = {}
+
+    def judging(self, pool: RolloutPool) -> Predictor:
+        """The same in another cell, of which a pool makes all rollouts."""
+        other = copy(self)
+        other.case = dc.replace(self.case, pool=pool)
+        other.by_cell = frozenset(range(len(self.case.problems)))
+        return other
 
     def with_directions(self, directions: Sequence[Array]) -> None:
         """Count N(0, 1) multiples of columns (m_i, j) of features, in their units, as noise."""
@@ -85,11 +98,51 @@ class Predictor:
 
     def vectors(self, asks: Sequence[Ask]) -> list[Array | None]:
         """Features (m_i,) of each rollout, in units of the noise; None of one that the twin cannot make."""
-        answers: list[Array | None] = []
-        for k in range(0, len(asks), TOGETHER):
-            answers += self._some(asks[k : k + TOGETHER])
+        answers: list[Array | None] = [None] * len(asks)
+        of_cell = [k for k, ask in enumerate(asks) if ask.push in self.by_cell]
+        of_twin = [k for k, ask in enumerate(asks) if ask.push not in self.by_cell]
+        for first in range(0, len(of_twin), TOGETHER):
+            some = of_twin[first : first + TOGETHER]
+            for k, answer in zip(some, self._some([asks[k] for k in some]), strict=True):
+                answers[k] = answer
+        for k, answer in zip(of_cell, self._in_cell([asks[k] for k in of_cell]), strict=True):
+            answers[k] = answer
         self.count += len(asks)
         return answers
+
+    def _in_cell(self, asks: Sequence[Ask]) -> list[Array | None]:
+        """By the cell, which knows no frictions that wander, but forces."""
+        tasks = [
+            Task(
+                problem=self._problem(ask), theta=ask.physics.theta, nuisance=self.case.nuisances[ask.push],
+                values=ask.own * self.case.nuisances[ask.push].stds,
+                effects=(*ask.physics.effects, *self._pulses(ask)),
+            )
+            for ask in asks
+        ]  # fmt: skip
+        found = self.case.pool.run(tasks) if tasks else []
+        return [
+            None if one is None or ask.wander.support or ask.wander.hand
+            else np.asarray(self.whitening[ask.push] @ self.case.features[ask.push].of(one))
+            for ask, one in zip(asks, found, strict=True)
+        ]  # fmt: skip
+
+    def _pulses(self, ask: Ask) -> tuple[Effect, ...]:
+        wander, begin = ask.wander, self.case.problems[ask.push].begin
+        if wander is STEADY:
+            return ()
+        return (
+            Pulse(
+                fx=wander.force[0], fy=wander.force[1], torque=wander.torque, middle=wander.middle - begin,
+                width=wander.width,
+            ),
+        )  # fmt: skip
+
+    def _problem(self, ask: Ask) -> PushProblem:
+        problem = self.case.problems[ask.push]
+        if ask.path_error < 0:
+            return problem
+        return dc.replace(problem, path=problem.path_errors[ask.path_error].path)
 
     def path_errors(self, owns: Sequence[Array], physics: Physics) -> list[Array]:
         """Columns (m_i, e) of features, in their units: what each error that a hand's path may have changes."""
@@ -125,6 +178,7 @@ class Predictor:
 
     def _some(self, asks: Sequence[Ask]) -> list[Array | None]:
         """As many as go in one call: those of each geometry together."""
+        say_that_it_compiles()
         answers: list[Array | None] = [None] * len(asks)
         plain = Geometry(shape=self.case.pool.spec.shape)
         twins: dict[int, Twin | None] = {}
@@ -140,7 +194,7 @@ class Predictor:
         of = {id(twin): twin for twin in twins.values() if twin is not None}
         for name, asked in waiting.items():
             twin = of[name]
-            traces = twin.rollouts([push for _, push, _ in asked])
+            traces = twin.rollouts([push for _, push, _ in asked], self.case.pool.jobs)
             for (k, _, where), trace in zip(asked, traces, strict=True):
                 if trace.outcome is Outcome.COMPLETED and not trace.tips and stays(self.case.pool.spec, twin, trace):
                     answers[k] = self._vector(asks[k], trace, where)
@@ -151,10 +205,8 @@ class Predictor:
         if key not in self._settings:
             if len(self._settings) >= MOST_SETTINGS:
                 self._settings.clear()
-            problem, nuisance = self.case.problems[ask.push], self.case.nuisances[ask.push]
-            if ask.path_error >= 0:
-                problem = dc.replace(problem, path=problem.path_errors[ask.path_error].path)
-            self._settings[key] = apply_nuisance(problem, nuisance, ask.own * nuisance.stds)
+            nuisance = self.case.nuisances[ask.push]
+            self._settings[key] = apply_nuisance(self._problem(ask), nuisance, ask.own * nuisance.stds)
         return self._settings[key]
 
     def _push(self, twin: Twin, plain: Geometry, ask: Ask) -> tuple[TwinPush, Index | None] | None:

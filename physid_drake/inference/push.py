@@ -133,6 +133,7 @@ def held_out(
     loudness: float,
     found: Sequence[Weighed],
     tail: float = TAIL,
+    folds: Sequence[Sequence[int]] | None = None,
 ) -> Array:
     """Log predictive density (n,) of each push given the others.
 
@@ -144,18 +145,26 @@ def held_out(
         loudness: of the pushes.
         found: the pushes, weighed.
         tail: degrees of freedom of their errors.
+        folds: indices of pushes that are left out together; each alone where None.
     """
-    information = sum((one.precision for one in found), np.diag(std**-2.0))
-    right = sum((one.right for one in found), mean * std**-2.0)
-    ridge = 1e-10 * np.trace(information) / max(1, len(right)) * np.eye(len(right))
     scores = np.zeros(len(pushes))
-    for i, (push, prior, one) in enumerate(zip(pushes, priors, found, strict=True)):
-        others = information - one.precision + ridge
-        root = np.linalg.cholesky(np.linalg.inv(0.5 * (others + others.T)))
-        dz = root @ (root.T @ (right - one.right))
-        scores[i] = weighed(
-            push.residual - push.shared @ dz, np.zeros((len(push.residual), 0)),
-            np.column_stack([push.own, push.shared @ root]), np.concatenate([prior, np.ones(len(dz))]), loudness,
-            tail,
-        ).log_density  # fmt: skip
+    for fold in [[i] for i in range(len(pushes))] if folds is None else folds:
+        dz, root = without(fold, mean, std, found)
+        for i in fold:
+            push = pushes[i]
+            scores[i] = weighed(
+                push.residual - push.shared @ dz, np.zeros((len(push.residual), 0)),
+                np.column_stack([push.own, push.shared @ root]), np.concatenate([priors[i], np.ones(len(dz))]),
+                loudness, tail,
+            ).log_density  # fmt: skip
     return scores
+
+
+def without(fold: Sequence[int], mean: Array, std: Array, found: Sequence[Weighed]) -> tuple[Array, Array]:
+    """What all pushes but some say of dz: estimate (n,), and a root (n, n) of its covariance."""
+    kept = [one for i, one in enumerate(found) if i not in fold]
+    information = sum((one.precision for one in kept), np.diag(std**-2.0))
+    right = sum((one.right for one in kept), mean * std**-2.0)
+    information = information + 1e-10 * np.trace(information) / max(1, len(right)) * np.eye(len(right))
+    root = np.linalg.cholesky(np.linalg.inv(0.5 * (information + information.T)))
+    return root @ (root.T @ right), root

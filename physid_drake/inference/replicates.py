@@ -15,13 +15,12 @@ from scipy import stats
 from scipy.linalg import cho_factor, cho_solve
 
 from physid_drake.inference.fit import Fit, Fitter
-from physid_drake.inference.scatter import SCATTERS, log_prior_of_scatter
+from physid_drake.inference.scatter import log_prior_of_scatter, scatters_beside
 from physid_drake.inference.scores import Column, by_family
 
 Array = NDArray[np.float64]
 
 REPLICATES = 300
-NEIGHBOURS = 2  # of the scatter's grid, on either side, that a refit may come to
 TAIL_SHARE = 0.15  # of the replicates: whose excesses give the tail beyond the largest
 
 
@@ -34,9 +33,7 @@ def largest_gains(fitter: Fitter, fit: Fit, found: Sequence[Column], rng: np.ran
         np.column_stack([push.residual, _drawn(push.own, prior, one.weight**-0.5, rng)])
         for push, prior, one in zip(fit.pushes, fitter.priors(fit.scatter), fit.weighed, strict=True)
     ]
-    k = SCATTERS.index(fit.scatter)
-    grid = SCATTERS[max(0, k - NEIGHBOURS) : k + NEIGHBOURS + 1]
-    tables = [_Table(fitter, fit, found, drawn, scatter) for scatter in grid]
+    tables = [_Table(fitter, fit, found, drawn, scatter) for scatter in scatters_beside(fit.scatter)]
     null = _best([table.scored([]) for table in tables])
     largest = np.full(1 + REPLICATES, -np.inf)
     for members in by_family(found):
@@ -76,6 +73,7 @@ class _Table:
     ) -> None:
         self.found, self.n = found, fit.hypothesis.dimension
         self.std = np.concatenate([fit.hypothesis.std, [c.coordinate.std for c in found]])
+        self.known, self.off = fit.hypothesis.known, fit.point.z - fit.hypothesis.mean
         self.log_prior = log_prior_of_scatter(scatter)
         self.precisions, self.rights, self.squares, self.log_dets = [], [], [], []
         for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(scatter), strict=True)):
@@ -97,9 +95,14 @@ class _Table:
         blocks, rights = [p[np.ix_(index, index)] for p in self.precisions], [r[index] for r in self.rights]
         whole, right = sum(blocks, np.diag(self.std[index] ** -2.0)), sum(rights, np.zeros_like(rights[0]))
         whole = whole + 1e-12 * float(np.trace(whole)) * np.eye(len(index))
+        # Of replicates the fitted model is true, and what is known beforehand is about it.
+        right[: self.n, 0] -= self.off / self.std[: self.n] ** 2
         beta, log_det = np.linalg.solve(whole, right), np.linalg.slogdet(whole)[1]
         value = self.log_prior + 0.5 * (_dot(right, beta) - sum(self.squares) - sum(self.log_dets))
-        held = np.zeros(len(value))
+        known = self.known
+        off = beta[known].copy()
+        off[:, 0] += self.off[known]
+        held = self.log_prior - 0.5 * ((off / self.std[known, None]) ** 2).sum(axis=0)
         for block, r, square, own in zip(blocks, rights, self.squares, self.log_dets, strict=True):
             others = whole - block
             b = np.linalg.solve(others, right - r)

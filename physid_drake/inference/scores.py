@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses as dc
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +14,7 @@ from physid_drake.inference.bounded import bounded
 from physid_drake.inference.fit import Fit, Fitter, slope
 from physid_drake.inference.predictions import Ask, Physics
 from physid_drake.inference.push import weighed
+from physid_drake.inference.scatter import log_prior_of_scatter, scatters_beside
 
 Array = NDArray[np.float64]
 
@@ -128,27 +130,41 @@ def by_family(found: Sequence[Column]) -> list[list[int]]:
 
 def scores(fitter: Fitter, fit: Fit, found: Sequence[Column]) -> list[Score]:
     """The score test of each family, best first: how much a model with it gains, all else refitted, linearly."""
+    n, families = fit.hypothesis.dimension, by_family(found)
+    best: list[tuple[float, Array]] = [(-math.inf, np.zeros(0))] * (1 + len(families))
+    for scatter in scatters_beside(fit.scatter):
+        value, precision, right = _equations(fitter, fit, found, scatter)
+        for k, members in enumerate([[], *families]):
+            gain, beta = _solved(
+                precision, right, [*range(n), *(n + m for m in members)], [found[m] for m in members]
+            )
+            if value + gain > best[k][0]:
+                best[k] = value + gain, beta
+    made = []
+    for members, (reached, beta) in zip(families, best[1:], strict=True):
+        first = found[members[0]]
+        point = np.array(first.family.point)
+        point[[found[m].index for m in members]] += beta[n:]
+        made.append(
+            Score(kind=first.kind, family=first.family, gain=reached - best[0][0], point=point, dz=beta[:n])
+        )  # fmt: skip
+    return sorted(made, key=lambda s: -s.gain)
+
+
+def _equations(fitter: Fitter, fit: Fit, found: Sequence[Column], scatter: float) -> tuple[float, Array, Array]:
+    """Log likelihood where the fit is, precision and precision times estimate of all that may move from there."""
     h = fit.hypothesis
-    n, mean = h.dimension, h.mean - fit.point.z
+    n, value = h.dimension, log_prior_of_scatter(scatter)
     precision, right = np.zeros((n + len(found),) * 2), np.zeros(n + len(found))
-    precision[:n, :n], right[:n] = np.diag(h.std**-2.0), mean * h.std**-2.0
-    for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(fit.scatter), strict=True)):
+    precision[:n, :n], right[:n] = np.diag(h.std**-2.0), (h.mean - fit.point.z) * h.std**-2.0
+    for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(scatter), strict=True)):
         shared = np.column_stack([push.shared, *(c.pushes[i] for c in found)])
         one = weighed(push.residual, shared, push.own, prior, fit.loudness, fit.tail)
         precision += one.precision
         right += one.right
+        value += one.log_density
     precision += np.diag(np.concatenate([np.zeros(n), [c.coordinate.std**-2.0 for c in found]]))
-    base, _ = _solved(precision, right, list(range(n)), [])
-    made = []
-    for members in by_family(found):
-        some = [found[k] for k in members]
-        gain, beta = _solved(precision, right, [*range(n), *(n + k for k in members)], some)
-        point = np.array(some[0].family.point)
-        point[[c.index for c in some]] += beta[n:]
-        made.append(
-            Score(kind=some[0].kind, family=some[0].family, gain=gain - base, point=point, dz=beta[:n])
-        )  # fmt: skip
-    return sorted(made, key=lambda s: -s.gain)
+    return value, precision, right
 
 
 def _solved(precision: Array, right: Array, index: list[int], some: Sequence[Column]) -> tuple[float, Array]:

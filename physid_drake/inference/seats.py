@@ -11,15 +11,20 @@ from physid_drake.inference.push import weighed
 
 Array = NDArray[np.float64]
 
+ODD = 1.5  # of what noise leaves of a push: more is to be explained
 DRAWN, STEPS = 4, 4  # starts of a push's unknowns that are drawn; steps from each
 
 
 def reseated(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
-    """The fit with each push's unknowns where they are likeliest; z stays where it is.
+    """The fit with the unknowns of each push that it does not explain where they are likeliest; z stays where it is.
 
     An object that is about to slip off the hand goes one way or the other. Given z, a push's cost depends on its own
     unknowns alone, so that all pushes are looked at in one batch.
     """
+    left = [y - f for y, f in zip(fitter.predictor.recorded, fit.point.predicted, strict=True)]
+    odd = [i for i, errors in enumerate(left) if float(errors @ errors) > ODD * len(errors)]
+    if not odd:
+        return fit
     h, point = fit.hypothesis, fit.point
     physics, priors = Physics(h.theta(point.z), h.effects(point.z)), fitter.priors(fit.scatter)
     added = [more @ point.z[h.simulated :] for more in fitter.tolerances]
@@ -29,7 +34,7 @@ def reseated(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
 
     owns = list(point.own)
     best = [cost(i, own, predicted) for i, (own, predicted) in enumerate(zip(owns, point.predicted, strict=True))]
-    seats = [(i, seat) for i, own in enumerate(owns) for seat in _starts(own, fitter.most[i], rng)]
+    seats = [(i, seat) for i in odd for seat in _starts(owns[i], fitter.most[i], rng)]
     for _ in range(STEPS):
         asks = [Ask(i, physics, one) for i, seat in seats for one in (seat, *own_steps(seat))]
         vectors, again = iter(fitter.predictor.vectors(asks)), []

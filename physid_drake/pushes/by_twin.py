@@ -40,7 +40,7 @@ def predicted_by_twin(spec: CellSpec, thetas: ThetaMap, tasks: Sequence[Task]) -
     That is where a law is not of the vocabulary, where the object rolls, tips or comes to the table's edge, and where
     the integration diverges.
     """
-    _say_that_it_compiles()
+    say_that_it_compiles()
     answers: list[Prediction | None] = [None] * len(tasks)
     twins: dict[int, Twin] = {}
     waiting: dict[int, list[tuple[int, TwinPush]]] = defaultdict(list)
@@ -59,7 +59,8 @@ def predicted_by_twin(spec: CellSpec, thetas: ThetaMap, tasks: Sequence[Task]) -
 
 
 @cache
-def _say_that_it_compiles() -> None:
+def say_that_it_compiles() -> None:
+    """On standard error, once, where no earlier process left its machine code."""
     if not is_compiled():
         print("compiling the twin for this machine, once: some twenty seconds", file=sys.stderr, flush=True)
 

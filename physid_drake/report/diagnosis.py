@@ -95,7 +95,6 @@ def _partly(partly: Partly) -> dict[str, Any]:
         "share": partly.share,
         "held_out_rms_m": partly.position,
         "held_out_rms_rad": partly.rotation,
-        "reduced_chi2": partly.reduced_chi2,
     }
 
 

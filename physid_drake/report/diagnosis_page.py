@@ -13,7 +13,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 
 from physid_drake.diagnose import Evidence
-from physid_drake.diagnose.leaving import predicted
+from physid_drake.diagnose.evidence import predicted
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.looks import SAID
 from physid_drake.diagnose.values import Detectable, Diagnosis, EffectFinding, ParameterEstimate, ThetaEstimate
@@ -76,7 +76,7 @@ def shown_pushes(diagnosis: Diagnosis, evidence: Evidence) -> list[ShownPush]:
                 times=case.features[i].middles,
                 recorded=case.features[i].poses(case.features[i].recorded),
                 before=predicted(evidence, evidence.errors_before, i),
-                after=predicted(evidence, evidence.errors_after, i) if diagnosis.effects else None,
+                after=None if evidence.best is None else predicted(evidence, evidence.errors_after, i),
                 released=next(free, None),
             )
         )

@@ -26,8 +26,11 @@ _KEPT: Final = 3  # revisions whose machine code is kept
 
 
 def compiled_outermost(function: F) -> F:
-    """A function in machine code, which Python calls, and which makes all the arrays that those within it use."""
-    return _compiled(function, error_model="numpy")
+    """A function in machine code, which Python calls, and which makes all the arrays that those within it use.
+
+    Meanwhile other threads may go on.
+    """
+    return _compiled(function, error_model="numpy", nogil=True)
 
 
 def compiled(function: F) -> F:

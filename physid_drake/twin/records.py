@@ -26,9 +26,11 @@ BODY: Final = np.dtype([(name, np.float64) for name in (
     "swing_load",        # of the weight that moves with it [N]
     "reach",             # from Bcm, within which slip may turn about a place [m]; the rollout fills it in
     "begin", "end",      # [s]
-    "wander_middle", "wander_width",   # when frictions differ most, and how long before and after at all [s]
-    "wander_support", "wander_hand",   # by which share then: with the table, and at the tip
+    "wander_middle", "wander_width",   # when frictions and forces differ most, how long before and after at all [s]
+    "wander_support", "wander_hand",   # by which share of friction then: with the table, and at the tip
+    "wander_x", "wander_y", "wander_torque",  # by which force at Bcm in W [N], and torque [N m]
     "rough", "grip",     # those frictions' factors in a stage; the rollout fills them in
+    "push_x", "push_y", "push_torque",  # and those forces
 )])  # fmt: skip
 """The object and the hand's tip in one rollout."""
 

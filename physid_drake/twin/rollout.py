@@ -309,6 +309,8 @@ def _wander(body, t):
     """Frictions at a time [s]: a share more or less in the middle of a while, less before and after."""
     share = max(0.0, 1.0 - abs(t - body.wander_middle) / body.wander_width)
     body.rough, body.grip = 1.0 + share * body.wander_support, 1.0 + share * body.wander_hand
+    body.push_x, body.push_y = share * body.wander_x, share * body.wander_y
+    body.push_torque = share * body.wander_torque
 
 
 @compiled

@@ -89,7 +89,7 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
     oval = ellipse(laws, yaw)
     wx, wy = force_by_place(laws, tables, x, y)
     swing_x, swing_y, swing_drag = pull_of(body, h, swing, spin0)
-    ex, ey = turned_back(c, s, wx + swing_x, wy + swing_y)
+    ex, ey = turned_back(c, s, wx + swing_x + body.push_x, wy + swing_y + body.push_y)
     linear, turning_drag, quadratic = drags(laws)
     headed = has(laws, HEADING_TABLE)
     arms = turned_back(c, s, body.swing_load * swing[0], body.swing_load * swing[1])
@@ -106,7 +106,7 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
         fx, fy, torque, xx, xy, yy, xw, yw, ww = _friction(
             body, object_, laws, tables, room, headed, yaw, vx, vy, spin, oval, hx, hy, arms, solved, full
         )
-        torque += torque_of(body, swing, c * vx - s * vy, s * vx + c * vy, spin)
+        torque += body.push_torque + torque_of(body, swing, c * vx - s * vy, s * vx + c * vy, spin)
         drag = linear + quadratic * length(vx, vy) + swing_drag
         mx, my, mxx, mxy, myy = force_by_motion(laws, tables, vx, vy)
         inverse = _inverse(

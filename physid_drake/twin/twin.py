@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import accumulate
@@ -32,24 +33,29 @@ Array = NDArray[np.float64]
 LIGHTEST_TIP = 1e-6  # kg
 POINTS = 100
 """Under the object, about: the edge of a patch crosses the base point by point."""
+PIECE = 32  # rollouts at least that are worth a thread
 AT_ONCE = 8  # numbers in a vector of the machine
 NO_TIMES, NO_VELOCITIES, NOWHERE = np.zeros(0), np.zeros((0, 2)), np.zeros(2)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wander:
-    """Frictions that differ for a while: a hat over time, a unit of what real frictions do along their way.
+    """Frictions and forces that differ for a while: a hat over time, a unit of what they do along their way.
 
     Attributes:
         middle: when they differ most [s].
         width: how long before and after at all [s].
-        support, hand: by which share then, with the table and at the tip.
+        support, hand: by which share of friction then, with the table and at the tip.
+        force: at the centre of mass, along x and y of W [N].
+        torque: about it [N m].
     """
 
     middle: float
     width: float
     support: float = 0.0
     hand: float = 0.0
+    force: tuple[float, float] = (0.0, 0.0)
+    torque: float = 0.0
 
 
 STEADY = Wander(middle=0.0, width=1.0)
@@ -69,7 +75,7 @@ class TwinPush:
         laws: of the vocabulary: forces and frictions.
         swing: what swings inside; None where nothing does.
         mount: what holds a tip that gives way; None for one that is moved as the path says.
-        wander: frictions that differ for a while.
+        wander: frictions and forces that differ for a while.
     """
 
     body: Body
@@ -144,23 +150,28 @@ class Twin:
         """Mean square distance of the underside from Bo [m^2]."""
         return self._base.polar
 
-    def rollouts(self, pushes: Sequence[TwinPush]) -> list[Trace]:
-        """Simulate all pushes, each as if it were alone."""
+    def rollouts(self, pushes: Sequence[TwinPush], threads: int = 1) -> list[Trace]:
+        """Simulate all pushes, each as if it were alone, in so many threads."""
         base = self._base
         ends = _ends([len(push.times) for push in pushes])
         poses, forces = np.zeros((ends[-1], 3)), np.zeros((ends[-1], 2))
         counts = np.zeros(len(pushes), COUNTS)
         laws, law_ends, tables = records_of([(push.laws, push.body.mass * self.gravity) for push in pushes])
-        _roll_all(
-            np.array([self._record(push) for push in pushes], dtype=BODY),
-            (base.points, base.weights, base.radii),
-            np.array([push.body.support_friction[base.cells] for push in pushes]),
-            self._edges, *_hands(pushes),
-            np.array([(*push.start.pose, *push.start.velocity) for push in pushes]),
-            laws, law_ends, tables, np.concatenate([push.times for push in pushes], dtype=np.float64),
-            np.array(ends),
-            poses, forces, counts,
-        )  # fmt: skip
+        bodies = np.array([self._record(push) for push in pushes], dtype=BODY)
+        friction = np.array([push.body.support_friction[base.cells] for push in pushes])
+        starts = np.array([(*push.start.pose, *push.start.velocity) for push in pushes])
+        knots, velocities, paths, knot_ends = _hands(pushes)
+        times, sample_ends = np.concatenate([push.times for push in pushes], dtype=np.float64), np.array(ends)
+
+        def some(first: int, last: int) -> None:
+            own, bounds = slice(first, last), slice(first, last + 1)
+            _roll_all(
+                bodies[own], (base.points, base.weights, base.radii), friction[own], self._edges, knots, velocities,
+                paths[own], knot_ends[bounds], starts[own], laws, law_ends[bounds], tables, times,
+                sample_ends[bounds], poses, forces, counts[own],
+            )  # fmt: skip
+
+        _in_threads(some, len(pushes), threads)
         outcomes, tips, lifts = (counts[name].tolist() for name in ("outcome", "tipped", "lifted"))
         return [
             Trace(
@@ -189,8 +200,20 @@ class Twin:
             com_x, com_y, 0.5 * solid.height, solid.outline.radius if isinstance(solid.outline, Disc) else 0.0,
             self.hand_radius or 0.0, height - 0.5 * solid.height, body.hand_friction, body.restitution,
             *_tip_of(push.mount), *_swing_of(push.swing), 0.0, push.begin, push.end,
-            wander.middle, wander.width, wander.support, wander.hand, 1.0, 1.0,
+            wander.middle, wander.width, wander.support, wander.hand, *wander.force, wander.torque,
+            1.0, 1.0, 0.0, 0.0, 0.0,
         )  # fmt: skip
+
+
+def _in_threads(some: Callable[[int, int], None], count: int, threads: int) -> None:
+    """All of so many, in pieces: from which to which."""
+    pieces = max(1, min(threads, count // PIECE))
+    edges = [count * k // pieces for k in range(pieces + 1)]
+    if pieces == 1:
+        some(0, count)
+        return
+    with ThreadPoolExecutor(pieces) as pool:
+        list(pool.map(some, edges[:-1], edges[1:]))
 
 
 def _roll_all(*arrays: Any) -> None:

@@ -11,7 +11,6 @@ from twin import SIGMA, body_of, config_of
 
 from physid_drake.cell import Cell, HandPath, Outcome, Start
 from physid_drake.effects import CATALOGUE, PushFacts, Surroundings, applicable, effect_named
-from physid_drake.effects.foils import FOILS
 from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
 from physid_drake.errors import ConfigError
 from physid_drake.recording import Box, Cylinder
@@ -62,12 +61,12 @@ MEANING = {
 CURVED = ("hand_compliance",)
 
 every_name = pytest.mark.parametrize("kind", CATALOGUE, ids=lambda kind: kind.name)
-every_effect = pytest.mark.parametrize("kind", (*CATALOGUE, *FOILS), ids=lambda kind: kind.name)
+every_effect = pytest.mark.parametrize("kind", CATALOGUE, ids=lambda kind: kind.name)
 
 # Of the patch, each place is a direction of its own.
 every_effect_by_direction = pytest.mark.parametrize(
     "kind",
-    [pytest.param(kind, marks=[pytest.mark.slow] * (kind.name == "friction_patch")) for kind in (*CATALOGUE, *FOILS)],
+    [pytest.param(kind, marks=[pytest.mark.slow] * (kind.name == "friction_patch")) for kind in CATALOGUE],
     ids=lambda kind: kind.name,
 )
 

@@ -90,6 +90,17 @@ def test_a_friction_that_differs_for_a_while_changes_the_speed_by_the_area_of_it
     assert plain - other == pytest.approx(apart, rel=1e-3)
 
 
+def test_a_wrench_that_comes_and_goes_gives_the_momentum_of_its_hat_about_its_middle():
+    """Hardly any friction: x(T) = v T + F width (T - middle) / m, and the same of the turn."""
+    middle, width, mass, end = 0.3, 0.2, 0.4, 1.0
+    wander = Wander(middle=middle, width=width, force=(0.05, -0.08), torque=2e-4)
+    x, y, yaw = slide(mu=1e-6, mass=mass, velocity=(0.2, 0.1, 0.5), end=end, wander=wander).poses[-1]
+    gained = width * (end - middle)
+    assert (x, y) == pytest.approx((0.2 + 0.05 * gained / mass, 0.1 - 0.08 * gained / mass), rel=1e-3)
+    inertia = mass * BOX.solid.gyration[2]
+    assert yaw == pytest.approx(0.5 + 2e-4 * gained / inertia, rel=1e-3)
+
+
 def test_mass_cancels_in_a_free_slide():
     poses = [slide(mass=mass, velocity=(SPEED, 0.1, 3.0)).poses for mass in (0.05, 0.4, 5.0)]
     assert np.abs(np.array(poses) - poses[0]).max() < 1e-9

@@ -8,12 +8,14 @@ from scipy import stats
 
 from physid_drake.diagnose import estimates
 from physid_drake.diagnose.estimates import correlation_of, parameters_of, theta_of
-from physid_drake.diagnose.model import EffectPoint
 from physid_drake.effects import Family, Surroundings
 from physid_drake.effects.body import Restitution, UnevenSupport
 from physid_drake.effects.drag import QuadraticDrag
 from physid_drake.effects.fields import TableTilt
 from physid_drake.effects.friction import FrictionPatch
+from physid_drake.inference.hypothesis import Hypothesis, Part
+from physid_drake.inference.push import LinearPush
+from physid_drake.inference.scores import Column
 from physid_drake.pushes.theta import CELL_ERROR
 from physid_drake.space import Parameter, ParameterSpace
 
@@ -21,45 +23,37 @@ AROUND = Surroundings(
     mass=0.2, friction=0.3, size=np.array([0.12, 0.05]), height=0.03, region=np.array([[-0.5, -0.5], [0.5, 0.5]]),
     top_speed=0.5, pushes=10, has_hand=True, rolls=False,
 )  # fmt: skip
-CASE = SimpleNamespace(thetas=SimpleNamespace(space=SimpleNamespace(names=("support_friction",))), around=AROUND)
+FRICTION = Parameter(name="support_friction", unit="-", lower=0.05, upper=1.0, scale="log", prior_mean=0.3)
+SPACE = ParameterSpace(parameters=(FRICTION,))
 
 
-def fitted(*points, covariance):
-    """A fit with one unknown of theta, these effects, and a tolerance that is none of the estimates."""
-    count = 1 + sum(len(p.free) for p in points)
-    precision = np.zeros((count + 1, count + 1))
-    precision[:count, :count], precision[count, count] = np.linalg.inv(covariance), 1.0
-    return SimpleNamespace(
-        state=SimpleNamespace(u=np.array([0.5]), effects=points), own_dimension=count, reduced_chi2=1.0,
-        solution=SimpleNamespace(precision=precision), pushes=range(10),
-    )  # fmt: skip
+def fitted(*parts, covariance):
+    """A fitter, and a fit with one unknown of theta, these effects, and a tolerance that is none of the estimates."""
+    hypothesis = Hypothesis(space=SPACE, around=AROUND, parts=parts, tolerances=1)
+    whole = np.eye(hypothesis.dimension)
+    whole[:-1, :-1] = covariance
+    z = np.concatenate([[0.5], *(np.array(p.point)[list(p.free)] for p in parts), [0.0]])
+    fit = SimpleNamespace(hypothesis=hypothesis, point=SimpleNamespace(z=z), pushes=range(10))
+    return SimpleNamespace(covariance=lambda fit: whole), fit
 
 
 def point(kind, free):
-    zeros = np.zeros(len(kind.chart(AROUND)))
-    return EffectPoint(kind=kind, point=zeros, free=free, origin=zeros)
+    return Part(kind=kind, point=(0.0,) * len(kind.chart(AROUND)), free=free)
 
 
 def test_theta_and_an_effect_whose_chart_is_its_parameters_vary_as_the_fit_says():
     stds = np.array([0.02, 0.003, 0.004])
     wanted = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, -0.3], [0.0, -0.3, 1.0]])
-    names, found = correlation_of(
-        CASE, fitted(point(TableTilt, (0, 1)), covariance=wanted * np.outer(stds, stds))
-    )  # fmt: skip
+    names, found = correlation_of(*fitted(point(TableTilt, (0, 1)), covariance=wanted * np.outer(stds, stds)))
     assert names == ("theta.support_friction", "table_tilt.x", "table_tilt.y")
     np.testing.assert_allclose(found, wanted, atol=3.0 / np.sqrt(2000))
     assert found[0, 1] == pytest.approx(0.9, abs=0.015)
 
 
 def test_no_interval_of_theta_is_narrower_than_the_cells_own_error():
-    friction = Parameter(name="support_friction", unit="-", lower=0.05, upper=1.0, scale="log", prior_mean=0.3)
-    case = SimpleNamespace(thetas=SimpleNamespace(space=ParameterSpace(parameters=(friction,))))
     for spread, widths in ((1e-6, (0.005, 0.02)), (0.05, (0.1, 0.3))):
-        fit = fitted(covariance=np.array([[spread**2]]))
-        evidence = SimpleNamespace(
-            case=case, nearest=fit, fitter=SimpleNamespace(priors=lambda state: (np.zeros(1), np.full(1, 0.3)))
-        )
-        estimate = theta_of(evidence, fit)["support_friction"]
+        fitter, fit = fitted(covariance=np.array([[spread**2]]))
+        estimate = theta_of(fitter, fit, fit)["support_friction"]
         assert estimate.identifiable
         # At the middle of its range; a deviation is 1 %, or 0.05 of three times log(20).
         reach = np.log(estimate.ci90[1] / estimate.value)
@@ -69,9 +63,8 @@ def test_no_interval_of_theta_is_narrower_than_the_cells_own_error():
 @pytest.mark.parametrize("share", [0.02, 0.7, 1.1])
 def test_an_effect_that_is_there_is_more_than_nothing_however_little_is_known_of_it(share):
     """Its logarithm is normal; ten pushes with two unknowns leave eight degrees of freedom."""
-    drag = EffectPoint(kind=QuadraticDrag, point=np.array([5.0]), free=(0,), origin=np.zeros(1))
-    fit = fitted(drag, covariance=np.diag([0.01, 5.0 * share]) ** 2)
-    told = parameters_of(SimpleNamespace(final=fit, case=CASE), 0)["coefficient"]
+    drag = Part(kind=QuadraticDrag, point=(5.0,), free=(0,))
+    told = parameters_of(*fitted(drag, covariance=np.diag([0.01, 5.0 * share]) ** 2), 0)["coefficient"]
     assert told.value == 5.0
     reach = np.hypot(share * stats.t.ppf(0.95, 8), CELL_ERROR * stats.norm.ppf(0.95))
     np.testing.assert_allclose(np.log(np.array(told.ci90) / 5.0), [-reach, reach], rtol=0.15)  # of 400 draws
@@ -79,10 +72,8 @@ def test_an_effect_that_is_there_is_more_than_nothing_however_little_is_known_of
 
 def test_no_interval_of_an_effect_is_narrower_than_the_cells_own_error():
     chart = FrictionPatch.chart(AROUND)
-    place = np.array([np.log(2.0), 0.1, -0.05, np.log(0.04)])
-    patch = EffectPoint(kind=FrictionPatch, point=place, free=(0, 1, 2, 3), origin=np.zeros(4))
-    fit = fitted(patch, covariance=1e-12 * np.eye(5))
-    told = parameters_of(SimpleNamespace(final=fit, case=CASE), 0)
+    patch = Part(kind=FrictionPatch, point=(np.log(2.0), 0.1, -0.05, np.log(0.04)), free=(0, 1, 2, 3))
+    told = parameters_of(*fitted(patch, covariance=1e-12 * np.eye(5)), 0)
     reach = CELL_ERROR * stats.norm.ppf(0.95)  # however few pushes
     assert [c.name for c in chart] == ["ratio", "x", "y", "radius"]
     strength, radius = (np.log(np.array(told[name].ci90) / told[name].value) for name in ("ratio", "radius"))
@@ -94,35 +85,43 @@ def test_no_interval_of_an_effect_is_narrower_than_the_cells_own_error():
 
 def test_a_drag_over_a_mass_that_nobody_weighed_varies_with_it():
     """Known to a factor of two at a deviation, both, and their ratio to a hundredth: no draw ends at no drag."""
-    drag = EffectPoint(kind=QuadraticDrag, point=np.array([5.0]), free=(0,), origin=np.zeros(1))
+    drag = Part(kind=QuadraticDrag, point=(5.0,), free=(0,))
     stds = np.array([0.1, 0.7 * 5.0])
     ratio = np.array([[1.0, 0.9999], [0.9999, 1.0]])
-    _, found = correlation_of(CASE, fitted(drag, covariance=ratio * np.outer(stds, stds)))
+    _, found = correlation_of(*fitted(drag, covariance=ratio * np.outer(stds, stds)))
     assert found[0, 1] > 0.999  # 0.991 where the draws that end at nothing are tied
 
 
 def test_what_does_not_vary_or_is_no_single_number_is_left_out():
-    names, found = correlation_of(CASE, fitted(point(TableTilt, (0,)), covariance=1e-4 * np.eye(2)))
+    names, found = correlation_of(*fitted(point(TableTilt, (0,)), covariance=1e-4 * np.eye(2)))
     assert names == ("theta.support_friction", "table_tilt.x") and found.shape == (2, 2)
     support = point(UnevenSupport, (0,))
-    names, found = correlation_of(CASE, fitted(support, covariance=1e-4 * np.eye(2)))
+    names, found = correlation_of(*fitted(support, covariance=1e-4 * np.eye(2)))
     assert names == ("theta.support_friction",)
     np.testing.assert_allclose(found, 1.0)
 
 
-@pytest.mark.parametrize(("column", "shows"), [(0.2, True), (0.02, False)])
-def test_what_would_not_show_at_its_strongest_is_not_among_what_would(column, shows, monkeypatch):
-    """Of a square of the restitution in steps of 0.01, up to 0.9: twelve steps would show, or 119."""
-    monkeypatch.setattr(estimates, "projected", lambda plain, blocks: (None, [np.full((3, 1), column)]))
-    evidence = SimpleNamespace(
-        plain=SimpleNamespace(pushes=[None] * 12, own_dimension=2), screening=SimpleNamespace(looks=10.0),
-        case=SimpleNamespace(around=AROUND, features=[SimpleNamespace(middles=np.zeros(1))]),
-        signatures=[SimpleNamespace(kind=Restitution, family=Family(point=(0.0,), free=(0,)), one_sided=(True,),
-                                    columns=[np.full((3, 1), column)])],
+@pytest.mark.parametrize(("column", "shows"), [(20.0, True), (2.0, False)])
+def test_what_would_not_show_at_its_strongest_is_not_among_what_would(column, shows):
+    """A square of the restitution, up to 0.9: with so much change for each unit, it takes 0.15, or 1.5."""
+    pushes = [LinearPush(residual=np.zeros(3), shared=np.zeros((3, 2)), own=np.zeros((3, 0)))] * 12
+    hypothesis = Hypothesis(space=SPACE, around=AROUND, tolerances=1)
+    plain = SimpleNamespace(hypothesis=hypothesis, pushes=pushes, scatter=1.0, loudness=1.0, tail=1e6)
+    columns = [
+        Column(
+            kind=Restitution, family=Family(point=(0.0,), free=(0,)), index=0,
+            coordinate=Restitution.chart(AROUND)[0], pushes=(np.full(3, column),) * 12,
+        )
+    ]  # fmt: skip
+    fitter = SimpleNamespace(
+        priors=lambda scatter: [np.zeros(0)] * 12, predictor=SimpleNamespace(whitening=[np.eye(3)] * 12),
+        case=SimpleNamespace(around=AROUND, features=[SimpleNamespace(middles=np.zeros(1))] * 12),
     )  # fmt: skip
-    found = estimates.smallest(evidence, 0.01, 1.0)
+    needed = 162.0
+    found = estimates.smallest(SimpleNamespace(fitter=fitter, plain=plain, columns=columns), needed)
     assert [one.name for one in found] == (["restitution"] if shows else [])
     if shows:
-        steps = np.sqrt(estimates._gain_needed(12, 2, 10.0, 0.01)) / (column * np.sqrt(3.0))
-        assert found[0].value == pytest.approx(Restitution.at(np.array([0.01 * steps]), AROUND).coefficient)
-        assert found[0].sigmas == pytest.approx(steps * column)
+        size = np.sqrt(2.0 * needed / (36.0 * column**2))
+        assert size == pytest.approx(0.15)
+        assert found[0].value == pytest.approx(Restitution.at(np.array([size]), AROUND).coefficient, rel=1e-4)
+        assert found[0].sigmas == pytest.approx(size * column, rel=1e-4)

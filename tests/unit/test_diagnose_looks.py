@@ -1,24 +1,25 @@
 """Where a missing wrench lives: a planted one is found in its frame, and noise lives nowhere."""
 
-import dataclasses as dc
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from physid_drake.diagnose import looks
-from physid_drake.diagnose.linear import LinearPush
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.looks import locate, looks_at
-from physid_drake.diagnose.model import Fitted, State
+from physid_drake.inference.push import LinearPush
 
 PUSHES, WINDOWS = 12, 4
 PHASED = ("contact", "contact", "free_slide", "free_slide")  # of a push's windows
 STD = 0.02  # N, N, N m, of a window's wrench
 
 
-def case():
-    return SimpleNamespace(problems=[SimpleNamespace(name=f"pushes/{k:03d}.csv", order=k) for k in range(PUSHES)])
+def fitter(count=PUSHES):
+    problems = [SimpleNamespace(name=f"pushes/{k:03d}.csv", order=k) for k in range(PUSHES)]
+    return SimpleNamespace(
+        case=SimpleNamespace(problems=problems), priors=lambda scatter: [np.array([scatter])] * count
+    )  # fmt: skip
 
 
 def world(planted, seed=0, *, loud=1.0):
@@ -44,20 +45,13 @@ def world(planted, seed=0, *, loud=1.0):
             )  # fmt: skip
         # Theta is friction: a force along the motion in all windows.
         friction = np.tile([1.0, 0.0, 0.0], WINDOWS)[:, None] / STD
-        pushes.append(
-            LinearPush(
-                residual=residual, shared=friction, own=friction * 0.01, noise=np.eye(3 * WINDOWS), friction=0
-            )
-        )  # fmt: skip
+        pushes.append(LinearPush(residual=residual, shared=friction, own=friction * 0.01))
     return plain_of(pushes), wrenches
 
 
 def plain_of(pushes):
-    state = State(u=np.zeros(1), effects=(), own=(), scatter=1.0)
-    return Fitted(
-        state=state, pushes=tuple(pushes), prior_mean=np.zeros(1), prior_std=np.ones(1), solution=None, predicted=(),
-        score=0.0,
-    )  # fmt: skip
+    hypothesis = SimpleNamespace(space=SimpleNamespace(dimension=1))
+    return SimpleNamespace(pushes=tuple(pushes), hypothesis=hypothesis, scatter=1.0)
 
 
 def force(size, angle, m):
@@ -91,7 +85,7 @@ PLANTED = {
 @pytest.mark.parametrize("name", PLANTED)
 def test_the_frame_of_what_is_planted_is_found(name):
     planted, frame, words = PLANTED[name]
-    found = locate(case(), *world(planted), np.random.default_rng(0))
+    found = locate(fitter(), *world(planted), np.random.default_rng(0))
     assert found.frame == frame
     assert words in found.statement
 
@@ -99,15 +93,15 @@ def test_the_frame_of_what_is_planted_is_found(name):
 def test_the_statement_is_in_the_frame_of_the_physics_that_was_found():
     """Of a slope, looks in other frames see a part: what is said may not contradict the frame beside it."""
     slope = world(PLANTED["a slope of friction"][0])
-    asked = {f: locate(case(), *slope, np.random.default_rng(0), f) for f in ("world", "push_order", "contact")}
-    assert asked["world"] == asked["contact"] == locate(case(), *slope, np.random.default_rng(0))
+    asked = {f: locate(fitter(), *slope, np.random.default_rng(0), f) for f in ("world", "push_order", "contact")}
+    assert asked["world"] == asked["contact"] == locate(fitter(), *slope, np.random.default_rng(0))
     assert asked["push_order"].frame in ("push_order", "none")
     assert "on the table" not in asked["push_order"].statement
 
 
 @pytest.mark.parametrize("phases", [("contact",), ("free_slide",), ("contact", "free_slide")])
 def test_the_phase_in_which_it_acts_is_said(phases):
-    found = locate(case(), *world(lambda m: force(0.06 * (m.phase in phases), 2.0, m)), np.random.default_rng(0))
+    found = locate(fitter(), *world(lambda m: force(0.06 * (m.phase in phases), 2.0, m)), np.random.default_rng(0))
     assert found.frame == "world" and found.phase == phases
     named = {(w.push, w.start) for w in found.windows}
     acting = {(f"pushes/{k:03d}.csv", 0.1 * j) for k in range(PUSHES) for j, p in enumerate(PHASED) if p in phases}
@@ -122,7 +116,7 @@ def degrees_in(words, before):
 def test_the_direction_is_the_planted_one(size):
     """Also of pushes that are far louder than they may speak."""
     plain, wrenches = world(lambda m: force(size, 2.0, m))
-    words = locate(case(), plain, wrenches, np.random.default_rng(0)).statement
+    words = locate(fitter(), plain, wrenches, np.random.default_rng(0)).statement
     assert degrees_in(words, "towards ") == pytest.approx(np.degrees(2.0), abs=5.0)
 
 
@@ -141,13 +135,13 @@ def test_the_axis_of_a_grain_is_the_one_that_holds_back_most():
         fx, fy = excess @ (c, s)
         return (c * fx + s * fy, c * fy - s * fx, 0.0)
 
-    words = locate(case(), *world(planted), np.random.default_rng(0)).statement
+    words = locate(fitter(), *world(planted), np.random.default_rng(0)).statement
     assert degrees_in(words, "most along ") == pytest.approx(np.degrees(0.5), abs=8.0)
 
 
 def test_the_slope_of_friction_is_the_planted_one():
     plain, wrenches = world(lambda m: (m.place @ (0.0, 0.6), 0.0, 0.0))
-    words = locate(case(), plain, wrenches, np.random.default_rng(0)).statement
+    words = locate(fitter(), plain, wrenches, np.random.default_rng(0)).statement
     assert degrees_in(words, "changing towards ") == pytest.approx(90.0, abs=8.0)
 
 
@@ -158,7 +152,7 @@ def test_what_holds_back_while_it_is_pushed_slowly_is_not_called_a_growth_with_s
         return (-0.1 * slow, 0.0, 0.0)
 
     for seed in range(6):
-        found = locate(case(), *world(planted, seed), np.random.default_rng(0))
+        found = locate(fitter(), *world(planted, seed), np.random.default_rng(0))
         # Over both phases it is one; while it is pushed, it holds back.
         assert "with the motion" not in found.statement or len(found.phase) == 2
 
@@ -168,20 +162,20 @@ def test_slides_without_a_hand_have_one_phase():
         m.phase = "free_slide"
         return force(0.06, 2.0, m)
 
-    found = locate(case(), *world(planted), np.random.default_rng(0))
+    found = locate(fitter(), *world(planted), np.random.default_rng(0))
     assert found.phase == ("free_slide",) and "pushed" not in found.statement
 
 
 def test_five_pushes_are_too_few():
     plain, wrenches = world(lambda m: force(0.3, 2.0, m))
-    few = dc.replace(plain, pushes=plain.pushes[:5])
-    found = locate(case(), few, [w for w in wrenches if w.push < 5], np.random.default_rng(0))
+    few = plain_of(plain.pushes[:5])
+    found = locate(fitter(5), few, [w for w in wrenches if w.push < 5], np.random.default_rng(0))
     assert found.frame == "none" and "too few pushes" in found.statement
 
 
 def test_noise_lives_nowhere():
     def frame(seed):
-        return locate(case(), *world(lambda m: (0.0, 0.0, 0.0), seed), np.random.default_rng(0)).frame
+        return locate(fitter(), *world(lambda m: (0.0, 0.0, 0.0), seed), np.random.default_rng(0)).frame
 
     # 38 are expected; at a false-alarm rate of 15 % there would be so many once in fifty times.
     assert [frame(seed) for seed in range(40)].count("none") >= 38 - 1
@@ -190,7 +184,7 @@ def test_noise_lives_nowhere():
 def test_one_loud_push_is_no_place():
     """A hundred deviations in one push, and nothing in the others."""
     plain, wrenches = world(lambda m: force(1e-3, 2.0, m), loud=2000.0)
-    found = locate(case(), plain, wrenches, np.random.default_rng(0))
+    found = locate(fitter(), plain, wrenches, np.random.default_rng(0))
     assert found.frame == "none" and "no one direction" in found.statement
     assert {w.push for w in found.windows[:WINDOWS]} == {"pushes/011.csv"}
 

@@ -6,6 +6,7 @@ from runs import shipped_pushes
 
 from physid_drake.diagnose.hypotheses import baseline, halved, settled, with_one_more, with_tolerances
 from physid_drake.diagnose.proposals import Proposal, with_part
+from physid_drake.effects import applicable
 from physid_drake.effects.drag import ViscousDrag
 from physid_drake.effects.fields import TableTilt
 from physid_drake.effects.friction import AnisotropicTable
@@ -40,7 +41,7 @@ def eraser():
 @pytest.fixture(scope="module")
 def grain():
     fitter = fitter_of(shipped_pushes(8, "sealed_01"))
-    return fitter, *with_tolerances(fitter, plain_of(fitter))
+    return fitter, *with_tolerances(fitter, plain_of(fitter), applicable(fitter.case.around))
 
 
 def test_the_baseline_is_identified_within_its_own_uncertainty(eraser):

@@ -39,7 +39,9 @@ def problem(rng, amount=0.0):
         )
         for (shared, own), column in zip(shapes, columns[0].pushes, strict=True)
     )
-    hypothesis = SimpleNamespace(dimension=SHARED, mean=np.zeros(SHARED), std=np.full(SHARED, 10.0))
+    hypothesis = SimpleNamespace(
+        dimension=SHARED, mean=np.zeros(SHARED), std=np.full(SHARED, 10.0), known=np.arange(SHARED)
+    )
     fit = SimpleNamespace(
         hypothesis=hypothesis, pushes=pushes, scatter=SCATTER, loudness=1.0, tail=1e6,
         point=SimpleNamespace(z=np.zeros(SHARED)),

@@ -10,6 +10,7 @@ import yaml
 from physid_drake.cell import Body, CellConfig
 from physid_drake.effects.body import UnevenSupport
 from physid_drake.effects.drag import ViscousDrag
+from physid_drake.effects.unnamed import UnnamedForce
 from physid_drake.errors import ConfigError
 from physid_drake.model import Correlation, Model
 from physid_drake.model_reading import load_model
@@ -29,7 +30,20 @@ MODEL = Model(
         hand_friction=0.2,
         support_friction=np.array([0.3]),
     ),
-    effects=(ViscousDrag(coefficient=0.4), UnevenSupport(weights=((1.0, 2.0), (0.5, 0.5)))),
+    effects=(
+        ViscousDrag(coefficient=0.4),
+        UnevenSupport(weights=((1.0, 2.0), (0.5, 0.5))),
+        UnnamedForce(
+            force_x=((0.1, 0.2),),
+            force_y=((0.0, -0.1),),
+            friction=((0.1,), (-0.2,)),
+            by_speed=(0.1, 0.2),
+            by_heading=(0.1, 0.0, 0.1),
+            along=(-0.1, -0.2),
+            places=(-0.1, 0.1, 0.2, 0.3),
+            speeds=(0.01, 0.5),
+        ),
+    ),
     intervals={DRAG: [0.3, 0.5]},
     correlation=Correlation(names=(DRAG,), matrix=((1.0,),)),
     hand_axes=((0.0, 1.0), (1.0, 0.0)),

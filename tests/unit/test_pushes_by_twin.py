@@ -1,14 +1,14 @@
 """What the twin predicts of recorded pushes: what the cell does; and what it leaves to the cell."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from bare_laws import BareLaws
 from runs import coarse_identifier, shipped_pushes
 
 from physid_drake.cell import CellConfig, ContactConfig
 from physid_drake.effects.drag import RollingResistance, ViscousDrag
-from physid_drake.effects.foils import FrictionByDistance
 from physid_drake.effects.tracker import TrackerLatency
 from physid_drake.identify import SearchConfig
 from physid_drake.pushes import by_twin
@@ -19,6 +19,18 @@ from physid_drake.pushes.task import Task
 from physid_drake.recording import Cylinder
 from physid_drake.twin import compiled
 
+
+@dataclass(frozen=True)
+class Rougher:
+    """A friction that is none of the vocabulary."""
+
+    largest: float = 1.2
+
+    def ratio(self, state):
+        return np.full(len(state.slips), self.largest)
+
+
+UNKNOWN = BareLaws(all=(Rougher(),))
 SIGMA = np.array([3e-4, 3e-4, 3e-3])
 
 
@@ -61,7 +73,7 @@ def test_turns_are_those_of_the_recording(identifier):
 
 def test_what_the_twin_does_not_know_is_left_to_the_cell(identifier):
     spec, thetas = identifier.pool.spec, identifier.thetas
-    (known, *_), (unknown, *_) = tasks_of(identifier), tasks_of(identifier, FrictionByDistance(ratio=1.2))
+    (known, *_), (unknown, *_) = tasks_of(identifier), tasks_of(identifier, UNKNOWN)
     assert predicted_by_twin(spec, thetas, [unknown, known])[0] is None
     rolls = replace(spec, shape=Cylinder(radius=0.03, length=0.1, axis="y"))
     assert (
@@ -75,7 +87,7 @@ def test_what_the_twin_does_not_know_is_left_to_the_cell(identifier):
 
 def test_a_pool_puts_the_cells_answers_where_the_twin_has_none(identifier):
     plain = list(tasks_of(identifier))
-    unknown = list(tasks_of(identifier, FrictionByDistance(ratio=1.2)))
+    unknown = list(tasks_of(identifier, UNKNOWN))
     mixed = [plain[0], unknown[1], plain[2], unknown[0]]
     spec, thetas = identifier.pool.spec, identifier.thetas
     said = RolloutPool(spec, thetas, 1, integrator="twin").run(mixed)
@@ -97,7 +109,7 @@ def test_identification_says_the_same_with_either(integrator):
 @pytest.mark.parametrize("kept", [True, False])
 def test_the_first_use_says_once_that_it_compiles(identifier, monkeypatch, capsys, kept):
     monkeypatch.setattr(by_twin, "is_compiled", lambda: kept)
-    by_twin._say_that_it_compiles.cache_clear()
+    by_twin.say_that_it_compiles.cache_clear()
     tasks = list(tasks_of(identifier))[:1]
     for _ in range(2):
         predicted_by_twin(identifier.pool.spec, identifier.thetas, tasks)

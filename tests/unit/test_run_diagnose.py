@@ -14,7 +14,7 @@ from physid_drake import load_model, run_diagnose
 from physid_drake.cell import Body, CellConfig, Start
 from physid_drake.cell.hand_path import straight_path
 from physid_drake.cli import main
-from physid_drake.diagnose.leaving import hand_frame
+from physid_drake.diagnose.exported import hand_frame
 from physid_drake.effects.body import UnevenSupport
 from physid_drake.effects.drag import ViscousDrag
 from physid_drake.effects.hand import HandOffset

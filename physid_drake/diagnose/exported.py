@@ -1,4 +1,4 @@
-"""The model that leaves a diagnosis, and what it predicts."""
+"""The model that leaves a diagnosis."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.estimates import correlation_of, theta_intervals
+from physid_drake.diagnose.estimates import correlation_of, parameters_of, theta_intervals
 from physid_drake.diagnose.evidence import Evidence
-from physid_drake.diagnose.model import Fitted
-from physid_drake.diagnose.values import Diagnosis
 from physid_drake.model import AS_W, Axes, Correlation, Model, turned
 from physid_drake.pushes.problem import HandUse, PushProblem
 
@@ -19,26 +17,15 @@ Array = NDArray[np.float64]
 SAME = 0.9  # determinant of the mean of frames: they lie within about 25 degrees of each other
 
 
-def fit_that_leaves(diagnosis: Diagnosis, evidence: Evidence) -> Fitted:
-    """The fit with the effects if they were found, else the plain cell where it predicts best."""
-    return evidence.final if diagnosis.effects else evidence.nearest
-
-
-def predicted(evidence: Evidence, errors: Sequence[Array], i: int) -> Array:
-    """Window means (w, 3) [m, m, rad] of push i, left out, of ``errors_before`` or ``errors_after``."""
-    features = evidence.case.features[i]
-    return features.poses(features.recorded - errors[i])
-
-
-def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
-    """The model that leaves, as ``model.yaml`` has it: with the effects if they were found, else plain."""
-    case, fitted = evidence.case, fit_that_leaves(diagnosis, evidence)
-    state, spec = fitted.state, case.pool.spec
+def model_of(evidence: Evidence) -> Model:
+    """The model that leaves, as ``model.yaml`` has it: with what was found, under a name or without one."""
+    case, fit, fitter = evidence.case, evidence.leaving, evidence.fitter
+    h, spec = fit.hypothesis, case.pool.spec
     # Also of what these pushes do not tell: a drag is known over a mass, and belief in one goes with the other.
-    intervals: dict[str, object] = {f"theta.{n}": list(ends) for n, ends in theta_intervals(evidence, fitted).items()}
-    for effect in diagnosis.effects:
-        intervals |= {f"{effect.name}.{name}": p.ci90 for name, p in effect.parameters.items()}
-    names, matrix = correlation_of(case, fitted)
+    intervals: dict[str, object] = {f"theta.{n}": list(ends) for n, ends in theta_intervals(fitter, fit).items()}
+    for k, part in enumerate(h.parts if evidence.named else ()):
+        intervals |= {f"{part.kind.name}.{name}": p.ci90 for name, p in parameters_of(fitter, fit, k).items()}
+    names, matrix = correlation_of(fitter, fit)
     hand_axes, hand_turns = hand_frame(case.problems)
     hand = HandUse.of(case.problems)
     kept = [k for k, name in enumerate(names) if name in intervals]
@@ -48,8 +35,8 @@ def model_of(diagnosis: Diagnosis, evidence: Evidence) -> Model:
         hand_radius=spec.hand_radius,
         table=spec.table,
         config=spec.config,
-        body=case.thetas.body(np.asarray(case.thetas.space.from_unit(state.u))),
-        effects=tuple(e.effect(case) for e in state.effects) if diagnosis.effects else (),
+        body=case.thetas.body(h.theta(fit.point.z)),
+        effects=h.effects(fit.point.z),
         intervals=intervals,
         correlation=Correlation.of([names[k] for k in kept], matrix[np.ix_(kept, kept)]),
         hand_axes=hand_axes,

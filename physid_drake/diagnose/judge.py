@@ -1,0 +1,83 @@
+"""The judge: the last hypotheses in the Drake cell, from which everything comes that is said of them.
+
+The twin finds them; the cell, as stiff as a rigid object needs, says how well they fit. Steps are Gauss-Newton's with
+the cell's residuals and the twin's derivatives.
+"""
+
+from __future__ import annotations
+
+import dataclasses as dc
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.cell import CellConfig
+from physid_drake.inference.fit import Fit, Fitter
+from physid_drake.inference.predictions import Ask, Physics
+from physid_drake.pushes.problem import spec_of
+
+Array = NDArray[np.float64]
+
+TICK = 5e-4  # s, at most
+HAND_FREQUENCY, REST_DEPTH, STICTION = 3000.0, 3e-7, 1e-5  # rad/s, m, m/s: a contact that hardly gives
+STEPS = 2
+
+
+class Judge:
+    """Takes fits of the twin to the cell.
+
+    Attributes:
+        fitter: like the one that found them, but with the cell's predictions.
+    """
+
+    def __init__(self, fitter: Fitter) -> None:
+        case = fitter.case
+        pool = case.pool.of(spec_of(case.recording, stiff(case.config)))
+        self.fitter = Fitter(case, fitter.predictor.judging(pool))
+        self.fitter.tolerances = fitter.tolerances
+
+    def judged(self, fit: Fit) -> Fit:
+        """The fit where the cell likes it best, with what the cell predicts there."""
+        h, point = fit.hypothesis, self.fitter.points([fit.hypothesis], [fit.point.z], [fit.point.own])[0]
+        if point is None:  # the cell cannot roll it out: what the twin says stands
+            return fit
+        best = self.fitter.seen_at(fit, point)
+        for _ in range(STEPS):
+            z, own = self.fitter.step(best)
+            moved = self.fitter.points([h], [z], [own])[0]
+            if moved is None:
+                break
+            other = self.fitter.seen_at(best, moved)
+            if other.log_likelihood <= best.log_likelihood:
+                break
+            best = other
+        return best
+
+    def left_out(self, fit: Fit) -> tuple[Array, ...]:
+        """Recorded less predicted (m_i,) of each push, in the features' units, simulated without having seen it.
+
+        Nothing of a push is known to its prediction but the start of the object and the hand's path.
+        """
+        h, count = fit.hypothesis, len(fit.pushes)
+        zs = [self.fitter.without(fit, i) for i in range(count)]
+        rests = self.fitter.at_rest()
+        asks = [Ask(i, Physics(h.theta(z), h.effects(z)), rests[i]) for i, z in enumerate(zs)]
+        errors = list[Array]()
+        for i, vector in enumerate(self.fitter.predictor.vectors(asks)):
+            push = fit.pushes[i]
+            left = push.residual - push.shared @ (zs[i] - fit.point.z)
+            if vector is not None:
+                left = self.fitter.predictor.recorded[i] - vector
+            errors.append(np.asarray(np.linalg.solve(self.fitter.predictor.whitening[i], left), dtype=np.float64))
+        return tuple(errors)
+
+
+def stiff(config: CellConfig) -> CellConfig:
+    """A cell whose contacts hardly give."""
+    solver, contact = config.solver, config.contact
+    tick = min(TICK, solver.time_step_s)
+    return dc.replace(
+        config,
+        solver=dc.replace(solver, time_step_s=tick, slide_time_step_s=min(2.0 * tick, solver.slide_time_step_s)),
+        contact=dc.replace(contact, hand_frequency_rad_s=HAND_FREQUENCY, rest_depth_m=REST_DEPTH),
+    )
