@@ -9,7 +9,6 @@ import numpy as np
 from scipy import stats
 
 from physid_drake.diagnose.decide import (
-    CONFIRMED,
     FEWEST_PUSHES,
     kinds_of,
     loudest,
@@ -36,7 +35,7 @@ VISIBLE = 10.0  # standard deviations of motion: pushes that would not show such
 def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
     """The verdict and all figures, from evidence; no rollouts."""
     case, found, plain, after = evidence.case, evidence.found, evidence.plain, evidence.leaving
-    detectable = smallest(found, _needed(evidence, alpha))
+    detectable = smallest(found)
     verdict = evidence.decision.verdict
     if verdict == "consistent" and _blind(evidence, detectable):
         verdict = "underpowered"
@@ -93,19 +92,13 @@ def p_value_of(evidence: Evidence) -> float:
         return 1.0
     if evidence.decision.verdict in ("consistent", "underpowered"):
         return found.p_value
-    fits = [*found.named, *found.unnamed]
-    looks = [found.p_value, *(p_value(one.gain, found.by_chance) for one in fits[:1])]
+    whole = {kinds_of(one)[0].name: one.gain for one in found.named if len(kinds_of(one)) == 1}
+    looks = [found.p_value, p_value(whole, found.by_chance)]
     if found.plain.loudness > loudest(noise):
         squares = sum(one.square for one in found.plain.weighed) / loudest(noise) ** 2
         looks.append(float(stats.chi2.sf(squares, _degrees(found.plain))))
     looks.append(found.alike)
     return min(looks)
-
-
-def _needed(evidence: Evidence, alpha: float) -> float:
-    """Held-out gain from which an effect would be seen, at even odds."""
-    by_chance = float(np.quantile(evidence.found.by_chance, 1.0 - alpha))
-    return max(by_chance, CONFIRMED * len(evidence.plain.pushes) / max(1, len(evidence.plain.pushes) - 1))
 
 
 def _blind(evidence: Evidence, detectable: tuple[Detectable, ...]) -> bool:

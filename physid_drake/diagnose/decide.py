@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.diagnose.search import Found, Weighed
 from physid_drake.effects import Effect
+from physid_drake.inference.replicates import surprise
 from physid_drake.pushes.tracker_noise import TrackerNoise
 
 Array = NDArray[np.float64]
 
-CONFIRMED = 12.0  # nats: by which a hypothesis is better than the baseline, its best push not counted
+CONFIRMED = 1e-4  # chance that the gain of an effect, its best push not counted, is none
 MARGIN = 8.0  # nats: by which one is surely better than another, likewise
 FEWEST_PUSHES = 3  # less cannot confirm anything on pushes that are left out
 ADEQUATE = 1e-3  # p-value of what a hypothesis leaves: of the catalogue beside it, of the scatter of frictions
@@ -77,13 +77,13 @@ def decided(found: Found, *, most: float) -> Decision:
     if len(found.plain.pushes) < FEWEST_PUSHES:
         return Decision(verdict="underpowered")
     every = [*found.named, *found.unnamed]
-    missing = found.odd and any(confirmed(one) for one in every)
+    missing = found.odd and any(confirmed(found, one) for one in every)
     quiet = found.plain.loudness <= most and found.alike >= ADEQUATE
     if not missing and quiet:
         return Decision(verdict="consistent")
-    nameless = next((one for one in found.unnamed if confirmed(one)), None)
-    best = simplest(found.named)
-    if best is None or not confirmed(best):
+    nameless = next((one for one in found.unnamed if confirmed(found, one)), None)
+    best = simplest(found)
+    if best is None or not confirmed(found, best):
         return Decision(verdict="unexplained", best=nameless)
     beaten = any(surely_better(one.gains - best.gains) for one in found.unnamed)
     little = found.left >= ADEQUATE or found.left_gain < LITTLE * best.gain
@@ -99,9 +99,17 @@ def without_best(gains: Array) -> float:
     return float(gains.sum() - gains.max())
 
 
-def confirmed(one: Weighed) -> bool:
-    """Whether pushes that were left out confirm that something is missing that a hypothesis has."""
-    return without_best(one.gains) > CONFIRMED
+def confirmed(found: Found, one: Weighed, beside: Weighed | None = None) -> bool:
+    """Whether pushes that were left out confirm what a hypothesis has beside another, or beside the baseline.
+
+    Its gain is compared with what such an effect gains by chance; that of what has no name with the effect that
+    gains most.
+    """
+    gained = np.array([without_best(one.gains if beside is None else one.gains - beside.gains)])
+    present = () if beside is None else kinds_of(beside)
+    names = [kind.name for kind in kinds_of(one) if kind not in present and kind.name in found.by_chance]
+    least = min(float(surprise(gained, found.by_chance[name])[0]) for name in names or found.by_chance)
+    return least > -math.log(CONFIRMED)
 
 
 def surely_better(gains: Array) -> bool:
@@ -114,15 +122,26 @@ def kinds_of(one: Weighed) -> tuple[type[Effect], ...]:
     return tuple(part.kind for part in one.fit.hypothesis.parts)
 
 
-def simplest(named: Sequence[Weighed]) -> Weighed | None:
-    """The hypothesis with the fewest effects, and then the fewest numbers, that the best one is not surely above."""
-    if not named:
+def simplest(found: Found) -> Weighed | None:
+    """The hypothesis with the fewest effects beside which the best one has nothing that is confirmed.
+
+    Of those that the best one is not surely better than, the one that is a limit of another.
+    """
+    if not found.named:
         return None
-    close = [one for one in named if not surely_better(named[0].gains - one.gains)]
+    best = found.named[0]
+    close = [one for one in found.named if not _worth(found, best, one)]
     fewest = min(len(kinds_of(one)) for one in close)
     few = [one for one in close if len(kinds_of(one)) == fewest]
     limits = [one for one in few if any(_is_limit(one, other) for other in few)]
     return (limits or few)[0]
+
+
+def _worth(found: Found, best: Weighed, other: Weighed) -> bool:
+    """Whether a hypothesis is surely better than another; an effect more has to be confirmed, and more than little."""
+    if len(kinds_of(best)) > len(kinds_of(other)):
+        return confirmed(found, best, other) and best.gain - other.gain > LITTLE * other.gain
+    return surely_better(best.gains - other.gains)
 
 
 def _is_limit(one: Weighed, other: Weighed) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from physid_drake.diagnose.decide import CONFIRMED
 from physid_drake.diagnose.search import Found
 from physid_drake.diagnose.values import Detectable, ParameterEstimate, ThetaEstimate
 from physid_drake.effects import Coordinate, Effect
@@ -17,6 +18,7 @@ from physid_drake.identify.cells import TOLD
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.hypothesis import Hypothesis, Part
 from physid_drake.inference.push import weighed
+from physid_drake.inference.replicates import gain_of
 from physid_drake.inference.scores import Column
 from physid_drake.pushes.case import Case
 from physid_drake.pushes.theta import CELL_ERROR, cell_error
@@ -174,18 +176,20 @@ def correlation_of(fitter: Fitter, fit: Fit) -> tuple[tuple[str, ...], Array]:
     return tuple(varying), np.atleast_2d(np.corrcoef(scores)) if scores else np.zeros((0, 0))
 
 
-def smallest(found: Found, needed: float) -> tuple[Detectable, ...]:
-    """The smallest effect of each kind that would have been seen, in its own unit and in motion.
+def smallest(found: Found) -> tuple[Detectable, ...]:
+    """The smallest effect of each kind that would have been confirmed, in its own unit and in motion.
 
-    Args:
-        found: the baseline, and columns of the catalogue beside it.
-        needed: gain in log likelihood from which one is seen [nats].
+    The gain that it takes, one push not counted, is that of its replicates' tail; half the information times the
+    square of the effect, it comes at even odds.
     """
+    pushes = len(found.plain.pushes)
+    counted = max(1, pushes - 1) / pushes
     best: dict[str, Detectable] = {}
     for column, information in zip(found.columns, _informations(found), strict=True):
         if information <= 0.0 or column.family.shares:
             continue
-        size = math.sqrt(2.0 * needed / information)  # a gain of half the information times the square
+        needed = gain_of(-math.log(CONFIRMED), found.by_chance[column.kind.name]) / counted
+        size = math.sqrt(2.0 * needed / information)
         one = _detectable(found, column, size)
         if one is not None and (one.name not in best or one.sigmas < best[one.name].sigmas):
             best[one.name] = one

@@ -119,6 +119,19 @@ def freed(fitter: Fitter, fit: Fit) -> Fit:
     return again if again.log_likelihood > fit.log_likelihood else fit
 
 
+def each_alone(fitter: Fitter, pair: Fit) -> list[Fit]:
+    """Each effect of a pair alone, fitted from where it is in the pair: a fit of its own may have stopped short."""
+    h, z, fits = pair.hypothesis, pair.point.z, []
+    for k in range(len(h.parts)):
+        kept = dc.replace(h, parts=h.parts[:k] + h.parts[k + 1 :])
+        begin = h.space.dimension + sum(len(part.free) for part in h.parts[:k])
+        shorter = np.delete(z, range(begin, begin + len(h.parts[k].free)))
+        point = fitter.points([kept], [shorter], [pair.point.own])[0]
+        if point is not None:
+            fits += fitter.fitted(fitter.started([kept], [point], [None], TAIL), LAST)
+    return fits
+
+
 def unnamed(fitter: Fitter, fit: Fit) -> list[Fit]:
     """The model with smooth forces and frictions that have no name: each block of them, and all together."""
     beside = columns(fitter, fit, [UnnamedForce])

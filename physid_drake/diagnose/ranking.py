@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from physid_drake.diagnose.decide import confirmed, kinds_of
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.regimes import standard_error
 from physid_drake.diagnose.search import Weighed
 from physid_drake.diagnose.values import Ranked
-from physid_drake.inference.replicates import p_value
+from physid_drake.inference.replicates import surprise
 from physid_drake.inference.scores import scores
 
 
 def ranking_of(evidence: Evidence, classes: Sequence[Sequence[str]]) -> tuple[Ranked, ...]:
-    """All effects, best first, fitted alone: what each gains, and why it was found or not.
+    """All effects, best first, alone: what each gains, fitted or by its columns, and why it was found or not.
 
     Args:
         evidence: what was fitted.
@@ -22,23 +24,21 @@ def ranking_of(evidence: Evidence, classes: Sequence[Sequence[str]]) -> tuple[Ra
     """
     found = evidence.found
     alone = {kinds_of(one)[0].name: one for one in found.named if len(kinds_of(one)) == 1}
-    linear = {score.kind.name: score.gain for score in reversed(scores(found.fitter, found.plain, found.columns))}
+    scored = {score.kind.name: score.gain for score in reversed(scores(found.fitter, found.plain, found.columns))}
     named = {kind.name for kind in evidence.decision.effects} if evidence.named else set()
     alike = {name for names in classes for name in names}
-    rows = []
-    for name in [*alone, *(name for name in linear if name not in alone)]:
-        one = alone.get(name)
-        rows.append(
-            Ranked(
-                name=name,
-                gain=2.0 * linear[name],
-                p_value=1.0 if one is None else p_value(one.gain, found.by_chance),
-                held_out_gain=None if one is None else one.gain,
-                held_out_se=None if one is None else standard_error(one.gains),
-                why=_why(name, one, named, alike, evidence),
-            )
+    gains = found.linearly | {name: one.gain for name, one in alone.items()}
+    return tuple(
+        Ranked(
+            name=name,
+            gain=2.0 * max(0.0, scored[name]),
+            p_value=float(np.exp(-surprise(np.array([gains[name]]), found.by_chance[name])[0])),
+            held_out_gain=gains[name] if np.isfinite(gains[name]) else None,
+            held_out_se=standard_error(alone[name].gains) if name in alone else None,
+            why=_why(name, alone.get(name), named, alike, evidence),
         )
-    return tuple(rows)
+        for name in sorted(gains, key=lambda name: -gains[name])
+    )
 
 
 def _why(name: str, one: Weighed | None, named: set[str], alike: set[str], evidence: Evidence) -> str:
@@ -47,8 +47,8 @@ def _why(name: str, one: Weighed | None, named: set[str], alike: set[str], evide
     if name in alike:
         return "these pushes cannot tell it from what was found"
     if one is None:
-        return "the twin cannot roll it out"
-    if not confirmed(one):
+        return "cannot be rolled out" if evidence.found.odd else "explains no more than chance would"
+    if not confirmed(evidence.found, one):
         return "pushes that were left out do not confirm it"
     if named:
         return "predicts pushes that were left out worse"

@@ -9,12 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.hypotheses import baseline, freed, unnamed, with_one_more, with_tolerances, with_two
+from physid_drake.diagnose.hypotheses import (
+    baseline,
+    each_alone,
+    freed,
+    settled,
+    unnamed,
+    with_one_more,
+    with_tolerances,
+    with_two,
+)
 from physid_drake.effects import Effect
 from physid_drake.identify.identify import MOST_SCATTER
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.hypothesis import Hypothesis
-from physid_drake.inference.replicates import largest_gains, p_value
+from physid_drake.inference.replicates import gains_by_chance, p_value
 from physid_drake.inference.scores import Column, columns
 from physid_drake.progress import Progress
 from physid_drake.pushes.case import UNIT_SCATTER
@@ -60,8 +69,9 @@ class Found:
         plain: the baseline, with tolerances.
         alike: of the baseline, as of ``Weighed``.
         columns: of the catalogue beside it.
+        linearly: what each effect gains by these columns, by its name [nats].
         p_value: that the best gain of the catalogue over the baseline is chance.
-        by_chance: (r,) the best gain in replicates of this recording in which the baseline is true.
+        by_chance: (r,) the same in replicates of this recording in which the baseline is true.
         odd: whether that is unlikely, or friction scatters by much.
         named: hypotheses of the catalogue, best first; empty where none was looked for.
         left: that the best gain of the catalogue over the first of them is chance; 1 where none was looked for.
@@ -73,8 +83,9 @@ class Found:
     plain: Fit
     alike: float
     columns: tuple[Column, ...]
+    linearly: dict[str, float]
     p_value: float
-    by_chance: Array
+    by_chance: dict[str, Array]
     odd: bool
     named: tuple[Weighed, ...]
     left: float
@@ -93,10 +104,14 @@ def searched(fitter: Fitter, kinds: Sequence[type[Effect]], *, seed: int, alpha:
         tick: told the stage.
     """
     rng, case = np.random.default_rng(seed), fitter.case
+
+    def polished(fit: Fit) -> Fit:
+        return settled(fitter, freed(fitter, fit), rng)
+
     tick("baseline", 0, 0)
     plain = baseline(fitter, Hypothesis(space=case.thetas.space, around=case.around), rng)
     plain, found = with_tolerances(fitter, plain, kinds)
-    seen, by_chance = largest_gains(fitter, plain, found, rng)
+    seen, by_chance = gains_by_chance(fitter, plain, found, rng)
     p = p_value(seen, by_chance)
     before = fitter.held_out(plain)
 
@@ -110,20 +125,29 @@ def searched(fitter: Fitter, kinds: Sequence[type[Effect]], *, seed: int, alpha:
         tick("effects, one at a time", 0, 0)
         named = ranked(with_one_more(fitter, plain, found))
     if odd and named:
-        named = ranked([freed(fitter, named[0].fit), *(one.fit for one in named[1:])])
+        named = ranked([polished(named[0].fit), *(one.fit for one in named[1:])])
         left = _left(fitter, named[0].fit, kinds, rng)
         if left[0] < alpha or named[0].fit.scatter > ODD_SCATTER:
             tick("pairs of effects", 0, 0)
-            pairs = ranked(with_two(fitter, [one.fit for one in named[:SINGLES]], kinds))
-            whole = [freed(fitter, one.fit) for one in pairs[:1]]
-            named = ranked([*(one.fit for one in named), *whole, *(one.fit for one in pairs[1:])])
+            singles = [one.fit for one in named]
+            pairs = [one.fit for one in ranked(with_two(fitter, singles[:SINGLES], kinds))]
+            pairs[:1] = map(polished, pairs[:1])
+            named = ranked([*better_of(singles, each_alone(fitter, pairs[0]) if pairs else ()), *pairs])
             left = _left(fitter, named[0].fit, kinds, rng)
         tick("physics without a name", 0, 0)
         without = ranked(unnamed(fitter, plain))
     return Found(
-        fitter=fitter, plain=plain, alike=_alike(fitter, plain), columns=tuple(found), p_value=p,
+        fitter=fitter, plain=plain, alike=_alike(fitter, plain), columns=tuple(found), linearly=seen, p_value=p,
         by_chance=by_chance, odd=odd, named=named, left=left[0], left_gain=left[1], unnamed=without,
     )  # fmt: skip
+
+
+def better_of(fits: Sequence[Fit], others: Sequence[Fit]) -> list[Fit]:
+    """The fits, but of hypotheses that others have fitted likelier theirs."""
+    likelier = {one.hypothesis.name: one for one in others}
+    return [
+        max(fit, likelier.get(fit.hypothesis.name, fit), key=lambda one: one.log_likelihood) for fit in fits
+    ]  # fmt: skip
 
 
 def _alike(fitter: Fitter, fit: Fit) -> float:
@@ -138,5 +162,5 @@ def _left(fitter: Fitter, fit: Fit, kinds: Sequence[type[Effect]], rng: np.rando
     beside = columns(fitter, fit, [kind for kind in kinds if kind not in present])
     if not beside:
         return 1.0, 0.0
-    seen, by_chance = largest_gains(fitter, fit, beside, rng)
-    return p_value(seen, by_chance), seen
+    seen, by_chance = gains_by_chance(fitter, fit, beside, rng)
+    return p_value(seen, by_chance), max(seen.values())

@@ -146,9 +146,9 @@ class Ranked:
         name: as in the catalogue.
         gain: of its score test: twice the gain in log likelihood [nats].
         p_value: of that gain, for all looks at the catalogue.
-        held_out_gain: of the fitted effect, in log predictive density of left-out pushes [nats], over the model
-            without it; None if not fitted.
-        held_out_se: its standard error over pushes.
+        held_out_gain: of the effect, in log predictive density of left-out pushes [nats], over the model without it;
+            to first order where it was not fitted. None where it would have to act the other way round.
+        held_out_se: its standard error over pushes; None where it was not fitted.
         why: it was found, or lost.
     """
 

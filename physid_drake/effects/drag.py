@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import ClassVar
 
 from physid_drake.cell.forces import ForceLaw, Wrench
@@ -28,7 +28,6 @@ class ViscousDrag(Effect):
     statement: ClassVar[str] = "a drag in proportion to the object's speed"
     frame: ClassVar[str] = "object_velocity"
     amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
-    mass_powers: ClassVar[Mapping[str, int]] = {"coefficient": 1}
 
     coefficient: float = parameter(0.0, "N*s/m", values=NOT_NEGATIVE)
 
@@ -51,7 +50,6 @@ class QuadraticDrag(Effect):
     statement: ClassVar[str] = "a drag in proportion to the square of the object's speed"
     frame: ClassVar[str] = "object_velocity"
     amplitudes: ClassVar[tuple[str, ...]] = ("coefficient",)
-    mass_powers: ClassVar[Mapping[str, int]] = {"coefficient": 1}
 
     coefficient: float = parameter(0.0, "N*s^2/m^2", values=NOT_NEGATIVE)
 

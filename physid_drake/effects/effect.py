@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -167,9 +167,6 @@ class Effect:
     beyond: ClassVar[tuple[str, ...]] = ()
     # Names of effects that it is the same as in a limit: a tether far away is a tilt.
     limits: ClassVar[tuple[str, ...]] = ()
-    # Chart coordinates that change with this power of the object's mass where its motion stays the same: 1 for what
-    # is in proportion to a force, since friction and inertia are. Nothing but a force can tell mass and these apart.
-    mass_powers: ClassVar[Mapping[str, int]] = {}
 
     @property
     def is_null(self) -> bool:
@@ -220,17 +217,6 @@ class Effect:
         count = len(cls.chart(around))
         return (Family(point=(0.0,) * count, free=tuple(range(count))),)
 
-    @property
-    def place(self) -> tuple[float, float] | None:
-        """The place on the table about which it acts [m], for an effect that has one."""
-        return None
-
-    @classmethod
-    def families_at(cls, place: tuple[float, float], around: Surroundings) -> tuple[Family, ...]:
-        """Families of several sizes at a place [m], for an effect that has one; none for others."""
-        del place, around
-        return ()
-
     @classmethod
     def leading(cls, around: Surroundings) -> tuple[int, ...]:
         """Indices of the coordinates that a first fit moves; the others follow once the effect is accepted."""
@@ -269,11 +255,6 @@ class Effect:
         """Friction laws."""
         del facts
         return ()
-
-    def friction_change(self, order: int) -> float | None:
-        """The share by which all support friction changes in a push, if the effect does nothing else; else None."""
-        del order
-        return None
 
     def hand(self, path: HandPath, facts: PushFacts) -> HandPath:
         """The path of the tip, or of its mount where it gives way."""

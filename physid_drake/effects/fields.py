@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -19,7 +18,7 @@ from physid_drake.ranges import NOT_NEGATIVE, POSITIVE
 Array = NDArray[np.float64]
 WEAKEST = 1e-9  # N/m: a spring weaker than this has no anchor
 SHORT = 0.1  # m: of a cable beside a table, at least as likely
-CORES = (0.015, 0.03, 0.06)  # m, of a magnet
+CORE = 0.03  # m, of a magnet
 PULL = 20.0  # times what friction holds: a stiff cable that is slack nearly everywhere
 
 
@@ -58,7 +57,6 @@ class Tether(Effect):
     frame: ClassVar[str] = "world"
     amplitudes: ClassVar[tuple[str, ...]] = ("stiffness",)
     limits: ClassVar[tuple[str, ...]] = ("table_tilt",)
-    mass_powers: ClassVar[Mapping[str, int]] = {"stiffness": 1, "force_x": 1, "force_y": 1}
 
     stiffness: float = parameter(0.0, "N/m", values=NOT_NEGATIVE)
     x: float = parameter(0.0, "m")
@@ -119,7 +117,6 @@ class Magnet(Effect):
     frame: ClassVar[str] = "world"
     amplitudes: ClassVar[tuple[str, ...]] = ("strength",)
     limits: ClassVar[tuple[str, ...]] = ("table_tilt",)
-    mass_powers: ClassVar[Mapping[str, int]] = {"strength": 1}
 
     strength: float = parameter(0.0, "N*m^2", values=NOT_NEGATIVE)
     x: float = parameter(0.0, "m")
@@ -141,18 +138,7 @@ class Magnet(Effect):
     def families(cls, around: Surroundings) -> tuple[Family, ...]:
         """A grid of places."""
         places, _ = grid_of_places(around)
-        return tuple(_magnet_family((x, y), CORES[1]) for x, y in places.tolist())
-
-    @property
-    def place(self) -> tuple[float, float]:
-        """What it attracts to."""
-        return self.x, self.y
-
-    @classmethod
-    def families_at(cls, place: tuple[float, float], around: Surroundings) -> tuple[Family, ...]:
-        """Of several cores."""
-        del around
-        return tuple(_magnet_family(place, core) for core in CORES)
+        return tuple(_magnet_family((x, y), CORE) for x, y in places.tolist())
 
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
         """The attraction."""

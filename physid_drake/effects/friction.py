@@ -162,17 +162,6 @@ class FrictionPatch(Effect):
         )
         return (*simulated, *wide)
 
-    @property
-    def place(self) -> tuple[float, float]:
-        """The middle."""
-        return self.x, self.y
-
-    @classmethod
-    def families_at(cls, place: tuple[float, float], around: Surroundings) -> tuple[Family, ...]:
-        """Of several radii."""
-        _, spacing = close_grid_of_places(around)
-        return tuple(_patch_family(place, size * BASE * spacing) for size in (0.5, 1.0, WIDE[0]))
-
     def reaches(self, places: Array, around: Surroundings) -> bool:
         """Whether a corner of the object may have been on the patch, which a fit may still make a little larger."""
         away = np.hypot(places[:, 0] - self.x, places[:, 1] - self.y)
@@ -255,7 +244,7 @@ class FrictionDrift(Effect):
         )
 
     def friction_change(self, order: int) -> float:
-        """In proportion to the push's number; some friction is left, also after pushes that are still to come."""
+        """By which share friction differs in a push: by its number, and some is left after those still to come."""
         return max(LEAST_LEFT - 1.0, self.per_push * order)
 
     def body(self, body: Body, facts: PushFacts) -> Body:

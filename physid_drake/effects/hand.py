@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -58,7 +57,6 @@ class HandCompliance(HandEffect):
     frame: ClassVar[str] = "contact"
     amplitudes: ClassVar[tuple[str, ...]] = ("compliance",)
     beyond: ClassVar[tuple[str, ...]] = ("share",)
-    mass_powers: ClassVar[Mapping[str, int]] = {"compliance": -1}
 
     compliance: float = parameter(0.0, "m/N", values=NOT_NEGATIVE)
     damping: float = parameter(0.5, "-", values=NOT_NEGATIVE)

@@ -6,12 +6,12 @@ by linear algebra on the score tests' columns.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 from scipy.linalg import cho_factor, cho_solve
 
 from physid_drake.inference.fit import Fit, Fitter
@@ -22,12 +22,20 @@ Array = NDArray[np.float64]
 
 REPLICATES = 300
 TAIL_SHARE = 0.15  # of the replicates: whose excesses give the tail beyond the largest
+FEWEST = 10  # replicates in which an effect has the right sign: fewer have no tail
+LEAST_SCALE = 0.1  # nats: of a tail
+MOST_GAIN = 1e6  # nats
 
 
-def largest_gains(fitter: Fitter, fit: Fit, found: Sequence[Column], rng: np.random.Generator) -> tuple[float, Array]:
-    """The largest held-out gain of any family, linearly: of the recording, and (REPLICATES,) where the model is true.
+def gains_by_chance(
+    fitter: Fitter, fit: Fit, found: Sequence[Column], rng: np.random.Generator
+) -> tuple[dict[str, float], dict[str, Array]]:
+    """Held-out gains, linearly, of the best family of each effect, by its name.
 
-    A push that is odd in the fit is as loud in all.
+    A push that is odd in the fit is as loud in all replicates.
+
+    Returns:
+        Of the recording, and (REPLICATES,) where the fitted model is true [nats].
     """
     drawn = [
         np.column_stack([push.residual, _drawn(push.own, prior, one.weight**-0.5, rng)])
@@ -35,21 +43,53 @@ def largest_gains(fitter: Fitter, fit: Fit, found: Sequence[Column], rng: np.ran
     ]
     tables = [_Table(fitter, fit, found, drawn, scatter) for scatter in scatters_beside(fit.scatter)]
     null = _best([table.scored([]) for table in tables])
-    largest = np.full(1 + REPLICATES, -np.inf)
+    best: dict[str, Array] = {}
     for members in by_family(found):
-        largest = np.maximum(largest, _best([table.scored(members) for table in tables]) - null)
-    return float(largest[0]), largest[1:]
+        gains = _best([table.scored(members) for table in tables]) - null
+        name = found[members[0]].kind.name
+        best[name] = np.maximum(best.get(name, gains), gains)
+    return {name: float(g[0]) for name, g in best.items()}, {name: g[1:] for name, g in best.items()}
 
 
-def p_value(seen: float, replicates: Array) -> float:
-    """Chance that a replicate has as large a value; beyond the replicates by an exponential tail."""
-    count = len(replicates)
-    above = int((replicates >= seen).sum())
-    if above >= 10:
-        return (1.0 + above) / (1.0 + count)
-    start = float(np.quantile(replicates, 1.0 - TAIL_SHARE))
-    excesses = replicates[replicates > start] - start
-    return TAIL_SHARE * float(stats.expon.sf(max(0.0, seen - start), scale=float(excesses.mean())))
+def surprise(values: Array, replicates: Array) -> Array:
+    """Minus the logarithm of the chance that a replicate has as large a value, of each (n,).
+
+    Beyond the largest seventh of the replicates by the exponential tail that these have.
+    """
+    some = np.sort(replicates[np.isfinite(replicates)])
+    if len(some) < FEWEST:
+        return np.where(np.isfinite(values), math.log(len(replicates)), 0.0)
+    count = max(1, round(TAIL_SHARE * len(replicates)))
+    tail = some[-count:]
+    scale = max(float((tail - tail[0]).mean()), LEAST_SCALE)
+    above = len(some) - np.searchsorted(some, values)
+    within = -np.log(np.maximum(above, 1) / len(replicates))
+    beyond = math.log(len(replicates) / len(tail)) + (values - tail[0]) / scale
+    return np.asarray(np.where(values > tail[0], beyond, np.where(np.isfinite(values), within, 0.0)))
+
+
+def gain_of(wanted: float, replicates: Array) -> float:
+    """The value whose surprise is as wanted, beyond the replicates [nats]."""
+    low, high = np.array([0.0]), np.array([1.0])
+    while surprise(high, replicates)[0] < wanted and high[0] < MOST_GAIN:
+        high *= 2.0
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if surprise(middle, replicates)[0] < wanted else (low, middle)
+    return float(high[0])
+
+
+def p_value(seen: dict[str, float], by_chance: dict[str, Array]) -> float:
+    """Chance that some effect gains as surprisingly much where the fitted model is true.
+
+    Each effect's gain is compared with its own by chance, so that one that has many shapes to choose from does not
+    hide what one with a single number shows.
+    """
+    if not seen:
+        return 1.0
+    of_replicates = np.max([surprise(g, g) for g in by_chance.values()], axis=0)
+    best = max(float(surprise(np.array([seen[name]]), by_chance[name])[0]) for name in seen)
+    return float(np.exp(-surprise(np.array([best]), of_replicates)[0]))
 
 
 def _drawn(own: Array, prior: Array, loudness: float, rng: np.random.Generator) -> Array:

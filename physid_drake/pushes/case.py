@@ -60,7 +60,6 @@ class Case:
         pool: makes the rollouts.
         around: the effects' scales.
         config: of the cell.
-        odd: (n,) how many times as loud as the others a push is; empty where none is.
         pushes: of the whole recording.
         lost: names of pushes that the cell cannot simulate, which are none of the others.
     """
@@ -75,7 +74,6 @@ class Case:
     pool: RolloutPool
     around: Surroundings
     config: CellConfig
-    odd: tuple[float, ...] = ()
     pushes: int = 0
     lost: tuple[str, ...] = ()
 
@@ -121,28 +119,18 @@ class Case:
 
         return dc.replace(
             self, recording=self.recording.subset(kept), problems=some(self.problems),
-            nuisances=some(self.nuisances), features=some(self.features), odd=some(self.odd) if self.odd else (),
+            nuisances=some(self.nuisances), features=some(self.features),
             lost=(*self.lost, *(self.problems[i].name for i in lost)),
         )  # fmt: skip
 
-    def louder(self, factor: float, forces: ForceNoise, odd: Sequence[float] = ()) -> Case:
-        """The case with more noise.
-
-        Args:
-            factor: times the noise of the poses.
-            forces: the noise of the forces.
-            odd: (n,) how many times as loud as the others a push is, in all; none where empty.
-        """
-        common = self.noise.louder(factor, forces)
-        odd = tuple(odd) or (1.0,) * len(self.problems)
+    def louder(self, factor: float, forces: ForceNoise) -> Case:
+        """The case with so many times the noise of the poses, and another noise of the forces."""
+        noise = self.noise.louder(factor, forces)
         features = tuple(
-            features_of(push, problem, common if times == 1.0 else common.louder(times))
-            for push, problem, times in zip(self.recording.pushes, self.problems, odd, strict=True)
+            features_of(push, problem, noise)
+            for push, problem in zip(self.recording.pushes, self.problems, strict=True)
         )
-        strange = [f"{p.name} ({times:.1f})" for p, times in zip(self.problems, odd, strict=True) if times > 1.0]
-        said = (f"pushes that stand out count as so many times noisier: {', '.join(strange)}",) if strange else ()
-        warnings = (*(w for w in common.warnings if not w.startswith("pushes that stand out")), *said)
-        return dc.replace(self, noise=dc.replace(common, warnings=warnings), features=features, odd=odd)
+        return dc.replace(self, noise=noise, features=features)
 
 
 def case_of(

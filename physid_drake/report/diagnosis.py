@@ -153,7 +153,8 @@ def ranking_table(diagnosis: Diagnosis, most: int = 8) -> Table:
     for column in ("effect", "score gain", "p", "held-out gain", "why"):
         table.add_column(column)
     for r in diagnosis.ranking[:most]:
-        held_out = "-" if r.held_out_gain is None else f"{r.held_out_gain:.0f} +- {r.held_out_se:.0f}"
+        unsure = "" if r.held_out_se is None else f" +- {r.held_out_se:.0f}"
+        held_out = "-" if r.held_out_gain is None else f"{r.held_out_gain:.0f}{unsure}"
         table.add_row(r.name, f"{r.gain:.1f}", f"{r.p_value:.2g}", held_out, r.why)
     return table
 

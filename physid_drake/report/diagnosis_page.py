@@ -16,7 +16,14 @@ from physid_drake.diagnose import Evidence
 from physid_drake.diagnose.evidence import predicted
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.looks import SAID
-from physid_drake.diagnose.values import Detectable, Diagnosis, EffectFinding, ParameterEstimate, ThetaEstimate
+from physid_drake.diagnose.values import (
+    Detectable,
+    Diagnosis,
+    EffectFinding,
+    ParameterEstimate,
+    Ranked,
+    ThetaEstimate,
+)
 from physid_drake.effects import effect_named
 from physid_drake.pushes.tracker_noise import UNKNOWN
 from physid_drake.recording import Recording
@@ -238,6 +245,13 @@ def _regimes(diagnosis: Diagnosis) -> list[tuple[str, str, str]]:
     ]
 
 
+def _gain(r: Ranked) -> str:
+    """On held-out pushes, with its spread where the effect was fitted."""
+    if r.held_out_gain is None:
+        return "–"
+    return tenths(r.held_out_gain) + ("" if r.held_out_se is None else f" ± {tenths(r.held_out_se)}")
+
+
 def _ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     best = max((r.gain for r in diagnosis.ranking if math.isfinite(r.gain)), default=1.0) or 1.0
     return [
@@ -246,7 +260,7 @@ def _ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             "gain": tenths(r.gain),
             "width": f"{share(r.gain, best):.1f}",
             "p": tiny(r.p_value),
-            "held_out": "–" if r.held_out_gain is None else f"{tenths(r.held_out_gain)} ± {tenths(r.held_out_se)}",
+            "held_out": _gain(r),
             "why": r.why,
             "found": r.name in {e.name for e in diagnosis.effects},
         }

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from physid_drake.diagnose.decide import ADEQUATE, CONFIRMED, LITTLE, LOUD, decided, probability, surely_better
+from physid_drake.diagnose.decide import ADEQUATE, LITTLE, LOUD, decided, probability, surely_better
 from physid_drake.diagnose.search import Found, Weighed
 from physid_drake.effects.drag import QuadraticDrag, ViscousDrag
 from physid_drake.effects.fields import Magnet, TableTilt, Tether
@@ -14,7 +14,10 @@ from physid_drake.effects.friction import FrictionDrift
 from physid_drake.effects.unnamed import UnnamedForce
 
 PUSHES = 8
-MUCH = 2.0 * CONFIRMED / (PUSHES - 1)  # nats a push, if all say as much
+MUCH = 24.0 / (PUSHES - 1)  # nats a push, if all say as much
+KINDS = (TableTilt, Tether, Magnet, ViscousDrag, QuadraticDrag, FrictionDrift)
+# By chance a gain is as rare as it has nats.
+BY_CHANCE = {kind.name: np.random.default_rng(0).exponential(size=300) for kind in KINDS}
 
 
 def hypothesis(*kinds, gain, loudness=1.0, alike=0.5):
@@ -28,8 +31,8 @@ def hypothesis(*kinds, gain, loudness=1.0, alike=0.5):
 def found(*named, unnamed=(), odd=True, left=0.5, left_gain=20.0, plain=1.0, alike=0.5, pushes=PUSHES):
     return Found(
         fitter=None, plain=SimpleNamespace(pushes=range(pushes), loudness=plain), alike=alike,
-        columns=(), p_value=1e-6, odd=odd,
-        by_chance=np.zeros(3), named=tuple(sorted(named, key=lambda one: -one.gain)), left=left,
+        columns=(), linearly={}, p_value=1e-6, odd=odd,
+        by_chance=BY_CHANCE, named=tuple(sorted(named, key=lambda one: -one.gain)), left=left,
         left_gain=left_gain, unnamed=tuple(unnamed),
     )  # fmt: skip
 
@@ -46,12 +49,12 @@ def test_one_effect_that_all_pushes_speak_for_is_named():
 
 def test_what_one_push_alone_says_is_nothing():
     alone = np.zeros(PUSHES)
-    alone[3] = 100.0 * CONFIRMED
+    alone[3] = 1200.0
     assert not surely_better(alone)
     assert said(hypothesis(TableTilt, gain=alone)).verdict == "consistent"
 
 
-@pytest.mark.parametrize(("odd", "gain"), [(False, MUCH), (True, 0.4 * MUCH)])
+@pytest.mark.parametrize(("odd", "gain"), [(False, MUCH), (True, 0.3 * MUCH)])
 def test_chance_is_consistent(odd, gain):
     assert said(hypothesis(TableTilt, gain=gain), odd=odd).verdict == "consistent"
 
@@ -74,6 +77,8 @@ def test_an_effect_stands_for_those_of_which_it_is_a_limit(further):
 def test_a_second_effect_has_to_be_worth_it():
     one, little = hypothesis(TableTilt, gain=3.0 * MUCH), hypothesis(TableTilt, ViscousDrag, gain=3.2 * MUCH)
     assert said(one, little).effects == (TableTilt,)
+    large = hypothesis(TableTilt, gain=100.0 * MUCH)
+    assert said(large, hypothesis(TableTilt, ViscousDrag, gain=101.5 * MUCH)).effects == (TableTilt,)
     much = hypothesis(TableTilt, ViscousDrag, gain=6.0 * MUCH)
     other = hypothesis(TableTilt, QuadraticDrag, gain=5.9 * MUCH)
     answer = said(one, much, other)

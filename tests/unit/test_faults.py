@@ -73,7 +73,7 @@ def diagnose(recording, out):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "moments"),
-    [(run_cell, (1, 3, 5, 8)), (diagnose, (3, 30))],
+    [(run_cell, (1, 3, 5, 8)), (diagnose, (1, 4))],
     ids=["run_cell", "diagnose"],
 )
 def test_a_run_that_is_killed_again_and_again_ends_with_the_bytes_of_one_that_was_not(
@@ -92,7 +92,7 @@ def test_a_run_that_is_killed_again_and_again_ends_with_the_bytes_of_one_that_wa
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("command", "largest"), [(run_cell, 30_000), (diagnose, 100_000)], ids=["run_cell", "diagnose"]
+    ("command", "largest"), [(run_cell, 30_000), (diagnose, 50_000)], ids=["run_cell", "diagnose"]
 )
 def test_a_full_disk_is_one_line_and_leaves_no_scraps(command, largest, recording, tmp_path):
     out = tmp_path / "out"

@@ -11,7 +11,7 @@ from physid_drake.effects.drag import ViscousDrag
 from physid_drake.effects.fields import TableTilt
 from physid_drake.inference import replicates
 from physid_drake.inference.push import LinearPush, weighed
-from physid_drake.inference.replicates import largest_gains, p_value
+from physid_drake.inference.replicates import gain_of, gains_by_chance, p_value, surprise
 from physid_drake.inference.scatter import SCATTERS
 from physid_drake.inference.scores import Column, scores
 
@@ -53,15 +53,15 @@ def problem(rng, amount=0.0):
 def test_chance_has_its_rate(monkeypatch):
     monkeypatch.setattr(replicates, "REPLICATES", 200)
     rng = np.random.default_rng(0)
-    values = [p_value(*largest_gains(*problem(rng), rng)) for _ in range(150)]
+    values = [p_value(*gains_by_chance(*problem(rng), rng)) for _ in range(150)]
     assert stats.kstest(values, "uniform").pvalue > 0.01
     assert np.mean(np.array(values) < 0.05) == pytest.approx(0.05, abs=0.05)
 
 
 def test_what_is_there_is_seen_and_the_wrong_sign_is_not():
     rng = np.random.default_rng(1)
-    assert p_value(*largest_gains(*problem(rng, amount=0.5), rng)) < 1e-6
-    seen, chance = largest_gains(*problem(rng, amount=-0.5), rng)  # no less than none, of a drag
+    assert p_value(*gains_by_chance(*problem(rng, amount=0.5), rng)) < 1e-6
+    seen, chance = gains_by_chance(*problem(rng, amount=-0.5), rng)  # no less than none, of a drag
     assert p_value(seen, chance) > 1e-3
 
 
@@ -75,8 +75,23 @@ def test_the_score_test_finds_how_much_there_is():
     assert wrong.gain < 0.5 * best.gain
 
 
-def test_a_value_beyond_all_replicates_has_the_probability_of_an_exponential_tail():
+def test_a_value_has_the_probability_of_an_exponential_tail_or_its_rank():
     chance = np.random.default_rng(3).exponential(2.0, size=20_000)
-    assert p_value(40.0, chance) == pytest.approx(np.exp(-20.0), rel=1.0)
-    assert p_value(float(np.median(chance)), chance) == pytest.approx(0.5, abs=0.01)
-    assert p_value(0.0, chance) == pytest.approx(1.0)
+    far, middle, none = np.exp(-surprise(np.array([40.0, np.median(chance), 0.0]), chance))
+    assert far == pytest.approx(np.exp(-20.0), rel=1.0)
+    assert (middle, none) == pytest.approx((0.5, 1.0), abs=0.01)
+
+
+def test_surprise_is_that_of_an_exponential_tail_and_goes_back():
+    draws = np.random.default_rng(3).exponential(2.0, size=3000)
+    asked = np.array([4.0, 10.0, 30.0])
+    assert surprise(asked, draws) == pytest.approx(asked / 2.0, rel=0.1)
+    assert surprise(np.array([-np.inf]), draws)[0] == 0.0
+    assert surprise(np.array([gain_of(9.0, draws)]), draws)[0] == pytest.approx(9.0)
+
+
+def test_an_effect_that_gains_much_by_chance_does_not_hide_one_that_does_not():
+    rng = np.random.default_rng(4)
+    chance = {"wide": rng.exponential(5.0, size=300), "narrow": rng.exponential(0.5, size=300)}
+    assert p_value({"wide": 8.0, "narrow": 8.0}, chance) < 1e-4
+    assert p_value({"wide": 8.0, "narrow": 0.2}, chance) > 0.1
