@@ -199,6 +199,7 @@ def _left(evidence: Evidence) -> str:
     scatter = 100.0 * UNIT_SCATTER * after.scatter
     trend = friction_trend(evidence.fitter, after)
     friction = f"friction scatters by {scatter:.0f} % from push to push" + ("" if trend is None else f", {trend}")
+    nameless = "" if evidence.named or evidence.best is None else "beside a force without a name, "
     if after.loudness <= loudest(evidence.case.noise):
-        return f"no more than noise; {friction}"
-    return f"{after.loudness:.1f} times what noise and the simulator's own error would leave; {friction}"
+        return f"{nameless}no more than noise; {friction}"
+    return f"{nameless}{after.loudness:.1f} times what noise and the simulator's own error would leave; {friction}"

@@ -138,7 +138,7 @@ def simplest(found: Found) -> Weighed | None:
 
 
 def _worth(found: Found, best: Weighed, other: Weighed) -> bool:
-    """Whether a hypothesis is surely better than another; an effect more has to be confirmed, and more than little."""
+    """Whether a hypothesis is surely better than another; an effect more has to be confirmed, and no little one."""
     if len(kinds_of(best)) > len(kinds_of(other)):
         return confirmed(found, best, other) and best.gain - other.gain > LITTLE * other.gain
     return surely_better(best.gains - other.gains)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from physid_drake.cell.solid import solid_of
 from physid_drake.inference.fit import Fit, Fitter, slope
 from physid_drake.inference.predictions import Ask, Physics
-from physid_drake.inference.push import weighed
+from physid_drake.inference.push import NO_TAIL, weighed
 from physid_drake.pushes.case import Case
 from physid_drake.twin.twin import Wander
 
@@ -137,9 +137,12 @@ def _windows(case: Case, i: int) -> list[_Spell]:
 def _solved(
     fitter: Fitter, plain: Fit, i: int, windows: Sequence[_Spell], columns: Array, units: Array
 ) -> list[MissingWrench]:
-    """Least squares with a wide prior, the push's own unknowns integrated out, theta held."""
+    """Least squares with a wide prior, the push's own unknowns integrated out, theta held.
+
+    Errors are what is missing, and not as loud as the model leaves them.
+    """
     push, prior = plain.pushes[i], fitter.priors(plain.scatter)[i]
-    one = weighed(push.residual, columns, push.own, prior, plain.loudness, plain.tail)
+    one = weighed(push.residual, columns, push.own, prior, 1.0, NO_TAIL)
     covariance = np.linalg.inv(one.precision + np.eye(columns.shape[1]) / LARGEST**2)
     values = covariance @ one.right
     stds = np.sqrt(np.diag(covariance))

@@ -145,7 +145,7 @@ class Ranked:
     Attributes:
         name: as in the catalogue.
         gain: of its score test: twice the gain in log likelihood [nats].
-        p_value: of that gain, for all looks at the catalogue.
+        p_value: that such an effect gains as much on held-out pushes by chance.
         held_out_gain: of the effect, in log predictive density of left-out pushes [nats], over the model without it;
             to first order where it was not fitted. None where it would have to act the other way round.
         held_out_se: its standard error over pushes; None where it was not fitted.
@@ -266,3 +266,10 @@ class Diagnosis:
     warnings: tuple[str, ...]
     rollouts: int
     pushes: int = 0
+
+    @property
+    def with_it(self) -> str | None:
+        """In words, what the model that leaves has beside the plain cell; None where nothing."""
+        if self.effects:
+            return "with what is missing"
+        return None if self.fit.rms_after == self.fit.rms_before else "with a force without a name"

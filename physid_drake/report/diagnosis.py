@@ -193,9 +193,9 @@ def held_out_figures(diagnosis: Diagnosis) -> list[tuple[str, list[float]]]:
             d.reduced_chi2_before,
         )
     ]
-    if d.effects:
+    if d.with_it is not None:
         after = (fit.position_after, fit.rotation_after, fit.force_after, fit.rms_after, d.reduced_chi2_after)
-        rows.append(("with what is missing", *after))
+        rows.append((d.with_it, *after))
     return [
         (name, [1e3 * position, math.degrees(rotation), *([] if force is None else [force]), sigmas, chi2])
         for name, position, rotation, force, sigmas, chi2 in rows

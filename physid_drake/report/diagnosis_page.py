@@ -231,7 +231,7 @@ def _bars(diagnosis: Diagnosis) -> list[dict[str, Any]]:
             "bars": [
                 (kind, f"{share(value, longest):.1f}", fixed(value))
                 for kind, value in (("before", before), ("after", after))
-                if kind == "before" or diagnosis.effects
+                if kind == "before" or diagnosis.with_it is not None
             ],
         }
         for name, before, after in rows
