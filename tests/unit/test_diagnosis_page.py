@@ -223,9 +223,17 @@ def test_a_page_of_little(verdict):
 
 
 def test_where_nothing_was_found_only_the_plain_cell_is_shown():
-    bare = diagnosis_with(verdict="unexplained", effects=())
+    found = diagnosis_with(verdict="unexplained", effects=())
+    bare = dc.replace(found, fit=dc.replace(found.fit, rms_after=found.fit.rms_before))
     text = diagnosis_page(bare, recording_of(), shown_pushes(after=False)[:1], WRENCHES[:2])
     assert "with what is missing" not in text and 'class="after"' not in text
+    assert "No effect of the catalogue is claimed." in text
+
+
+def test_what_a_force_without_a_name_does_to_the_errors_is_shown():
+    found = diagnosis_with(verdict="unexplained", effects=())
+    text = diagnosis_page(found, recording_of(), shown_pushes()[:1], WRENCHES[:2])
+    assert "with a force without a name" in text and 'class="after"' in text
     assert "No effect of the catalogue is claimed." in text
 
 
