@@ -83,7 +83,7 @@ def decided(found: Found, *, most: float) -> Decision:
         return Decision(verdict="consistent")
     nameless = next((one for one in found.unnamed if confirmed(found, one)), None)
     best = simplest(found)
-    if best is None or not confirmed(found, best):
+    if best is None:
         return Decision(verdict="unexplained", best=nameless)
     beaten = any(surely_better(one.gains - best.gains) for one in found.unnamed)
     little = found.left >= ADEQUATE or found.left_gain < LITTLE * best.gain
@@ -123,14 +123,15 @@ def kinds_of(one: Weighed) -> tuple[type[Effect], ...]:
 
 
 def simplest(found: Found) -> Weighed | None:
-    """The hypothesis with the fewest effects beside which the best one has nothing that is confirmed.
+    """The confirmed hypothesis with the fewest effects beside which the best one has nothing that is confirmed.
 
     Of those that the best one is not surely better than, the one that is a limit of another.
     """
-    if not found.named:
+    named = [one for one in found.named if confirmed(found, one)]
+    if not named:
         return None
-    best = found.named[0]
-    close = [one for one in found.named if not _worth(found, best, one)]
+    best = named[0]
+    close = [one for one in named if not _worth(found, best, one)]
     fewest = min(len(kinds_of(one)) for one in close)
     few = [one for one in close if len(kinds_of(one)) == fewest]
     limits = [one for one in few if any(_is_limit(one, other) for other in few)]

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 REPLICATES = 300
 TAIL_SHARE = 0.15  # of the replicates: whose excesses give the tail beyond the largest
 FEWEST = 10  # replicates in which an effect has the right sign: fewer have no tail
-LEAST_SCALE = 0.1  # nats: of a tail
+LEAST_SCALE = 1.0  # nats, of a tail: a likelihood ratio of x nats has a chance of exp(-x) at most (Markov)
 MOST_GAIN = 1e6  # nats
 
 
