@@ -54,7 +54,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
             quieter=quieter_by(before, _degrees(plain)),
             fewest=FEWEST_PUSHES if len(case.problems) < FEWEST_PUSHES else None,
         ),
-        p_value=p_value_of(evidence),
+        p_value=p_value_of(evidence, alpha),
         alpha=alpha,
         effects=findings,
         location=_location(evidence, seed),
@@ -82,23 +82,23 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
     )
 
 
-def p_value_of(evidence: Evidence) -> float:
-    """Of "nothing is missing": of the best gain by chance, and where a mismatch is claimed of what else claims it.
+def p_value_of(evidence: Evidence, alpha: float) -> float:
+    """Of "nothing is missing": of the best gain by chance; where that claims no mismatch, of what else claims it.
 
-    That is a gain which only a whole fit shows, errors that are no noise, and frictions that differ by too much.
+    That is a gain which only a whole fit shows, errors that are no noise, and frictions that differ by too much; the
+    smallest of so many looks (Sidak 1967).
     """
     found, noise = evidence.found, evidence.case.noise
     if is_own_error(errors_of(evidence.case, evidence.errors_before)):
         return 1.0
-    if evidence.decision.verdict in ("consistent", "underpowered"):
+    if found.p_value < alpha or evidence.decision.verdict in ("consistent", "underpowered"):
         return found.p_value
     whole = {kinds_of(one)[0].name: one.gain for one in found.named if len(kinds_of(one)) == 1}
-    looks = [found.p_value, p_value(whole, found.by_chance)]
+    looks = [found.p_value, p_value(whole, found.by_chance), found.alike]
     if found.plain.loudness > loudest(noise):
         squares = sum(one.square for one in found.plain.weighed) / loudest(noise) ** 2
         looks.append(float(stats.chi2.sf(squares, _degrees(found.plain))))
-    looks.append(found.alike)
-    return min(looks)
+    return float(-np.expm1(len(looks) * np.log1p(-min(*looks, 1.0 - 1e-16))))
 
 
 def _blind(evidence: Evidence, detectable: tuple[Detectable, ...]) -> bool:

@@ -9,7 +9,7 @@ from physid_drake.diagnose.regimes import speed_of
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.pushes.case import Case
 
-FEWEST = 6  # pushes that tell their friction
+FEWEST = 6  # pushes
 CHANCE = 0.05  # of the best of all looks
 
 
@@ -22,15 +22,14 @@ def friction_trend(fitter: Fitter, fit: Fit) -> str | None:
         fitter: of the recording.
         fit: the model whose pushes have frictions of their own.
     """
-    case = fitter.case
-    told = range(len(case.problems))
-    frictions = fitter.frictions(fit)
-    if len(told) < FEWEST:
+    case, frictions = fitter.case, fitter.frictions(fit)
+    every = range(len(frictions))
+    if len(every) < FEWEST:
         return None
     looks = {
-        "the further the object goes": [_way(case, i) for i in told],
-        "the faster it is pushed": [speed_of(case, i) for i in told],
-        "the later the push": [float(case.problems[i].order) for i in told],
+        "the further the object goes": [_way(case, i) for i in every],
+        "the faster it is pushed": [speed_of(case, i) for i in every],
+        "the later the push": [float(case.problems[i].order) for i in every],
     }
     seen = {words: stats.kendalltau(frictions, values) for words, values in looks.items()}
     best = min(seen, key=lambda words: float(np.nan_to_num(seen[words].pvalue, nan=1.0)))

@@ -18,7 +18,7 @@ from physid_drake.pushes.problem import spec_of
 
 Array = NDArray[np.float64]
 
-TICK = 5e-4  # s, at most
+TICK, LONGEST_TICK = 5e-4, 1e-3  # s: of the judge; of a hand that is not slow
 HAND_FREQUENCY, REST_DEPTH, STICTION = 3000.0, 3e-7, 1e-5  # rad/s, m, m/s: a contact that hardly gives
 STEPS = 2
 
@@ -73,11 +73,15 @@ class Judge:
 
 
 def stiff(config: CellConfig) -> CellConfig:
-    """A cell whose contacts hardly give."""
+    """A cell whose contacts hardly give; of a hand so slow that ticks are long, the cell as it is."""
     solver, contact = config.solver, config.contact
+    if solver.time_step_s > LONGEST_TICK:
+        return config
     tick = min(TICK, solver.time_step_s)
     return dc.replace(
         config,
         solver=dc.replace(solver, time_step_s=tick, slide_time_step_s=min(2.0 * tick, solver.slide_time_step_s)),
-        contact=dc.replace(contact, hand_frequency_rad_s=HAND_FREQUENCY, rest_depth_m=REST_DEPTH),
+        contact=dc.replace(
+            contact, hand_frequency_rad_s=HAND_FREQUENCY, rest_depth_m=REST_DEPTH, stiction_tolerance_mps=STICTION
+        ),
     )

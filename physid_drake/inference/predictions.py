@@ -84,6 +84,7 @@ class Predictor:
     def judging(self, pool: RolloutPool) -> Predictor:
         """The same in another cell, of which a pool makes all rollouts."""
         other = copy(self)
+        other.count = 0
         other.case = dc.replace(self.case, pool=pool)
         other.by_cell = frozenset(range(len(self.case.problems)))
         return other
