@@ -69,6 +69,12 @@ class UnnamedForce(Effect):
     places: tuple[float, ...] = parameter((0.0, 0.0, 1.0, 1.0), "m")
     speeds: tuple[float, ...] = parameter((0.01, 1.0), "m/s")
 
+    @property
+    def is_null(self) -> bool:
+        """Whether all tables are empty, or hold nothing but zeros."""
+        over_places = any(any(row) for name in OVER_PLACES for row in getattr(self, name))
+        return not over_places and not any(any(getattr(self, name)) for name in MODES if name not in OVER_PLACES)
+
     @classmethod
     def chart(cls, around: Surroundings) -> tuple[Coordinate, ...]:
         """Multiples of each table's modes."""

@@ -21,6 +21,11 @@ def test_none_of_it_is_nothing():
     assert effect.is_null and laws_of(effect) == []
 
 
+def test_tables_of_zeros_are_nothing_either():
+    assert UnnamedForce(force_x=((0.0, 0.0),), by_speed=(0.0,), friction=((0.0,), (0.0,))).is_null
+    assert not UnnamedForce(force_x=((0.0, 0.1),)).is_null and not UnnamedForce(by_speed=(0.1,)).is_null
+
+
 @pytest.mark.parametrize(
     ("block", "law"), zip(BLOCKS, (ForceTable, PlaceTable, SpeedTable, HeadingTable, MotionTable), strict=True)
 )
