@@ -1,16 +1,12 @@
 """Whether a plan keeps its word: the success rate that it states, against pushes in worlds that it never saw.
 
     python benchmarks/confidence.py [--worlds N] [--seed S] [--state FILE] [--without PART ...]
-    python benchmarks/confidence.py --slides N [--seed S] [--without PART ...]
 
 Every world of the planar integrator draws an object, both frictions, friction's scatter from push to push, and a
 goal. Three to five pushes with the tracker's noise are identified and a push is planned. The world makes it several
 times: each time friction is drawn anew, and the object stands where the tracker sees it but for the tracker's error.
 What the plan states is drawn last; ``--without`` leaves a part of the belief out of it. With ``--state`` worlds are
 kept, so that an interrupted run goes on.
-
-``--slides`` is the same without rollouts: straight slides of v^2 / (2 mu g); each training push tells its own
-friction; identification's linear algebra, intervals and draws are the project's, and the realised rate is exact.
 """
 
 import argparse
@@ -27,41 +23,31 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from scipy import stats
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "recovery"))
 
 from reference.planar import Hand, HandPath, simulate_planar
 from reference.scenes import OBJECTS, draw_theta
-from twin import config_of, shape_of
+from twin import config_of
 from worlds import POINTS, POSITION_STD, ROTATION_STD, TIME_STEP, pushes_of, recorded
 
 from physid_drake.cell import HandPath as CellPath
-from physid_drake.cell.solid import solid_of
 from physid_drake.identify import Identification, Identifier, SearchConfig
-from physid_drake.identify.identify import estimates_of
-from physid_drake.identify.linearise import prior_slope
-from physid_drake.identify.polish import ROUNDS, SCATTER_PUSHES, Polished, new_scatter, scatter_freedom
 from physid_drake.model import Model
 from physid_drake.model_reading import load_model
 from physid_drake.plan import DistanceToGoal, Situation, plan
-from physid_drake.plan.draws import draws_of
+from physid_drake.plan.draws import draws_of, scatter_freedom
 from physid_drake.plan.story import Spread, spread_of
 from physid_drake.plan.system import identified_model
 from physid_drake.plan.task import policy_for
 from physid_drake.pushes.config import ThetaConfig
-from physid_drake.pushes.misfit import Whitener
-from physid_drake.pushes.nuisance import FIRST_SCATTER
-from physid_drake.pushes.theta import theta_map
-from physid_drake.recording import ObjectModel
 
 NAMES = ("eraser", "box", "book")
 RADIUS, AFTER = 0.010, 2.0  # m; s
 TRIALS, DRAWS, MADE = 24, 32, 20
 # Twice the usual ticks; fewer points under the object would turn slow pushes by 20 mrad and bias the frictions.
 CELL = config_of("point", time_step_s=2e-3, slide_time_step_s=4e-3)
-SLIDE_NOISE, SLIDE_DRAWS = 0.003, 256  # of ln mu that a push tells
 PARTS = ("correlation", "freedom", "start")
 SEEN = 20  # samples of the object at rest, over which its start is averaged
 START_STD = np.array([POSITION_STD, POSITION_STD, ROTATION_STD]) / math.sqrt(SEEN)
@@ -94,10 +80,10 @@ class World:
         )
         identifier = Identifier(
             recording, cell=CELL, theta=ThetaConfig(parameters=["support_friction", "hand_friction"]),
-            search=SearchConfig(candidates=64, budget=8, jobs=1), held_out_share=0.0, seed=0,
+            search=SearchConfig(candidates=64, budget=8, jobs=1), seed=0,
         )  # fmt: skip
         result = identifier.run()
-        return identified_model(result, identifier.pool.spec, self.body.name), result
+        return identified_model(result, identifier.case.pool.spec, self.body.name), result
 
     def ends(self, path: CellPath) -> np.ndarray:
         """Where the hand's path leaves the object (MADE, 2), each time with another friction and start [m]."""
@@ -125,7 +111,7 @@ def made_in(world: World) -> Row:
     )  # fmt: skip
     return {
         "object": world.body.name, "pushes": world.count, "scatter": world.scatter, "goal": world.goal,
-        "start": world.start, "model": model.dump(), "scatter_found": result.polished.friction_scatter,
+        "start": world.start, "model": model.dump(), "scatter_found": result.friction_scatter,
         "theta": {e.name: [getattr(world.theta, e.name), e.value, *e.ci90] for e in result.estimates},
         "settings": made.settings.tolist(), "cost": made.cost, "ends": world.ends(made.predicted.paths[0]).tolist(),
     }  # fmt: skip
@@ -216,80 +202,6 @@ def summary(rows: list[Row]) -> list[str]:
     return lines
 
 
-class Slide:
-    """A straight slide over a distance, planned with the friction that a few slides told.
-
-    Attributes:
-        stated: success rate that the belief states.
-        realised: the true one.
-        inside: probability of an end between the draws' 5 and 95 % quantiles.
-        held: whether friction's 90 % interval holds the truth.
-    """
-
-    def __init__(self, seed: int, number: int, without: Sequence[str]) -> None:
-        rng = np.random.default_rng([seed, number])
-        friction, scatter = float(rng.uniform(0.15, 0.5)), float(rng.uniform(0.01, 0.05))
-        count, distance = int(rng.integers(3, 6)), float(rng.uniform(0.1, 0.4))
-        logs = math.log(friction) + np.log1p(scatter * rng.standard_normal(count))
-        model, found = slide_model(logs + SLIDE_NOISE * rng.standard_normal(count))
-        draws = draws_of(
-            model, Situation(start=(0.0, 0.0, 0.0)), SLIDE_DRAWS, rng, friction_scatter=found,
-            scatter_freedom=math.inf if "freedom" in without else scatter_freedom(count),
-        )  # fmt: skip
-        planned = float(model.body.support_friction[0])
-        ends = distance * planned / np.array([float(d.model.body.support_friction[0]) for d in draws])
-
-        def rate(low: float, high: float) -> float:
-            """Probability of an end between two distances: friction is between their inverses."""
-            above, below = (distance * planned / (end * friction) - 1.0 for end in (low, high))
-            return float(stats.norm.cdf(above / scatter) - stats.norm.cdf(below / scatter))
-
-        self.stated = float(np.mean(np.abs(ends - distance) <= TOLERANCE))
-        self.realised = rate(distance - TOLERANCE, distance + TOLERANCE)
-        self.inside = rate(*np.quantile(ends, [0.05, 0.95]).tolist())
-        low, high = model.intervals["theta.support_friction"]
-        self.held = low <= friction <= high
-
-
-def slide_model(logs: np.ndarray) -> tuple[Model, float]:
-    """Friction and its scatter as identification has them, from each push's ln mu (n,) but for ``SLIDE_NOISE``."""
-    body, config = OBJECTS["box"], ThetaConfig(parameters=["support_friction"])
-    shape = shape_of(body)
-    known, density = ObjectModel(shape=shape, mass=body.mass), CELL.default_density_kgpm3
-    thetas = theta_map(known, solid_of(shape), (1, 1), config, density)
-    space, middle, scatter = thetas.space, float(logs.mean()), FIRST_SCATTER
-    residuals = [np.array([(middle - x) / SLIDE_NOISE]) for x in logs]
-
-    def whiteners() -> list[Whitener]:
-        return [Whitener.of(np.array([[scatter / SLIDE_NOISE]])) for _ in logs]
-
-    if len(logs) >= SCATTER_PUSHES:
-        for _ in range(ROUNDS):
-            scatter = new_scatter(whiteners(), [0] * len(logs), residuals, old=scatter, first=FIRST_SCATTER)
-    slope = np.log(space.upper / space.lower) / SLIDE_NOISE
-    rows = [w.apply(slope)[:, np.newaxis] for w in whiteners()]
-    marginal = tuple(w.apply(r) for w, r in zip(whiteners(), residuals, strict=True))
-    polished = Polished(
-        theta=np.array([math.exp(middle)]), jacobian=np.vstack([*rows, prior_slope(space)]), chi2=0.0, inflation=1.0,
-        samples=len(logs), friction_scatter=scatter, residuals=marginal, unknowns=(), rollouts=0,
-    )  # fmt: skip
-    estimate = estimates_of(thetas, polished)[0]
-    model = Model(
-        recording="slides", shape=shape, hand_radius=None, table=((-1.0, -1.0), (1.0, 1.0)), config=CELL,
-        body=thetas.body(polished.theta), intervals={"theta.support_friction": list(estimate.ci90)},
-    )  # fmt: skip
-    return model, scatter
-
-
-def show_slides(slides: list[Slide]) -> None:
-    """Print the table of slides."""
-    rates, made, inside = (np.array([getattr(s, n) for s in slides]) for n in ("stated", "realised", "inside"))
-    title = f"{len(slides)} worlds of straight slides, {SLIDE_DRAWS} draws"
-    show_bins(title, rates, made, inside)
-    print(brier_of(rates, made))
-    print(f"90 % intervals of support_friction that hold the truth: {np.mean([s.held for s in slides]):.2f}")
-
-
 def main() -> None:
     """Run the worlds and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -297,11 +209,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=5)
     parser.add_argument("--state", type=Path, metavar="FILE", help="worlds so far, to go on from")
     parser.add_argument("--without", nargs="+", choices=PARTS, default=[], metavar="PART", help=", ".join(PARTS))
-    parser.add_argument("--slides", type=int, metavar="N", help="worlds of straight slides instead")
     arguments = parser.parse_args()
-    if arguments.slides:
-        show_slides([Slide(arguments.seed, k, arguments.without) for k in range(arguments.slides)])
-        return
     kept: Path | None = arguments.state
     rows = [json.loads(line) for line in kept.read_text().splitlines()] if kept and kept.exists() else []
     for number in range(len(rows), arguments.worlds):

@@ -51,9 +51,7 @@ def identified(name: str, truth: object, noise: Noise, rng: np.random.Generator)
         pushes = [(truth, draw_push(rng, body, tip_radius=0.010)) for _ in range(PUSHES)]
         write_reference_recording(place, body, pushes, noise, rng)
         recording = read_recording(place)
-        identifier = Identifier(
-            recording, cell=CellConfig(), theta=ThetaConfig(), search=SearchConfig(), held_out_share=0.0, seed=0
-        )
+        identifier = Identifier(recording, cell=CellConfig(), theta=ThetaConfig(), search=SearchConfig(), seed=0)
         return identifier.run()
 
 

@@ -20,8 +20,9 @@ from physid_drake.diagnose.hypotheses import baseline, with_tolerances
 from physid_drake.inference.discrepancy import ALIKE, WANDERS, WHITE, discrepancy, way_of
 from physid_drake.inference.fit import Fitter
 from physid_drake.inference.hypothesis import Hypothesis
-from physid_drake.inference.predictions import Physics, Predictor
+from physid_drake.inference.predictions import Predictor
 from physid_drake.inference.push import TAIL
+from physid_drake.inference.rollouts import Physics
 from physid_drake.pushes.case import case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording.reading import read_recording

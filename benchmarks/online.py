@@ -11,6 +11,7 @@ from rich.table import Table
 
 from physid_drake.cell import CellConfig
 from physid_drake.identify import OnlineIdentifier, SearchConfig
+from physid_drake.identify.accuracy import rms
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import read_recording
 from physid_drake.resources import shipped
@@ -39,7 +40,7 @@ def main() -> None:
         result = learner.identification(belief)
         assert result is not None
         estimates = [f"{e.value:.3f} ({e.ci90[0]:.3f} to {e.ci90[1]:.3f})" for e in result.estimates]
-        table.add_row(str(k + 1), *estimates, f"{belief.foreseen[-1].sigmas:.2f}", f"{belief.fitted[-1].sigmas:.2f}",
+        table.add_row(str(k + 1), *estimates, f"{rms(belief.foreseen[push.name]):.2f}", f"{result.fitted.rms:.2f}",
                       str(belief.rollouts - before), f"{spent:.1f}")  # fmt: skip
     console = Console(width=170)
     console.print(table)

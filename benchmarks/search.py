@@ -27,9 +27,8 @@ from rich.table import Table
 from runs import COARSE, shipped_pushes
 
 from physid_drake.belief import Belief
-from physid_drake.identify import Identifier, SearchConfig
+from physid_drake.experiments.learning import Learner
 from physid_drake.pushes.config import ThetaConfig
-from physid_drake.pushes.misfit import whitened_residual
 from physid_drake.search import SEARCHES, Search, search_minimum, search_named
 from physid_drake.space import Parameter, ParameterSpace
 
@@ -192,14 +191,14 @@ class Counted:
     """The misfit of three shipped pushes; ends a method when its budget is spent.
 
     Attributes:
-        identifier: that simulates.
+        learner: that simulates.
         budget: thetas.
         told: errors in their order.
         busy: CPU time in rollouts [s].
         total: CPU time of the run [s].
     """
 
-    identifier: Identifier
+    learner: Learner
     budget: int
     told: list[float] = dc.field(default_factory=list)
     busy: float = 0.0
@@ -210,10 +209,8 @@ class Counted:
         if len(self.told) >= self.budget:
             raise Spent
         begin = time.process_time()
-        one = self.identifier
-        predictions = one.pool.run([one._task(p, theta) for p in one.training])
-        pairs = zip(one.training, predictions, strict=True)
-        residual = np.concatenate([whitened_residual(p, one.noise, r) for p, r in pairs])
+        one = self.learner
+        residual = one.residuals(one.problems, theta)
         self.told.append(float(0.5 * np.log(np.mean(residual**2))))
         self.busy += time.process_time() - begin
         return residual
@@ -249,12 +246,9 @@ OWN: dict[str, tuple[str, Optimise]] = {
 
 
 def push_table(console: Console, name: str, parameters: list[str], seeds: int, budget: int, only: str) -> Table:
-    identifier = Identifier(
-        shipped_pushes(3), cell=COARSE, theta=ThetaConfig(parameters=parameters, bounds=BOUNDS),
-        search=SearchConfig(jobs=1),
-        held_out_share=0.0, seed=0,
-    )  # fmt: skip
-    least = _least(identifier)
+    theta = ThetaConfig(parameters=parameters, bounds=BOUNDS)
+    learner = Learner(shipped_pushes(3), config=COARSE, theta=theta)
+    least = _least(learner)
     runs: dict[str, list[Counted]] = {}
     for method, (module, optimise) in {**OWN, **PEERS}.items():
         if not any(part in method for part in only.split(",")):
@@ -264,22 +258,22 @@ def push_table(console: Console, name: str, parameters: list[str], seeds: int, b
         except ImportError as error:
             console.print(f"{method} is left out: {error}")
             continue
-        runs[method] = [_run(identifier, optimise, budget, seed) for seed in range(seeds)]
+        runs[method] = [_run(learner, optimise, budget, seed) for seed in range(seeds)]
         console.print(f"{name}: {method} done")
     return _ranked(runs, least, f"{name}: {budget} trials, {seeds} seeds")
 
 
-def _least(identifier: Identifier) -> float:
+def _least(learner: Learner) -> float:
     """Log of the least rms misfit that a long run of least squares finds."""
-    counted = _run(identifier, PEERS["scipy least_squares, starts"][1], 40 * identifier.thetas.space.dimension, 0)
+    counted = _run(learner, PEERS["scipy least_squares, starts"][1], 40 * learner.thetas.space.dimension, 0)
     return min(counted.told)
 
 
-def _run(identifier: Identifier, optimise: Optimise, budget: int, seed: int) -> Counted:
-    counted = Counted(identifier, budget)
+def _run(learner: Learner, optimise: Optimise, budget: int, seed: int) -> Counted:
+    counted = Counted(learner, budget)
     begin = time.process_time()
     with contextlib.suppress(Spent):
-        optimise(counted.errors, counted.residuals, identifier.thetas.space, budget, seed)
+        optimise(counted.errors, counted.residuals, learner.thetas.space, budget, seed)
     counted.total = time.process_time() - begin
     return counted
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,19 +12,18 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from rich.console import Console
 
-from physid_drake.diagnose import Diagnosis, model_of
+from physid_drake.diagnose import Diagnosis, DiagnosisSystem, Examined, diagnose_from, model_of
 from physid_drake.door import DONE, Parser, enter, path
 from physid_drake.errors import ConfigError
-from physid_drake.identify import Identification, Identifier, OnlineIdentifier
+from physid_drake.identify import Identification, Identifier, OnlineIdentifier, in_the_cell
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
 from physid_drake.model import Model
 from physid_drake.plan import Hindsight, Plan, caveat_of, outcome_under
 from physid_drake.plan.system import Planner, PolicySystem, identified_model, planner_of
 from physid_drake.progress import Progress
-from physid_drake.pushes.case import case_of
+from physid_drake.pushes.case import UNIT_SCATTER
 from physid_drake.pushes.doubts import doubts
 from physid_drake.pushes.kept_rollouts import KeptRollouts
-from physid_drake.pushes.nuisance import nuisance_of
 from physid_drake.pushes.problem import HandUse
 from physid_drake.pushes.rollouts import simulate
 from physid_drake.pushes.task import Task
@@ -39,7 +37,7 @@ from physid_drake.report.result import result_json
 from physid_drake.report.stage import LOOPBACK, ShownMotion, Stage, served
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
 from physid_drake.report.terminal import terminal
-from physid_drake.run_diagnose import ALPHA, STATE, recording_folder, run_case, show, write
+from physid_drake.run_diagnose import ALPHA, STATE, recording_folder, show, write
 from physid_drake.run_folder import RunFolder, made_with, named_after, versions
 from physid_drake.run_plan import FILES as PLAN
 from physid_drake.run_plan import forget as forget_plan
@@ -53,7 +51,7 @@ DIAGNOSIS_PAGE = "diagnosis.html"
 DIAGNOSIS = ("diagnosis.json", DIAGNOSIS_PAGE, "scene.html")
 RESULTS = ("result.json", "page.html", "model.yaml", *DIAGNOSIS, *PLAN)
 MOST_WARNINGS = 5  # printed
-SHOWN = 12  # pushes in the animation, held-out ones first
+SHOWN = 12  # pushes in the animation
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -130,53 +128,157 @@ def _fill(
     folder: RunFolder, identifier: Identifier, planner: Planner | None, scenario: Scenario, recording: Recording,
     stage: Stage | None, arguments: argparse.Namespace, console: Console,
 ) -> Stage:  # fmt: skip
-    """Identify, plan and diagnose; each result is written as soon as it is there."""
+    """Identify, diagnose and plan; then all is written, each file once, and then shown: a pipe may close."""
     folder.own(BELIEF)
-    result, plan = _identify(identifier, planner, scenario, recording, console)
-    hand = HandUse.of(identifier.problems)
-    model = identified_model(result, identifier.pool.spec, recording.name, hand=hand)
+    identifier.case.pool.kept = KeptRollouts(folder.own(STATE))
+    work = Work(identifier, planner, scenario, recording, console, diagnosing=not arguments.no_diagnosis)
+    examined, plan, hindsight = work.done()
     stage = stage or Stage(recording)
-    marks = stage.play(_scenes(result, identifier, recording))
-    note = f"{recording.description} Seed {scenario.seed}."
-    html = stage.meshcat.StaticHtml()
-    page = partial(result_page, html, result, name=recording.name, marks=marks, note=note)
-    folder.write("page.html", page(plan=plan))
-    folder.write("result.json", result_json(result, recording, scenario.seed, versions()))
-    for stale in DIAGNOSIS:  # an earlier run's, of another model
+    marks = stage.play(_scenes(examined.known))
+    for stale in (*DIAGNOSIS, "result.json"):  # an earlier run's, of another model
         folder.forget(stale)
-    folder.write("model.yaml", model.dump())
-    _keep_plan(plan, scenario, folder)
-    _show(result, identifier, recording, console)  # what is printed may go to a pipe that closes
-    console.print(f"written: result.json, page.html and model.yaml in {folder.path}")
-    _show_plan(plan, folder, console)
-    if not arguments.no_diagnosis:
-        diagnosis, found = _diagnose(scenario, recording, folder, console)
-        page = partial(page, diagnosis=(diagnosis.verdict, diagnosis.sentence))
-        folder.write("page.html", page(plan=plan))
-        if planner is not None and plan is not None and (found.effects or _caveat(diagnosis)):
-            plan, hindsight = _planned_again(planner, plan, diagnosis, found, console)
-            _keep_plan(plan, scenario, folder, hindsight=hindsight)
-            folder.write("page.html", page(plan=plan, hindsight=hindsight))
-            _show_plan(plan, folder, console, hindsight=hindsight)
-        folder.forget(STATE)
+    folder.write("page.html", result_page(
+        stage.meshcat.StaticHtml(), examined, name=recording.name, marks=marks,
+        note=f"{recording.description} Seed {scenario.seed}.", plan=plan, hindsight=hindsight,
+    ))  # fmt: skip
+    _keep_plan(plan, scenario, folder, hindsight=hindsight)
+    if examined.evidence is None or examined.diagnosis is None:
+        folder.write("model.yaml", work.model(examined).dump())
+    else:
+        write(folder, examined.diagnosis, examined.evidence, page=DIAGNOSIS_PAGE)
+    # Last: where it is, all is.
+    folder.write("result.json", result_json(examined, recording, scenario.seed, versions()))
+    _show(examined.known, recording, console, alone=examined.diagnosis is None)
+    if examined.diagnosis is not None:
+        show(console, examined.diagnosis)
+    if plan is not None:
+        console.print(plan_table(plan, hindsight=hindsight))
+    files = ["result.json", "page.html", "model.yaml", *(() if arguments.no_diagnosis else DIAGNOSIS)]
+    files += [] if plan is None else ["plan.json", *push_files(plan)]
+    console.print(f"written: {', '.join(files)} in {folder.path}")
+    folder.forget(STATE)
     folder.forget(BELIEF)
     return stage
 
 
-def _show(result: Identification, identifier: Identifier, recording: Recording, console: Console) -> None:
+class Work:
+    """Identification, diagnosis and plan as one Drake diagram."""
+
+    def __init__(
+        self, identifier: Identifier, planner: Planner | None, scenario: Scenario, recording: Recording,
+        console: Console, *, diagnosing: bool,
+    ) -> None:  # fmt: skip
+        """Prepare.
+
+        Args:
+            identifier: of the recording.
+            planner: what plans a push; None plans none.
+            scenario: how.
+            recording: the pushes.
+            console: for the progress.
+            diagnosing: whether to look for what is missing, too.
+        """
+        self._identifier, self._planner, self._scenario = identifier, planner, scenario
+        self._recording, self._console, self._diagnosing = recording, console, diagnosing
+        self._hindsight: Hindsight | None = None
+
+    def done(self) -> tuple[Examined, Plan | None, Hindsight | None]:
+        """Wire and run: the recording's player, what learns from its pushes, what examines that, the policy's."""
+        last = len(self._recording.pushes) * PUSH_PERIOD  # what the last push teaches is seen at the next update
+        with progress_bar(self._console) as bar:
+            builder = DiagramBuilder()
+            player = builder.AddSystem(RecordingPlayer(self._recording.pushes))
+            space = self._identifier.case.thetas.space
+            system = builder.AddSystem(
+                IdentificationSystem(self._learner(bar), dimension=space.dimension, nominal=space.nominal)
+            )
+            builder.Connect(player.GetOutputPort("push.measured"), system.GetInputPort("push.measured"))
+            examiner = builder.AddSystem(DiagnosisSystem(lambda known: self._examined(known, bar), begin=last))
+            identified = system.GetOutputPort("identification.estimated")
+            builder.Connect(identified, examiner.GetInputPort("identification.estimated"))
+            policy = None
+            if self._planner is not None:
+                planner = self._planner
+                policy = builder.AddSystem(PolicySystem(
+                    lambda examined: self._planned(planner, examined, bar), dimension=planner.dimension,
+                    begin=last + PUSH_PERIOD,
+                ))  # fmt: skip
+                diagnosed = examiner.GetOutputPort("diagnosis.estimated")
+                builder.Connect(diagnosed, policy.GetInputPort("identification.estimated"))
+            simulator = Simulator(builder.Build())
+            simulator.AdvanceTo(last + 2.0 * PUSH_PERIOD)
+            root = simulator.get_context()
+            examined = examiner.examined(examiner.GetMyContextFromRoot(root))
+            plan = None if policy is None else policy.plan(policy.GetMyContextFromRoot(root))
+        assert examined is not None
+        return examined, plan, self._hindsight
+
+    def model(self, examined: Examined) -> Model:
+        """What a plan is made with: the plain cell, or what the diagnosis leaves."""
+        if examined.evidence is not None:
+            return model_of(examined.evidence)
+        case = examined.known.case
+        hand = HandUse.of(case.problems)
+        return identified_model(examined.known, case.pool.spec, self._recording.name, hand=hand)
+
+    def _learner(self, bar: Progress) -> Learner[Any]:
+        """What learns from the pushes: from all at once, or from one after another."""
+        scenario, recording = self._scenario, self._recording
+        if not scenario.search.online:
+            return BatchLearner(lambda _: self._identifier.run(bar), after=len(recording.pushes))
+        return OnlineIdentifier(
+            recording, cell=scenario.cell, theta=scenario.theta, search=scenario.search, seed=scenario.seed,
+            progress=bar,
+        )  # fmt: skip
+
+    def _examined(self, known: Identification, bar: Progress) -> Examined:
+        if self._scenario.search.online:
+            bar("in the Drake cell", 0, 0)
+            known = in_the_cell(known)
+        if not self._diagnosing:
+            return Examined(known=known)
+        diagnosis, evidence = diagnose_from(known, seed=self._scenario.seed, alpha=ALPHA, tick=bar)
+        return Examined(known=evidence.known, diagnosis=diagnosis, evidence=evidence)
+
+    def _planned(self, planner: Planner, examined: Examined, bar: Progress) -> Plan:
+        """The plan with the model that leaves; what the plain cell's would have been, where that is another."""
+        model, evidence, diagnosis = self.model(examined), examined.evidence, examined.diagnosis
+        fit = examined.known.fit if evidence is None else evidence.leaving
+        scatter, pushes = UNIT_SCATTER * fit.scatter, len(fit.pushes)
+        plan = planner.with_model(model, friction_scatter=scatter, pushes=pushes, tick=bar)
+        if diagnosis is not None:
+            self._hindsight = self._with_plain(planner, examined, diagnosis, model, bar)
+        return plan
+
+    def _with_plain(
+        self, planner: Planner, examined: Examined, diagnosis: Diagnosis, model: Model, bar: Progress
+    ) -> Hindsight | None:
+        caveat = caveat_of(diagnosis.verdict, {e.name: e.indistinguishable_from for e in diagnosis.effects})
+        if not model.effects:
+            return Hindsight(caveat=caveat) if caveat else None
+        bar("what the plain cell would have planned", 0, 0)
+        plain = planner.run(examined.known, bar)
+        return Hindsight(plain=plain, outcome=outcome_under(plain, model), caveat=caveat)
+
+
+def _show(result: Identification, recording: Recording, console: Console, *, alone: bool) -> None:
+    """What was identified, and whether that is enough, unless a diagnosis is to say so."""
     console.print()
     console.print(estimates_table(result, recording.name))
     if result.cells is not None:
         console.print(cells_table(result.cells))
     console.print(accuracy_table(result))
-    console.print(verdict(result))
+    if alone:
+        console.print(verdict(result))
     odd = (*doubts(recording), *warning_lines(recording))
     for line in odd[:MOST_WARNINGS]:
         console.print(f"Note: {line}", markup=False)
     if len(odd) > MOST_WARNINGS:
         console.print(f"and {len(odd) - MOST_WARNINGS} more: physid_drake inspect")
-    if identifier.pool.diverged:
-        console.print(f"{identifier.pool.diverged} of {identifier.pool.count} rollouts diverged and count as failed.")
+    pools = (result.case.pool, result.fitter.predictor.rollouts.pool)
+    diverged, count = (sum(getattr(pool, name) for pool in pools) for name in ("diverged", "count"))
+    if diverged:
+        console.print(f"{diverged} of {count} rollouts diverged and count as failed.")
 
 
 def _keep_plan(
@@ -186,44 +288,6 @@ def _keep_plan(
     forget_plan(folder)
     if plan is not None:
         write_plan(folder, plan, seed=scenario.seed, hindsight=hindsight, page=None)
-
-
-def _show_plan(plan: Plan | None, folder: RunFolder, console: Console, *, hindsight: Hindsight | None = None) -> None:
-    if plan is not None:
-        console.print(plan_table(plan, hindsight=hindsight))
-        console.print(f"written: plan.json and {', '.join(push_files(plan))} in {folder.path}")
-
-
-def _diagnose(
-    scenario: Scenario, recording: Recording, folder: RunFolder, console: Console
-) -> tuple[Diagnosis, Model]:
-    """Say what physics is missing, and keep the model with it."""
-    console.print("\nDiagnosing: what these pushes say beyond the plain cell")
-    case = case_of(recording, scenario.cell, scenario.theta, jobs=scenario.search.jobs)
-    kept = KeptRollouts(folder.own(STATE))
-    diagnosis, evidence = run_case(case, console, seed=scenario.seed, alpha=ALPHA, kept=kept)
-    write(folder, diagnosis, evidence, page=DIAGNOSIS_PAGE)
-    show(console, diagnosis)
-    console.print(f"written: diagnosis.json, diagnosis.html, scene.html and model.yaml in {folder.path}")
-    return diagnosis, model_of(evidence)
-
-
-def _planned_again(
-    planner: Planner, plain: Plan, diagnosis: Diagnosis, found: Model, console: Console
-) -> tuple[Plan, Hindsight]:
-    """The plan with the effects that were found, or the same plan where none was, and what is to be said of it."""
-    caveat = _caveat(diagnosis)
-    if not found.effects:
-        return plain, Hindsight(caveat=caveat)
-    console.print(f"Planned again, with {' and '.join(e.name for e in found.effects)}:")
-    scatter, pushes = diagnosis.friction_scatter, len(diagnosis.fit.per_push)
-    with progress_bar(console) as bar:
-        again = planner.with_model(found, friction_scatter=scatter, pushes=pushes, tick=bar)
-    return again, Hindsight(plain=plain, outcome=outcome_under(plain, found), caveat=caveat)
-
-
-def _caveat(diagnosis: Diagnosis) -> str:
-    return caveat_of(diagnosis.verdict, {e.name: e.indistinguishable_from for e in diagnosis.effects})
 
 
 def _live(recording: Recording, host: str, console: Console) -> Stage:
@@ -239,9 +303,9 @@ def _identifier(scenario: Scenario, recording: Recording, out: Path) -> Identifi
         cell=scenario.cell,
         theta=scenario.theta,
         search=scenario.search,
-        held_out_share=scenario.held_out_share,
         seed=scenario.seed,
         state=out / BELIEF,
+        most=scenario.pushes,
     )
 
 
@@ -251,7 +315,9 @@ def _planner(scenario: Scenario, recording: Recording, identifier: Identifier, c
     try:
         if recording.hand is None:
             raise ConfigError("plan: no hand pushes in this recording.")
-        return planner_of(scenario.plan, identifier.pool.spec, identifier.problems, recording.name, scenario.seed)
+        return planner_of(
+            scenario.plan, identifier.case.pool.spec, identifier.case.problems, recording.name, scenario.seed
+        )
     except ConfigError as error:
         if asked:
             raise
@@ -259,58 +325,14 @@ def _planner(scenario: Scenario, recording: Recording, identifier: Identifier, c
         return None
 
 
-def _identify(
-    identifier: Identifier, planner: Planner | None, scenario: Scenario, recording: Recording, console: Console
-) -> tuple[Identification, Plan | None]:
-    """Wire and run the diagram: the recording's player, the system that learns from its pushes, and the policy's."""
-    last = len(recording.pushes) * PUSH_PERIOD  # what the last push teaches is seen at the next update
-    with progress_bar(console) as bar:
-        builder = DiagramBuilder()
-        player = builder.AddSystem(RecordingPlayer(recording.pushes))
-        system = builder.AddSystem(
-            IdentificationSystem(
-                _learner(identifier, scenario, recording, bar),
-                dimension=identifier.thetas.space.dimension,
-                nominal=identifier.thetas.space.nominal,
-            )
-        )
-        builder.Connect(player.GetOutputPort("push.measured"), system.GetInputPort("push.measured"))
-        policy = None
-        if planner is not None:
-            policy = builder.AddSystem(
-                PolicySystem(lambda known: planner.run(known, bar), dimension=planner.dimension, begin=last)
-            )
-            identified = system.GetOutputPort("identification.estimated")
-            builder.Connect(identified, policy.GetInputPort("identification.estimated"))
-        simulator = Simulator(builder.Build())
-        simulator.AdvanceTo(last + PUSH_PERIOD)
-        root = simulator.get_context()
-        result: Identification | None = system.identification(system.GetMyContextFromRoot(root))
-        plan = None if policy is None else policy.plan(policy.GetMyContextFromRoot(root))
-    assert result is not None
-    return result, plan
-
-
-def _learner(identifier: Identifier, scenario: Scenario, recording: Recording, bar: Progress) -> Learner[Any]:
-    """What learns from the pushes: from all at once, or from one after another."""
-    if not scenario.search.online:
-        return BatchLearner(lambda _: identifier.run(bar), after=len(recording.pushes))
-    return OnlineIdentifier(
-        recording, cell=scenario.cell, theta=scenario.theta, search=scenario.search, seed=scenario.seed,
-        pool=identifier.pool, progress=bar,
-    )  # fmt: skip
-
-
-def _scenes(result: Identification, identifier: Identifier, recording: Recording) -> list[ShownMotion]:
-    """Held-out pushes first, as the model predicts them: with nothing of their own fitted."""
-    by_name = {problem.name: problem for problem in identifier.problems}
-    names = [*result.held_out, *result.training][:SHOWN]
-    scenes = []
-    for push in recording.subset(names).pushes:
-        problem = by_name[push.name]
-        nuisance = nuisance_of(problem, 0.01)
-        task = Task(problem=problem, theta=result.theta, nuisance=nuisance, values=0.0 * nuisance.stds)
-        scenes.append(ShownMotion(push=push, motion=simulate(identifier.pool.spec, identifier.thetas, task)))
+def _scenes(known: Identification) -> list[ShownMotion]:
+    """Pushes as the plain cell predicts them: with nothing of their own fitted."""
+    case, scenes = known.case, []
+    for push, problem, nuisance in list(zip(case.recording.pushes, case.problems, case.nuisances, strict=True))[
+        :SHOWN
+    ]:
+        task = Task(problem=problem, theta=known.theta, nuisance=nuisance, values=0.0 * nuisance.stds)
+        scenes.append(ShownMotion(push=push, motion=simulate(case.pool.spec, case.thetas, task)))
     return scenes
 
 

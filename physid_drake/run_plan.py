@@ -12,11 +12,10 @@ import numpy as np
 
 from physid_drake.errors import ConfigError
 from physid_drake.files import FileError, read_json
-from physid_drake.identify.polish import scatter_freedom
 from physid_drake.model import Model
 from physid_drake.model_reading import load_model
 from physid_drake.plan import DistanceToGoal, Ending, Hindsight, Outcome, Plan, Situation, caveat_of, plan
-from physid_drake.plan.draws import uncertain_names
+from physid_drake.plan.draws import scatter_freedom, uncertain_names
 from physid_drake.plan.story import outcome_under
 from physid_drake.plan.task import Choices, policy_for
 from physid_drake.plan.trajectory import tip_height_of
@@ -187,7 +186,7 @@ def _learnt_from(content: Any, *, of_diagnosis: bool) -> Learnt:
         caveat = caveat_of(_value(content, "verdict", str), alike)
     else:
         fitted, caveat = len(_value(content, "training.pushes", list, dict)), ""
-        pushes = fitted + len(_value(content, "held_out.pushes", list, dict))
+        pushes = _value(content, "pushes", int) if "pushes" in content else fitted
     if not 0 <= pushes <= MOST_PUSHES:
         raise ConfigError(f"pushes must be from 0 to {MOST_PUSHES}, but is {shown(pushes)}.")
     return Learnt(

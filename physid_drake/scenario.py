@@ -15,8 +15,8 @@ from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
 from physid_drake.cell.checks import check_config
 from physid_drake.errors import ConfigError
+from physid_drake.identify.config import INTEGRATORS
 from physid_drake.policies import POLICIES
-from physid_drake.pushes.rollouts import INTEGRATORS
 from physid_drake.ranges import Range
 from physid_drake.resources import shipped
 from physid_drake.run_folder import named_after
@@ -33,6 +33,7 @@ WHOLE = {
     "search.refine_every": (0, 10_000), "search.candidates": (2, 20_000), "search.budget": (1, 2_000),
     "search.batch": (1, 1_000), "search.patience": (1, 10_000), "search.jobs": (0, 1_000),
     "plan.budget": (1, 2_000), "plan.sweep": (0, 1_000), "plan.draws": (0, 1_000), "seed": (0, 2**32 - 1),
+    "pushes": (1, 10_000),
 }  # fmt: skip
 """From, to. Beyond, memory or patience end before the run does."""
 REAL = {
@@ -41,7 +42,6 @@ REAL = {
     "plan.start_deg": (Range(least=-3600.0, most=3600.0), "from -3600 to 3600 degrees"),
     "theta.cell_spread": (Range(least=1e-3, most=10.0), "from 0.001 to 10"),
     "theta.cell_length": (Range(least=1e-3, most=100.0), "from 0.001 to 100"),
-    "held_out_share": (Range(least=0.0, below=1.0), "in [0, 1)"),
 }
 
 

@@ -5,6 +5,7 @@ import dataclasses as dc
 from physid_drake.cell.config import CellConfig
 from physid_drake.identify import SearchConfig
 from physid_drake.plan.config import PlanConfig
+from physid_drake.pushes.case import MOST_PUSHES
 from physid_drake.pushes.config import ThetaConfig
 
 
@@ -14,7 +15,7 @@ class Scenario:
 
     Attributes:
         recording: a folder, or the name of a recording that ships with the project.
-        held_out_share: of the pushes, not fitted but predicted.
+        pushes: to look at, at most; of more, so many are taken at equal distances.
         seed: of everything random.
         cell: contact, solver, friction cells.
         theta: the unknowns.
@@ -23,7 +24,7 @@ class Scenario:
     """
 
     recording: str = "eraser_reference"
-    held_out_share: float = 0.25
+    pushes: int = MOST_PUSHES
     seed: int = 0
     cell: CellConfig = dc.field(default_factory=CellConfig)
     theta: ThetaConfig = dc.field(default_factory=ThetaConfig)

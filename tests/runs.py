@@ -60,7 +60,6 @@ def coarse_identifier(recording: Recording, **more: object) -> Identifier:
         "cell": COARSE,
         "theta": ThetaConfig(),
         "search": SearchConfig(candidates=32, budget=3, jobs=1),
-        "held_out_share": 0.0,
         "seed": 0,
     }
     return Identifier(recording, **(given | more))

@@ -78,18 +78,16 @@ class HandPath:
         start = middle + (1.0 + share) * (self.start - middle)
         return replace(self, velocities=(1.0 + share) * self.velocities, start=start)
 
-    def braking(self, share: float, begin: float = -math.inf, end: float = math.inf) -> HandPath:
-        """The last brake longer by ``share`` about its middle, so that the hand stops at the same place.
+    def braking(self, share: float, brake: tuple[int, int] | None) -> HandPath:
+        """A brake longer by ``share`` about its middle, so that the hand stops at the same place.
 
         The object leaves the hand at the first instant of braking, so this is what a 100 Hz stream knows least.
 
         Args:
             share: relative change of the brake's duration [-].
-            begin: as of ``last_brake`` [s].
-            end: the same.
+            brake: as ``last_brake`` has it; None changes nothing.
         """
-        brake = self.last_brake(begin, end)
-        if brake is None:
+        if brake is None or share == 0.0:
             return self
         first, last = (knot // self.pieces for knot in brake)
         times = self.times[:: self.pieces].copy()
@@ -123,6 +121,15 @@ class HandPath:
             begin: when the object begins to move [s]: a hand that came faster braked before.
             end: when it has come to rest [s]: one that withdraws goes back, and brakes later.
         """
+        if (begin, end) not in self._brakes:
+            self._brakes[begin, end] = self._last_brake(begin, end)
+        return self._brakes[begin, end]
+
+    @cached_property
+    def _brakes(self) -> dict[tuple[float, float], tuple[int, int] | None]:
+        return {}
+
+    def _last_brake(self, begin: float, end: float) -> tuple[int, int] | None:
         way = np.diff(self.positions(np.array([begin, end])), axis=0)[0]
         velocities, times = self.velocities[:: self.pieces], self.times[:: self.pieces]
         speed = np.where(velocities @ way > 0.0, np.linalg.norm(velocities, axis=1), 0.0)

@@ -8,24 +8,18 @@ import math
 import numpy as np
 from scipy import stats
 
-from physid_drake.diagnose.decide import (
-    FEWEST_PUSHES,
-    kinds_of,
-    loudest,
-    probability,
-)
+from physid_drake.diagnose.decide import FEWEST_PUSHES, is_own_error, kinds_of, loudest, probability
 from physid_drake.diagnose.estimates import parameters_of, smallest, theta_of
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.frictions import friction_trend
-from physid_drake.diagnose.left_out import errors_of, is_own_error
 from physid_drake.diagnose.looks import locate
 from physid_drake.diagnose.ranking import ranking_of
 from physid_drake.diagnose.regimes import regime_gains, standard_error
 from physid_drake.diagnose.sentence import sentence
 from physid_drake.diagnose.values import Detectable, Diagnosis, EffectFinding, FitQuality, Location, Partly
-from physid_drake.inference.fit import Fit
+from physid_drake.identify.accuracy import accuracy_of
 from physid_drake.inference.replicates import p_value
-from physid_drake.pushes.case import UNIT_SCATTER, Case
+from physid_drake.pushes.case import UNIT_SCATTER
 from physid_drake.pushes.stated import quieter_by
 
 GOOD_PART = 0.25  # of the squared error: less is not worth a word
@@ -41,7 +35,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
         verdict = "underpowered"
     findings = _findings(evidence) if evidence.named else ()
     partly = _partly(evidence)
-    before, left = _reduced_chi2(plain), _reduced_chi2(after)
+    before, left = plain.reduced_chi2, after.reduced_chi2
     return Diagnosis(
         recording=case.recording.name,
         verdict=verdict,
@@ -51,7 +45,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
             partly,
             better=evidence.best is not None,
             known=case.noise.known,
-            quieter=quieter_by(before, _degrees(plain)),
+            quieter=quieter_by(before, plain.degrees),
             fewest=FEWEST_PUSHES if len(case.problems) < FEWEST_PUSHES else None,
         ),
         p_value=p_value_of(evidence, alpha),
@@ -69,13 +63,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
         reduced_chi2_before=before,
         reduced_chi2_after=left,
         friction_scatter=UNIT_SCATTER * after.scatter,
-        noise={
-            "position_m": case.noise.position,
-            "rotation_rad": case.noise.rotation,
-            "correlation_time_s": list(case.noise.correlation_time),
-            "jitter_s": case.noise.jitter,
-            **_noise_of_sensors(case),
-        },
+        noise=evidence.known.noise,
         warnings=(*case.warnings, *_by_cell(evidence)),
         rollouts=found.fitter.predictor.count + evidence.fitter.predictor.count,
         pushes=case.pushes,
@@ -89,7 +77,7 @@ def p_value_of(evidence: Evidence, alpha: float) -> float:
     smallest of so many looks (Sidak 1967).
     """
     found, noise = evidence.found, evidence.case.noise
-    if is_own_error(errors_of(evidence.case, evidence.errors_before)):
+    if is_own_error(accuracy_of(evidence.case, evidence.errors_before)):
         return 1.0
     if found.p_value < alpha or evidence.decision.verdict in ("consistent", "underpowered"):
         return found.p_value
@@ -97,7 +85,7 @@ def p_value_of(evidence: Evidence, alpha: float) -> float:
     looks = [found.p_value, p_value(whole, found.by_chance), found.alike]
     if found.plain.loudness > loudest(noise):
         squares = sum(one.square for one in found.plain.weighed) / loudest(noise) ** 2
-        looks.append(float(stats.chi2.sf(squares, _degrees(found.plain))))
+        looks.append(float(stats.chi2.sf(squares, found.plain.degrees)))
     return float(-np.expm1(len(looks) * np.log1p(-min(*looks, 1.0 - 1e-16))))
 
 
@@ -108,35 +96,12 @@ def _blind(evidence: Evidence, detectable: tuple[Detectable, ...]) -> bool:
     return not sizes or float(np.median(sizes)) > VISIBLE
 
 
-def _degrees(fit: Fit) -> int:
-    """Residuals less shared parameters."""
-    return sum(len(push.residual) for push in fit.pushes) - fit.hypothesis.simulated
-
-
-def _reduced_chi2(fit: Fit) -> float:
-    """Squares that a model leaves, in units of noise, with what its priors cost, per degree of freedom."""
-    point, h = fit.point, fit.hypothesis
-    squares = float(np.sum(((point.z - h.mean) / h.std) ** 2))
-    for one in fit.weighed:
-        squares += one.square
-    return squares / max(1, _degrees(fit))
-
-
 def _by_cell(evidence: Evidence) -> tuple[str, ...]:
     """That a part was rolled out by the cell alone, which takes longer."""
     count = len(evidence.found.fitter.predictor.by_cell)
     if not count:
         return ()
     return (f"{count} of the pushes were rolled out by the Drake cell alone, whose motion the twin does not know",)
-
-
-def _noise_of_sensors(case: Case) -> dict[str, float]:
-    """Of the hand and of a force component, where they were recorded."""
-    hand = {} if case.recording.hand is None else {"hand_m": case.sensors.hand}
-    if case.sensors.hand_memory > 0.0:
-        hand["hand_correlation_time_s"] = case.sensors.hand_memory
-    compared = any(len(problem.force_times) for problem in case.problems)
-    return hand | ({"force_n": case.sensors.force} if compared else {})
 
 
 def _location(evidence: Evidence, seed: int) -> Location | None:
@@ -168,7 +133,7 @@ def _partly(evidence: Evidence) -> Partly | None:
     one = evidence.decision.partly
     if one is None or evidence.errors_partly is None:
         return None
-    before, after = (errors_of(evidence.case, e) for e in (evidence.errors_before, evidence.errors_partly))
+    before, after = (accuracy_of(evidence.case, e) for e in (evidence.errors_before, evidence.errors_partly))
     share = 1.0 - (after.rms / before.rms) ** 2
     if share < GOOD_PART:
         return None
@@ -179,7 +144,7 @@ def _partly(evidence: Evidence) -> Partly | None:
 def _quality(evidence: Evidence) -> FitQuality:
     case, plain, after = evidence.case, evidence.plain, evidence.leaving
     gains = evidence.fitter.held_out(after) - evidence.fitter.held_out(plain)
-    old, new = (errors_of(case, errors) for errors in (evidence.errors_before, evidence.errors_after))
+    old, new = (accuracy_of(case, errors) for errors in (evidence.errors_before, evidence.errors_after))
     return FitQuality(
         rms_before=old.rms, rms_after=new.rms, position_before=old.position, position_after=new.position,
         rotation_before=old.rotation, rotation_after=new.rotation,
@@ -193,7 +158,7 @@ def _quality(evidence: Evidence) -> FitQuality:
 
 def _left(evidence: Evidence) -> str:
     """What the model that leaves does not account for, in words."""
-    if is_own_error(errors_of(evidence.case, evidence.errors_before)):
+    if is_own_error(accuracy_of(evidence.case, evidence.errors_before)):
         return "no more than what two simulators differ by"
     after = evidence.leaving
     scatter = 100.0 * UNIT_SCATTER * after.scatter

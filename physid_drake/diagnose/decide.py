@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from physid_drake.diagnose.search import Found, Weighed
 from physid_drake.effects import Effect
+from physid_drake.identify import Accuracy
 from physid_drake.inference.replicates import surprise
 from physid_drake.pushes.tracker_noise import TrackerNoise
 
@@ -25,6 +26,7 @@ FEWEST_PUSHES = 3  # less cannot confirm anything on pushes that are left out
 ADEQUATE = 1e-3  # p-value of what a hypothesis leaves: of the catalogue beside it, of the scatter of frictions
 LITTLE = 0.02  # of the gain of a hypothesis: two honest implementations of one effect differ by a tenth of it or more
 LOUD = 1.25  # times the noise: more is not noise
+OWN_ERROR = (2e-4, 2e-3)  # m, rad: of pushes left out, by which two honest simulators differ
 DOUBTS = 1.5  # times the doubt about the noise's variance: three deviations of its root
 
 
@@ -92,6 +94,11 @@ def decided(found: Found, *, most: float) -> Decision:
         return Decision(verdict="unexplained", best=nameless, partly=best)
     alike = tuple(one for one in found.named if _in_class(one, best))
     return Decision(verdict="ambiguous" if alike else "explained", best=best, rivals=alike)
+
+
+def is_own_error(left_out: Accuracy) -> bool:
+    """Whether pushes are predicted as well as simulators agree: what is left has structure, and is no physics."""
+    return left_out.position < OWN_ERROR[0] and left_out.rotation < OWN_ERROR[1]
 
 
 def without_best(gains: Array) -> float:

@@ -14,28 +14,22 @@ from physid_drake.diagnose.decide import CONFIRMED
 from physid_drake.diagnose.search import Found
 from physid_drake.diagnose.values import Detectable, ParameterEstimate, ThetaEstimate
 from physid_drake.effects import Coordinate, Effect
-from physid_drake.identify.cells import TOLD
+from physid_drake.identify.accuracy import rms
+from physid_drake.identify.estimates import estimates_of, t_factor
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.hypothesis import Hypothesis, Part
 from physid_drake.inference.push import weighed
 from physid_drake.inference.replicates import gain_of
 from physid_drake.inference.scores import Column
 from physid_drake.pushes.case import Case
-from physid_drake.pushes.theta import CELL_ERROR, cell_error
+from physid_drake.pushes.theta import CELL_ERROR
 
 Array = NDArray[np.float64]
 
-Z90 = float(stats.norm.ppf(0.95))
 SAMPLES = 400  # of an effect's chart, for the intervals of its parameters
 JOINT_SAMPLES = 2000  # of theta and all charts, for how the estimates vary together
 # Of its standard deviation: below, an amplitude may be nothing. What is known over an unweighed mass only is above.
 DOUBTFUL = 0.5
-
-
-def _t_factor(fit: Fit) -> float:
-    """How much wider than a normal interval one is with so few pushes; the cell's own error does not grow with it."""
-    free = max(2, len(fit.pushes) - fit.hypothesis.simulated)
-    return float(stats.t.ppf(0.95, free)) / Z90
 
 
 def coordinates_of(h: Hypothesis, k: int) -> slice:
@@ -48,7 +42,7 @@ def parameters_of(fitter: Fitter, fit: Fit, k: int) -> dict[str, ParameterEstima
     """Values and intervals of the k-th effect, by drawing its chart point."""
     h, part = fit.hypothesis, fit.hypothesis.parts[k]
     here, some = h.points(fit.point.z)[k], coordinates_of(h, k)
-    seen = _t_factor(fit) ** 2 * fitter.covariance(fit)[some, some]
+    seen = t_factor(fit) ** 2 * fitter.covariance(fit)[some, some]
     covariance = seen + np.diag(_own_error(part, here, h) ** 2)
     rng = np.random.default_rng(0)
     draws = rng.multivariate_normal(np.zeros(len(part.free)), covariance, SAMPLES, method="eigh")
@@ -123,33 +117,14 @@ def _interval(effect: Effect, name: str, values: Sequence[Any]) -> Any:
 
 def theta_of(fitter: Fitter, fit: Fit, plain: Fit) -> dict[str, ThetaEstimate]:
     """Theta under a model, which of it these pushes tell, and what the baseline had."""
-    h, result = fit.hypothesis, dict[str, ThetaEstimate]()
-    covariance, intervals = fitter.covariance(fit), theta_intervals(fitter, fit)
-    before, here = plain.hypothesis.theta(plain.point.z), h.theta(fit.point.z)
-    for j, parameter in enumerate(h.space.parameters):
-        told = math.sqrt(covariance[j, j]) < TOLD * h.std[j]
-        result[parameter.name] = ThetaEstimate(
-            value=float(here[j]) if told else None,
-            unit=parameter.unit,
-            ci90=intervals[parameter.name] if told else None,
-            identifiable=bool(told),
-            before=float(before[j]),
+    before = plain.hypothesis.theta(plain.point.z)
+    return {
+        e.name: ThetaEstimate(
+            value=e.value if e.identifiable else None, unit=e.unit, ci90=e.ci90 if e.identifiable else None,
+            identifiable=e.identifiable, before=float(was),
         )
-    return result
-
-
-def theta_intervals(fitter: Fitter, fit: Fit) -> dict[str, tuple[float, float]]:
-    """90 % intervals of theta, told or not, the cell's own error in them, and none wider than the prior's."""
-    h = fit.hypothesis
-    space, u, here = h.space, fit.point.z[: h.space.dimension], h.theta(fit.point.z)
-    seen = _t_factor(fit) * np.sqrt(np.diag(fitter.covariance(fit)))
-    intervals = {}
-    for j, name in enumerate(space.names):
-        std = math.hypot(seen[j], cell_error(space, here, j))
-        along = Z90 * min(std, h.std[j]) * np.eye(len(u))[j]
-        low, high = (float(space.from_unit(np.clip(end, 0.0, 1.0))[j]) for end in (u - along, u + along))
-        intervals[name] = (low, high)
-    return intervals
+        for e, was in zip(estimates_of(fitter, fit), before, strict=True)
+    }  # fmt: skip
 
 
 def correlation_of(fitter: Fitter, fit: Fit) -> tuple[tuple[str, ...], Array]:
@@ -162,7 +137,7 @@ def correlation_of(fitter: Fitter, fit: Fit) -> tuple[tuple[str, ...], Array]:
     h, rng = fit.hypothesis, np.random.default_rng(0)
     count = h.simulated
     covariance = fitter.covariance(fit)[:count, :count]
-    moves = rng.multivariate_normal(np.zeros(count), covariance, JOINT_SAMPLES, method="eigh") * _t_factor(fit)
+    moves = rng.multivariate_normal(np.zeros(count), covariance, JOINT_SAMPLES, method="eigh") * t_factor(fit)
     drawn: dict[str, Array] = {f"theta.{name}": moves[:, j] for j, name in enumerate(h.space.names)}
     for k, (part, here) in enumerate(zip(h.parts, h.points(fit.point.z), strict=True)):
         effect = part.kind.at(here, h.around)
@@ -201,7 +176,7 @@ def _informations(found: Found) -> list[float]:
     fitter, fit = found.fitter, found.plain
     n, count = fit.hypothesis.dimension, len(found.columns)
     precision = np.zeros((n + count,) * 2)
-    precision[:n, :n] = np.diag(fit.hypothesis.std**-2.0)
+    precision[:n, :n] = fit.hypothesis.precision
     for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(fit.scatter), strict=True)):
         shared = np.column_stack([push.shared, *(c.pushes[i] for c in found.columns)])
         precision += weighed(push.residual, shared, push.own, prior, fit.loudness, fit.tail).precision
@@ -239,8 +214,3 @@ def _motion(found: Found, column: Column) -> float:
         for w, pushed, f in zip(found.fitter.predictor.whitening, column.pushes, case.features, strict=True)
     ]
     return rms(np.concatenate(poses))
-
-
-def rms(values: Array) -> float:
-    """Root mean square; NaN of nothing."""
-    return float(np.sqrt(np.mean(np.square(values)))) if values.size else math.nan

@@ -11,6 +11,7 @@ from physid_drake.diagnose.decide import Decision
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.search import Found
 from physid_drake.diagnose.values import NextPush
+from physid_drake.identify import Identification
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.pushes.case import Case
 
@@ -22,30 +23,42 @@ class Evidence:
     """What was computed, for the report and the model that leaves.
 
     Attributes:
-        case: the recording.
+        known: what was identified: the recording, and the baseline in the cell.
         found: all hypotheses, on the twin.
         decision: what is said.
         fitter: whose predictions are the cell's.
-        plain: the baseline in the cell.
         best: the hypothesis that was decided on, or comes nearest, in the cell; None where nothing is missing.
-        errors_before: per push (m,), recorded less what the baseline predicts, fitted without that push.
-        errors_after: the same of the best hypothesis; those before where there is none.
+        errors_after: per push (m,), recorded less what the best hypothesis predicts, fitted without that push; of the
+            baseline where there is none.
         errors_partly: the same of effects that take a part away; None where there are none.
         wrenches: what is missing from the baseline, window by window.
         next_push: that would tell rivals apart.
     """
 
-    case: Case
+    known: Identification
     found: Found
     decision: Decision
     fitter: Fitter
-    plain: Fit
     best: Fit | None
-    errors_before: tuple[Array, ...]
     errors_after: tuple[Array, ...]
     errors_partly: tuple[Array, ...] | None = None
     wrenches: tuple[MissingWrench, ...] = ()
     next_push: NextPush | None = None
+
+    @property
+    def case(self) -> Case:
+        """The recording."""
+        return self.known.case
+
+    @property
+    def plain(self) -> Fit:
+        """The baseline in the cell."""
+        return self.known.fit
+
+    @property
+    def errors_before(self) -> tuple[Array, ...]:
+        """Per push (m,), recorded less what the baseline predicts, fitted without that push."""
+        return self.known.errors
 
     @property
     def named(self) -> bool:

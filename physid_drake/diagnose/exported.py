@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.estimates import correlation_of, parameters_of, theta_intervals
+from physid_drake.diagnose.estimates import correlation_of, parameters_of
 from physid_drake.diagnose.evidence import Evidence
+from physid_drake.identify.estimates import estimates_of
 from physid_drake.model import AS_W, Axes, Correlation, Model, turned
 from physid_drake.pushes.problem import HandUse, PushProblem
 
@@ -22,7 +23,7 @@ def model_of(evidence: Evidence) -> Model:
     case, fit, fitter = evidence.case, evidence.leaving, evidence.fitter
     h, spec = fit.hypothesis, case.pool.spec
     # Also of what these pushes do not tell: a drag is known over a mass, and belief in one goes with the other.
-    intervals: dict[str, object] = {f"theta.{n}": list(ends) for n, ends in theta_intervals(fitter, fit).items()}
+    intervals: dict[str, object] = {f"theta.{e.name}": list(e.ci90) for e in estimates_of(fitter, fit)}
     for k, part in enumerate(h.parts if evidence.named else ()):
         intervals |= {f"{part.kind.name}.{name}": p.ci90 for name, p in parameters_of(fitter, fit, k).items()}
     names, matrix = correlation_of(fitter, fit)

@@ -10,81 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.diagnose.proposals import Proposal, proposals
-from physid_drake.effects import Effect, tolerated
+from physid_drake.effects import Effect
 from physid_drake.effects.unnamed import UnnamedForce
-from physid_drake.errors import RecordingError
+from physid_drake.identify.baseline import LAST, fitted_at
 from physid_drake.inference.fit import Fit, Fitter
-from physid_drake.inference.hypothesis import Hypothesis, Part
-from physid_drake.inference.predictions import Physics
+from physid_drake.inference.hypothesis import Part
 from physid_drake.inference.push import TAIL
 from physid_drake.inference.scores import Column, columns, scores
-from physid_drake.inference.seats import reseated
 
 Array = NDArray[np.float64]
 
-CANDIDATES, STARTS = 64, 4  # points of theta that are looked at, and from which the baseline is fitted
-FIRST, SECOND, LAST = 2, 4, 8  # steps of a fit before the halvings, and after them
+FIRST, SECOND = 2, 4  # steps of a fit before the halvings
 FINALISTS = 8
 BESIDE = 12  # families of score tests beside a single effect
-RESEATINGS, WORTH = 3, 1.0  # at most, while one gains so much log likelihood
-
-
-def baseline(fitter: Fitter, hypothesis: Hypothesis, rng: np.random.Generator) -> Fit:
-    """The model without effects, fitted from the best of many starts.
-
-    Raises:
-        RecordingError: if none of them can be rolled out.
-    """
-    space = hypothesis.space
-    drawn = [np.asarray(space.to_unit(theta)) for theta in space.sample(rng, CANDIDATES - 1, from_prior=True)]
-    zs = [hypothesis.mean, *(np.clip(z, *hypothesis.bounds) for z in drawn)]
-    points = fitter.points([hypothesis] * len(zs), zs, [fitter.at_rest()] * len(zs))
-    best = sorted((p for p in points if p is not None), key=fitter.roughly)[:STARTS]
-    if not best:
-        name = fitter.case.recording.name
-        raise RecordingError(f"recording '{name}': at no theta that was tried can all of its pushes be simulated.")
-    fits = fitter.fitted(fitter.started([hypothesis] * len(best), best, [None] * len(best)), LAST)
-    fits = fitter.fitted(fitter.renewed(fitter.robust(fits)), LAST)
-    return settled(fitter, max(fits, key=lambda f: f.log_likelihood), rng)
-
-
-def settled(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
-    """The fit with each push on the better of its ways, fitted again while that helps."""
-    for _ in range(RESEATINGS):
-        again = fitter.fitted([reseated(fitter, fit, rng).again()], LAST)[0]
-        gained = again.log_likelihood - fit.log_likelihood
-        fit = again if gained > 0.0 else fit
-        if gained < WORTH:
-            break
-    return fit
-
-
-def with_tolerances(fitter: Fitter, fit: Fit, kinds: Sequence[type[Effect]]) -> tuple[Fit, list[Column]]:
-    """The model with what pushes may differ by without its being physics, and the columns of effects beside it.
-
-    Each push's hand path has the errors that its stream's noise allows; all share slight errors of size, pressure,
-    centre and clocks.
-    """
-    h, predictor = fit.hypothesis, fitter.predictor
-    predictor.with_directions(predictor.path_errors(fit.point.own, Physics(h.theta(fit.point.z))))
-    fit = _at(fitter, h, fit.point.z, fit)
-    every = columns(fitter, fit, list(dict.fromkeys((*kinds, *tolerated(fitter.case.around)))))
-    slight = [c for c in every if c.coordinate.tolerance > 0.0 and c.family.size == 1.0]
-    fitter.shared_by_all([
-        np.column_stack([np.zeros((len(y), 0)), *(c.coordinate.tolerance * c.pushes[i] for c in slight)])
-        for i, y in enumerate(predictor.recorded)
-    ])  # fmt: skip
-    h = dc.replace(h, tolerances=len(slight))
-    return _at(fitter, h, np.concatenate([fit.point.z, np.zeros(len(slight))]), fit), [
-        c for c in every if c.kind in kinds
-    ]
-
-
-def _at(fitter: Fitter, h: Hypothesis, z: Array, near: Fit) -> Fit:
-    """A hypothesis fitted from a point that can be rolled out."""
-    point = fitter.points([h], [z], [near.point.own])[0]
-    assert point is not None
-    return fitter.fitted(fitter.started([h], [point], [None], TAIL), LAST)[0]
 
 
 def with_one_more(fitter: Fitter, fit: Fit, found: Sequence[Column]) -> list[Fit]:
@@ -115,7 +53,7 @@ def freed(fitter: Fitter, fit: Fit) -> Fit:
     more, d = dc.replace(h, parts=parts), h.space.dimension
     effects = [x for part in parts for x in part.point]
     z = np.concatenate([fit.point.z[:d], effects, fit.point.z[h.simulated :]])
-    again = _at(fitter, more, z, fit)
+    again = fitted_at(fitter, more, z, fit)
     return again if again.log_likelihood > fit.log_likelihood else fit
 
 

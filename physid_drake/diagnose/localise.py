@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.inference.fit import Fit, Fitter, slope
-from physid_drake.inference.predictions import Ask, Physics
 from physid_drake.inference.push import NO_TAIL, weighed
+from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.pushes.case import Case
 from physid_drake.twin.twin import Wander
 

@@ -15,13 +15,12 @@ from physid_drake.cell import HandPath, Start
 from physid_drake.cell.solid import solid_of
 from physid_drake.diagnose.exported import hand_frame
 from physid_drake.diagnose.values import NextPush
-from physid_drake.inference.predictions import Physics
+from physid_drake.inference.rollouts import Ask, Physics, Rollouts
 from physid_drake.model import turned
 from physid_drake.pushes.case import Case
 from physid_drake.pushes.frames import reach_of
 from physid_drake.pushes.problem import PushProblem
-from physid_drake.pushes.rollouts import TWIN, RolloutPool
-from physid_drake.pushes.task import Task
+from physid_drake.pushes.rollouts import RolloutPool
 
 Array = NDArray[np.float64]
 
@@ -49,22 +48,15 @@ def next_push(case: Case, models: Sequence[Physics]) -> NextPush | None:
     if len(models) < 2 or case.recording.hand is None:
         return None
     pushes = [_problem(case, *choice) for choice in _choices()]
-    pool = brisk_pool(case)
-    tasks = []
-    for model in models:
-        for problem in pushes:
-            nuisance = case.nuisances[0]
-            tasks.append(
-                Task(
-                    problem=problem,
-                    theta=model.theta,
-                    nuisance=nuisance,
-                    values=np.zeros(len(nuisance.names)),
-                    effects=model.effects,
-                )
-            )
-    ends = [None if p is None else p.poses[-1] for p in pool.run(tasks)]
-    case.pool.count += pool.count
+    nuisance = case.nuisances[0]
+    rest = np.zeros(len(nuisance.names))
+    twin = Rollouts(brisk_pool(case), pushes, [nuisance] * len(pushes))
+    asks = [Ask(k, model, rest) for model in models for k in range(len(pushes))]
+    found = twin.predictions(asks)
+    left = [k for k, one in enumerate(found) if one is None]
+    for k, one in zip(left, twin.in_cell(twin.pool).predictions([asks[k] for k in left]), strict=True):
+        found[k] = one
+    ends = [None if one is None else one.poses[-1] for one in found]
     chances = [_chance(case, ends[k :: len(pushes)], pushes[k]) for k in range(len(pushes))]
     best = int(np.argmax(chances))
     if chances[best] == -math.inf:
@@ -79,13 +71,11 @@ def next_push(case: Case, models: Sequence[Physics]) -> NextPush | None:
 
 
 def brisk_pool(case: Case) -> RolloutPool:
-    """A pool like the case's, of the twin; where that does not know what happens, a cell for a fast hand does."""
+    """A pool like the case's, for a fast hand."""
     spec = case.pool.spec
     share = min(1.0, LONGEST_TICK / spec.config.solver.time_step_s)
     config = dc.replace(spec.config, solver=spec.config.solver.scaled(share))
-    pool = case.pool.of(dc.replace(spec, config=config))
-    pool.integrator = TWIN
-    return pool
+    return case.pool.of(dc.replace(spec, config=config))
 
 
 def _choices() -> list[tuple[float, float, float]]:

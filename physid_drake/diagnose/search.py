@@ -9,20 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from physid_drake.diagnose.hypotheses import (
-    baseline,
-    each_alone,
-    freed,
-    settled,
-    unnamed,
-    with_one_more,
-    with_tolerances,
-    with_two,
-)
+from physid_drake.diagnose.hypotheses import each_alone, freed, unnamed, with_one_more, with_two
 from physid_drake.effects import Effect
+from physid_drake.identify.baseline import settled
 from physid_drake.identify.identify import MOST_SCATTER
 from physid_drake.inference.fit import Fit, Fitter
-from physid_drake.inference.hypothesis import Hypothesis
 from physid_drake.inference.replicates import gains_by_chance, p_value
 from physid_drake.inference.scores import Column, columns
 from physid_drake.progress import Progress
@@ -92,25 +83,34 @@ class Found:
     left_gain: float
     unnamed: tuple[Weighed, ...]
 
+    @property
+    def richest(self) -> Fit:
+        """The likeliest fit of all that was looked at."""
+        return max(
+            [self.plain, *(one.fit for one in (*self.named, *self.unnamed))], key=lambda fit: fit.log_likelihood
+        )
 
-def searched(fitter: Fitter, kinds: Sequence[type[Effect]], *, seed: int, alpha: float, tick: Progress) -> Found:
-    """Fit the baseline, effects, pairs of them where one leaves something, and physics without a name.
+
+def searched(
+    fitter: Fitter, plain: Fit, kinds: Sequence[type[Effect]], *, seed: int, alpha: float, tick: Progress
+) -> Found:
+    """Fit effects, pairs of them where one leaves something, and physics without a name.
 
     Args:
         fitter: of the recording.
+        plain: the baseline.
         kinds: of effects that may be in it.
         seed: of all that is drawn.
         alpha: a p-value below which something is missing.
         tick: told the stage.
     """
-    rng, case = np.random.default_rng(seed), fitter.case
+    rng = np.random.default_rng(seed)
 
     def polished(fit: Fit) -> Fit:
         return settled(fitter, freed(fitter, fit), rng)
 
-    tick("baseline", 0, 0)
-    plain = baseline(fitter, Hypothesis(space=case.thetas.space, around=case.around), rng)
-    plain, found = with_tolerances(fitter, plain, kinds)
+    tick("is anything missing?", 0, 0)
+    found = columns(fitter, plain, kinds)
     seen, by_chance = gains_by_chance(fitter, plain, found, rng)
     p = p_value(seen, by_chance)
     before = fitter.held_out(plain)

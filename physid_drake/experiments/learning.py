@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from physid_drake.cell import CellConfig, SolverConfig
-from physid_drake.identify import Identifier
-from physid_drake.identify.config import SearchConfig
+from physid_drake.inference.predictions import Predictor
+from physid_drake.inference.rollouts import Ask, Physics
+from physid_drake.pushes.case import UNIT_SCATTER, case_of
 from physid_drake.pushes.config import ThetaConfig
-from physid_drake.pushes.misfit import FAILED, whitened_residual
-from physid_drake.pushes.nuisance import FIRST_SCATTER, nuisance_of
-from physid_drake.pushes.prediction import Prediction
+from physid_drake.pushes.nuisance import nuisance_of
 from physid_drake.pushes.problem import PushProblem
 from physid_drake.pushes.task import Task
 from physid_drake.recording import Recording
@@ -36,6 +35,7 @@ SEARCHES: Final[Mapping[str, Callable[[], Search]]] = {
 METHODS: Final = (GREEDY, RANDOM, LEAST_SQUARES, ENTROPY)
 CANDIDATES: Final = 1000
 AS_IN_THE_PAPER: Final = ThetaConfig(bounds={"mass": [0.1, 0.9]})  # kg
+FAILED: Final = 1e4  # standard deviations: of a rollout that diverged, in all that is compared
 _STEP = 0.01  # of the unit cube, for differences
 
 
@@ -68,11 +68,9 @@ class Learner:
     """The pushes of a recording, and how well a theta explains some of them.
 
     Attributes:
-        config: of the cell.
+        case: the pushes, ready, in this process.
         problems: the pushes.
         thetas: what is unknown, and the body that a theta describes.
-        noise: of the recording.
-        pool: makes the rollouts, in this process.
     """
 
     def __init__(
@@ -93,21 +91,26 @@ class Learner:
         """
         solver = SolverConfig(time_step_s=tick_s, slide_time_step_s=max(tick_s, 2e-3))
         self.config = config or CellConfig(solver=solver)
-        identifier = Identifier(
-            recording, cell=self.config, theta=theta or AS_IN_THE_PAPER, search=SearchConfig(jobs=1),
-            held_out_share=0.0, seed=0,
-        )  # fmt: skip
-        self.problems: tuple[PushProblem, ...] = identifier.problems
-        self.thetas, self.noise, self.pool = identifier.thetas, identifier.noise, identifier.pool
+        count = len(recording.pushes)
+        self.case = case_of(recording, self.config, theta or AS_IN_THE_PAPER, jobs=1, most=count)
+        self.problems, self.thetas = self.case.problems, self.case.thetas
+        self._places = {problem.name: i for i, problem in enumerate(self.problems)}
+        self._predictor = Predictor(
+            self.case, range(count)
+        )  # as in the paper: every trial is a rollout of the engine
 
-    def predictions(self, problems: Sequence[PushProblem], theta: Array) -> list[Prediction | None]:
-        """Rollouts of some pushes with theta (d,); None where one diverged."""
-        return self.pool.run([plain_task(problem, theta) for problem in problems])
+    def errors(self, problems: Sequence[PushProblem], theta: Array) -> list[Array | None]:
+        """Recorded less predicted (m_i,) of some pushes, in units of the noise; None where a rollout diverged."""
+        at = [self._places[problem.name] for problem in problems]
+        asks = [Ask(i, Physics(theta), np.zeros(len(self.case.nuisances[i].names))) for i in at]
+        pairs = zip(at, self._predictor.vectors(asks), strict=True)
+        return [None if seen is None else self._predictor.recorded[i] - seen for i, seen in pairs]
 
     def residuals(self, problems: Sequence[PushProblem], theta: Array) -> Array:
         """Residuals (m,) of some pushes in standard deviations; large ones where a rollout diverged."""
-        pairs = zip(problems, self.predictions(problems, theta), strict=True)
-        return np.concatenate([whitened_residual(problem, self.noise, seen) for problem, seen in pairs])
+        sizes = [len(self._predictor.recorded[self._places[problem.name]]) for problem in problems]
+        pairs = zip(self.errors(problems, theta), sizes, strict=True)
+        return np.concatenate([np.full(size, FAILED) if one is None else one for one, size in pairs])
 
     def misfit(self, residuals: Array) -> float:
         """Log of the rms of residuals (m,); inf where a rollout diverged."""
@@ -117,9 +120,10 @@ class Learner:
 
     def end_errors(self, problems: Sequence[PushProblem], theta: Array) -> EndErrors:
         """Errors of the last pose."""
+        seen = self.case.pool.run([plain_task(problem, theta) for problem in problems])
         ends = [
             np.full(3, np.inf) if r is None else r.poses[-1] - p.poses[-1]
-            for p, r in zip(problems, self.predictions(problems, theta), strict=True)
+            for p, r in zip(problems, seen, strict=True)
         ]
         x, y, yaw = np.array(ends).T
         return EndErrors(positions=np.hypot(x, y), rotations=np.abs(yaw))
@@ -226,5 +230,5 @@ class _SpentError(Exception):
 
 def plain_task(problem: PushProblem, theta: Array) -> Task:
     """A rollout of a push with theta (d,), its own unknowns at their most likely values."""
-    nuisance = nuisance_of(problem, FIRST_SCATTER)
+    nuisance = nuisance_of(problem, UNIT_SCATTER)
     return Task(problem=problem, theta=theta, nuisance=nuisance, values=np.zeros(len(nuisance.names)))

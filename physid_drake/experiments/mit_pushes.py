@@ -280,7 +280,7 @@ class PublishedPushes:
         theta = ThetaConfig(parameters=["hand_friction"], nominal={"support_friction": SUPPORT_FRICTION})
         config = CellConfig(solver=SolverConfig(time_step_s=TICK, slide_time_step_s=TICK))
         learner = Learner(recording, theta=theta, config=config)
-        self._spec, self._thetas = learner.pool.spec, learner.thetas
+        self._spec, self._thetas = learner.case.pool.spec, learner.thetas
         self.problems = tuple(played(problem, PLAYED_SPEED) for problem in learner.problems)
         self.published = _published(source, recording)
         support = support_of(solid_of(recording.object.shape).underside, FrictionGrid(), 100)

@@ -32,7 +32,7 @@ from physid_drake.experiments.worlds import (
     draw_world,
     record_pushes,
 )
-from physid_drake.identify.linearise import prior_slope
+from physid_drake.identify.baseline import plain
 from physid_drake.plan import most_informative_push
 from physid_drake.policies import PlannedPush
 from physid_drake.progress import Progress
@@ -101,8 +101,7 @@ class NextPush:
         tester = Learner(tests, tick_s=self.tick_s, theta=config)
         learner, made = tester, list[Push]()
         theta = np.asarray(tester.thetas.space.nominal)
-        slope = prior_slope(tester.thetas.space)
-        information = slope.T @ slope
+        information = plain(tester.case).precision
         found: dict[str, list[float]] = {"support_friction": [], "hand_friction": [], "mm": [], "deg": []}
         for number, offer in enumerate(offers):
             tick(f"{name}: push {number + 1}", number, len(offers))
@@ -156,9 +155,7 @@ class NextPush:
 def most_informative(learner: Learner, theta: Array, information: Array, offer: Offer) -> tuple[int, Array]:
     """The push that is expected to teach most."""
     pose, pushes = offer
-    lesson = most_informative_push(
-        pushes, pool=learner.pool, noise=learner.noise, start=pose, thetas=theta, information=information
-    )
+    lesson = most_informative_push(pushes, case=learner.case, start=pose, thetas=theta, information=information)
     return lesson.best, information + lesson.informations[lesson.best]
 
 

@@ -1,4 +1,4 @@
-"""Friction that differs from cell to cell: a prior that ties neighbours, and what pushes tell of the cells."""
+"""Friction that differs from cell to cell: what pushes tell of the cells."""
 
 from __future__ import annotations
 
@@ -9,58 +9,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.spatial.distance import cdist
 
-from physid_drake.cell.outline import Outline
-from physid_drake.errors import ConfigError
-from physid_drake.identify.polish import Polished
-from physid_drake.pushes.config import ThetaConfig
+from physid_drake.identify.estimates import TOLD
 from physid_drake.pushes.theta import ThetaMap, friction_names
 
 Array = NDArray[np.float64]
-
-LEVEL_STD = 1.0  # of ln friction, common to all cells: about what bounds of 0.02 and 1.2 leave open
-TOLD = 0.5  # share of the prior's standard deviation that may be left of what counts as told
-
-
-def tied_cells(thetas: ThetaMap, outline: Outline, config: ThetaConfig) -> ThetaMap:
-    """The same parameters with a prior under which neighbouring cells have about the same friction.
-
-    ln friction is a level that all cells share plus a Gaussian process over the underside, whose correlation falls
-    with the distance of the cells' centres as exp(-distance / length): on a line, a Markov process.
-
-    Args:
-        thetas: the parameters; without a grid they are returned as they are.
-        outline: of the object, over whose box the grid lies.
-        config: ``cell_spread`` and ``cell_length``.
-
-    Raises:
-        ConfigError: if one of the two is not above 0.
-    """
-    if not (config.cell_spread > 0.0 and config.cell_length > 0.0):
-        raise ConfigError(
-            f"theta: cell_spread and cell_length must be above 0, but are {config.cell_spread:g} and"
-            f" {config.cell_length:g}."
-        )
-    names = friction_names(thetas.cells)
-    space = thetas.space
-    places = {name: k for k, name in enumerate(names) if name in space.names}
-    if len(names) == 1 or not places:
-        return thetas
-    low_x, low_y, high_x, high_y = outline.extent()
-    size = np.array([high_x - low_x, high_y - low_y])
-    index = np.array(list(itertools.product(range(thetas.cells[0]), range(thetas.cells[1]))))
-    centres = (index + 0.5) / thetas.cells * size
-    decay = np.exp(-cdist(centres, centres) / (config.cell_length * size.max()))
-    std = math.hypot(LEVEL_STD, config.cell_spread)
-    tie = (LEVEL_STD**2 + config.cell_spread**2 * decay) / std**2
-    np.fill_diagonal(tie, 1.0)
-    correlation = np.eye(space.dimension)
-    for a, b in itertools.product(places, places):
-        correlation[space.index(a), space.index(b)] = tie[places[a], places[b]]
-    parameters = tuple(dc.replace(p, prior_std=std) if p.name in places else p for p in space.parameters)
-    rows = tuple(map(tuple, correlation.tolist()))
-    return dc.replace(thetas, space=dc.replace(space, parameters=parameters, correlation=rows))
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -111,10 +64,14 @@ class CellsTold:
         return sum(c.told for c in self.combinations)
 
 
-def cells_told(thetas: ThetaMap, polished: Polished) -> CellsTold | None:
+def cells_told(thetas: ThetaMap, theta: Array, prior: Array, posterior: Array) -> CellsTold | None:
     """What a fit tells about the cells; None without a grid.
 
-    Only the curvature of the cost counts, with the noise widened where the fit is worse than the noise.
+    Args:
+        thetas: the parameters.
+        theta: (d,) the estimate.
+        prior: covariance (d, d) before any push, in the unit cube.
+        posterior: after them.
 
     Source: the generalised eigenvalues of posterior against prior covariance; A. Spantini et al., "Optimal low-rank
     approximations of Bayesian linear inverse problems", SIAM J. Sci. Comput. 37, 2015.
@@ -124,12 +81,9 @@ def cells_told(thetas: ThetaMap, polished: Polished) -> CellsTold | None:
     if thetas.cells == (1, 1) or not grid:
         return None
     at = [space.index(name) for name in grid]
-    rows = polished.jacobian[-space.dimension :]
-    prior = np.linalg.inv(rows.T @ rows)[np.ix_(at, at)]
-    posterior = np.linalg.inv(polished.jacobian.T @ polished.jacobian)[np.ix_(at, at)]
     # In ln friction: the cube's coordinate is linear in it, over widths that bounds may make unequal.
     widths = np.array([math.log(space.upper[k] / space.lower[k]) for k in at])
-    prior, posterior = widths[:, None] * prior * widths, widths[:, None] * posterior * widths
+    prior, posterior = (widths[:, None] * c[np.ix_(at, at)] * widths for c in (prior, posterior))
     shares, vectors = eigh(posterior, prior)
     left = np.sqrt(np.clip(shares, 1e-16, 1.0))
     apart: list[tuple[str, str]] = []
@@ -143,7 +97,7 @@ def cells_told(thetas: ThetaMap, polished: Polished) -> CellsTold | None:
     return CellsTold(
         grid=thetas.cells,
         names=tuple(grid),
-        friction=np.asarray(polished.theta[at]),
+        friction=np.asarray(theta[at]),
         left=np.sqrt(np.diag(posterior) / np.diag(prior)),
         combinations=tuple(
             Combination(weights=_signed(v), strength=math.sqrt(1.0 / s**2 - 1.0), left=float(s))

@@ -2,6 +2,8 @@
 
 import dataclasses as dc
 
+INTEGRATORS = ("twin", "cell")
+
 
 @dc.dataclass
 class SearchConfig:
@@ -16,10 +18,9 @@ class SearchConfig:
         patience: over so many updates.
         refine_every: trials after which the candidates gather where the best theta may be; 0 keeps one fixed set.
         jobs: processes; 0 takes the machine's cores.
-        integrator: ``cell`` simulates every trial in Drake; ``twin`` in the compiled planar image of the cell,
-            many times faster, and in Drake what that does not know.
-        online: learn from one push after another, with a small search for each, instead of from all at once. Every
-            push is learned from, none is held out.
+        integrator: ``twin`` simulates every trial of the search in the compiled planar image of the cell, and in
+            Drake what that does not know; ``cell`` all of them in Drake, which takes a hundred times as long.
+        online: learn from one push after another, with a small search for each, instead of from all at once.
     """
 
     method: str = "greedy_entropy"
@@ -30,5 +31,5 @@ class SearchConfig:
     patience: int = 5
     refine_every: int = 5
     jobs: int = 0
-    integrator: str = "cell"
+    integrator: str = "twin"
     online: bool = False

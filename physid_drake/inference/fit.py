@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from physid_drake.inference.bounded import bounded
 from physid_drake.inference.hypothesis import Hypothesis
-from physid_drake.inference.predictions import Ask, Physics, Predictor
+from physid_drake.inference.predictions import Predictor
 from physid_drake.inference.push import (
     NO_TAIL,
     TAIL,
@@ -23,6 +23,7 @@ from physid_drake.inference.push import (
     weighed,
     without,
 )
+from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.inference.scatter import SCATTERS, log_prior_of_scatter
 from physid_drake.pushes.case import Case
 
@@ -86,8 +87,19 @@ class Fit:
     def log_likelihood(self) -> float:
         """Marginal over the pushes' unknowns, with the priors of z and scatter."""
         z, h = self.point.z, self.hypothesis
-        prior = -0.5 * float(np.sum(((z - h.mean) / h.std) ** 2)) + log_prior_of_scatter(self.scatter)
+        prior = -0.5 * h.surprise(z) + log_prior_of_scatter(self.scatter)
         return sum(one.log_density for one in self.weighed) + prior
+
+    @property
+    def degrees(self) -> int:
+        """Residuals less shared parameters, at least 1."""
+        return max(1, sum(len(push.residual) for push in self.pushes) - self.hypothesis.simulated)
+
+    @property
+    def reduced_chi2(self) -> float:
+        """Squares that are left, in units of noise, with what the priors cost, per degree of freedom."""
+        squares = self.hypothesis.surprise(self.point.z) + sum(one.square for one in self.weighed)
+        return squares / self.degrees
 
     def again(self) -> Fit:
         """The fit, to be stepped on from."""
@@ -140,7 +152,7 @@ class Fitter:
 
     def cost(self, hypothesis: Hypothesis, point: Point, scatter: float, loudness: float, tail: float) -> float:
         """Twice the negative log posterior of z and the pushes' unknowns, but for a constant."""
-        total = float(np.sum(((point.z - hypothesis.mean) / hypothesis.std) ** 2))
+        total = hypothesis.surprise(point.z)
         for i, prior in enumerate(self.priors(scatter)):
             total += self.cost_of_push(i, point.own[i], point.predicted[i], prior, loudness, tail)
         return total
@@ -257,7 +269,7 @@ class Fitter:
             for k in (best - 1, best, best + 1):
                 if 0 <= k < len(SCATTERS) and k not in values:
                     found = self._weighed(pushes, SCATTERS[k], loudness, tail)
-                    precision, right = normal_equations(found, h.mean - point.z, h.std)
+                    precision, right = normal_equations(found, h.mean - point.z, h.precision)
                     gained = 0.5 * float(right @ bounded(precision, right, None))  # when z has moved
                     likelihood = sum(one.log_density for one in found)
                     values[k] = likelihood + gained + log_prior_of_scatter(SCATTERS[k]), found
@@ -323,7 +335,7 @@ class Fitter:
     def step(self, fit: Fit) -> tuple[Array, Own]:
         """Where a damped Gauss-Newton step leads, within bounds."""
         h, point = fit.hypothesis, fit.point
-        precision, right = normal_equations(fit.weighed, h.mean - point.z, h.std)
+        precision, right = normal_equations(fit.weighed, h.mean - point.z, h.precision)
         damped = precision + np.diag(fit.damping * np.diag(precision))
         reach = self._reach(h)
         least, most = np.maximum(h.bounds[0] - point.z, -reach), np.minimum(h.bounds[1] - point.z, reach)
@@ -342,17 +354,17 @@ class Fitter:
         """
         h = fit.hypothesis
         scores = held_out(
-            fit.pushes, self.priors(fit.scatter), h.mean - fit.point.z, h.std, fit.loudness, fit.weighed, fit.tail,
-            folds,
+            fit.pushes, self.priors(fit.scatter), h.mean - fit.point.z, h.precision, fit.loudness, fit.weighed,
+            fit.tail, folds,
         )  # fmt: skip
-        known = h.known
-        cost = 0.5 * float(np.sum(((fit.point.z - h.mean) / h.std)[known] ** 2)) - log_prior_of_scatter(fit.scatter)
+        known = (h.whitening @ (fit.point.z - h.mean))[h.known]
+        cost = 0.5 * float(known @ known) - log_prior_of_scatter(fit.scatter)
         return np.asarray(scores - cost / len(scores))
 
     def without(self, fit: Fit, push: int) -> Array:
         """Where z (n,) is likeliest for all pushes but one, within bounds and no further than a step goes."""
         h = fit.hypothesis
-        dz, _ = without([push], h.mean - fit.point.z, h.std, fit.weighed)
+        dz, _ = without([push], h.mean - fit.point.z, h.precision, fit.weighed)
         reach = self._reach(h)
         return np.clip(fit.point.z + np.clip(dz, -reach, reach), *h.bounds)
 
@@ -371,16 +383,16 @@ class Fitter:
     def covariance(self, fit: Fit) -> Array:
         """Of z (n, n), the pushes' unknowns integrated out."""
         h = fit.hypothesis
-        precision, _ = normal_equations(fit.weighed, h.mean - fit.point.z, h.std)
+        precision, _ = normal_equations(fit.weighed, h.mean - fit.point.z, h.precision)
         return np.asarray(np.linalg.pinv(precision))
 
 
-def normal_equations(found: Sequence[Weighed], mean: Array, std: Array) -> tuple[Array, Array]:
-    """Precision (n, n) of dz, and precision times estimate (n,), with its prior."""
-    precision = sum((one.precision for one in found), np.diag(std**-2.0))
-    right = sum((one.right for one in found), mean * std**-2.0)
-    ridge = 1e-12 * float(np.trace(precision)) * np.eye(len(right))
-    return np.asarray(precision + ridge), np.asarray(right)
+def normal_equations(found: Sequence[Weighed], mean: Array, precision: Array) -> tuple[Array, Array]:
+    """Precision (n, n) of dz, and precision times estimate (n,), with a prior of such a mean and precision."""
+    whole = sum((one.precision for one in found), precision)
+    right = sum((one.right for one in found), precision @ mean)
+    ridge = 1e-12 * float(np.trace(whole)) * np.eye(len(right))
+    return np.asarray(whole + ridge), np.asarray(right)
 
 
 def own_steps(own: Array) -> list[Array]:

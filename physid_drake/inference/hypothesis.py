@@ -81,6 +81,25 @@ class Hypothesis:
             [self.space.prior_std_unit, [c.std for c in self.coordinates], np.ones(self.tolerances)]
         )
 
+    @cached_property
+    def whitening(self) -> Array:
+        """What (n, n) takes z less its mean to independent numbers of unit variance; 0 where nothing is known."""
+        d = self.space.dimension
+        made = np.diag(1.0 / self.std)
+        if self.space.correlation:
+            covariance = np.array(self.space.correlation) * np.outer(self.std[:d], self.std[:d])
+            made[:d, :d] = np.linalg.inv(np.linalg.cholesky(covariance))
+        return made
+
+    @cached_property
+    def precision(self) -> Array:
+        """Of the prior (n, n)."""
+        return np.asarray(self.whitening.T @ self.whitening)
+
+    def surprise(self, z: Array) -> float:
+        """Twice the negative log prior density of z (n,), but for a constant."""
+        return float(np.sum((self.whitening @ (z - self.mean)) ** 2))
+
     @property
     def known(self) -> Index:
         """Indices in z of what something is known of beforehand: theta and the tolerances."""

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 TAIL = 15.0  # degrees of freedom of a push's noise
 NO_TAIL = 1e6  # of noise that is normal
+TOO_ALIKE = 1e-10  # of information about coordinates that act alike, as a share of that about each: less is rounding
 WEIGHINGS = 5  # rounds in which a push's weight and unknowns find each other
 
 
@@ -129,7 +130,7 @@ def held_out(
     pushes: Sequence[LinearPush],
     priors: Sequence[Array],
     mean: Array,
-    std: Array,
+    precision: Array,
     loudness: float,
     found: Sequence[Weighed],
     tail: float = TAIL,
@@ -141,7 +142,7 @@ def held_out(
         pushes: linearised at the fitted z.
         priors: (k,) of each push's unknowns.
         mean: (n,) of the prior of dz.
-        std: (n,).
+        precision: (n, n) of it.
         loudness: of the pushes.
         found: the pushes, weighed.
         tail: degrees of freedom of their errors.
@@ -149,7 +150,7 @@ def held_out(
     """
     scores = np.zeros(len(pushes))
     for fold in [[i] for i in range(len(pushes))] if folds is None else folds:
-        dz, root = without(fold, mean, std, found)
+        dz, root = without(fold, mean, precision, found)
         for i in fold:
             push = pushes[i]
             scores[i] = weighed(
@@ -160,11 +161,13 @@ def held_out(
     return scores
 
 
-def without(fold: Sequence[int], mean: Array, std: Array, found: Sequence[Weighed]) -> tuple[Array, Array]:
+def without(fold: Sequence[int], mean: Array, precision: Array, found: Sequence[Weighed]) -> tuple[Array, Array]:
     """What all pushes but some say of dz: estimate (n,), and a root (n, n) of its covariance."""
     kept = [one for i, one in enumerate(found) if i not in fold]
-    information = sum((one.precision for one in kept), np.diag(std**-2.0))
-    right = sum((one.right for one in kept), mean * std**-2.0)
-    information = information + 1e-10 * np.trace(information) / max(1, len(right)) * np.eye(len(right))
-    root = np.linalg.cholesky(np.linalg.inv(0.5 * (information + information.T)))
+    information = sum((one.precision for one in kept), precision)
+    right = sum((one.right for one in kept), precision @ mean)
+    # In units in which each coordinate alone is known to one: theirs are far apart.
+    scale = np.diag(information) ** -0.5
+    values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
+    root = scale[:, None] * vectors / np.sqrt(np.maximum(values, TOO_ALIKE))
     return root @ (root.T @ right), root

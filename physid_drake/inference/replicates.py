@@ -112,43 +112,41 @@ class _Table:
         self, fitter: Fitter, fit: Fit, found: Sequence[Column], drawn: Sequence[Array], scatter: float
     ) -> None:
         self.found, self.n = found, fit.hypothesis.dimension
-        self.std = np.concatenate([fit.hypothesis.std, [c.coordinate.std for c in found]])
-        self.known, self.off = fit.hypothesis.known, fit.point.z - fit.hypothesis.mean
+        self.h, self.off = fit.hypothesis, fit.point.z - fit.hypothesis.mean
+        self.prior = np.diag(np.concatenate([np.zeros(self.n), [c.coordinate.std**-2.0 for c in found]]))
+        self.prior[: self.n, : self.n] = self.h.precision
         self.log_prior = log_prior_of_scatter(scatter)
-        self.precisions, self.rights, self.squares, self.log_dets = [], [], [], []
-        for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(scatter), strict=True)):
-            shared = np.column_stack([push.shared, *(c.pushes[i] for c in found)])
-            own = push.own * prior
-            factor = cho_factor(np.eye(len(own)) / fit.weighed[i].weight + own @ own.T, lower=True)
-            solved = cho_solve(factor, shared)
-            self.precisions.append(shared.T @ solved)
-            self.rights.append(solved.T @ drawn[i])
-            self.squares.append(np.einsum("ij,ij->j", drawn[i], cho_solve(factor, drawn[i])))
-            self.log_dets.append(2.0 * float(np.log(np.diag(factor[0])).sum()))
+        made = [
+            _equations(np.column_stack([push.shared, *(c.pushes[i] for c in found)]), push.own * prior,
+                       fit.weighed[i].weight, drawn[i])
+            for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(scatter), strict=True))
+        ]  # fmt: skip
+        self.precisions, self.rights, self.squares, self.log_dets = map(np.array, zip(*made, strict=True))
 
     def scored(self, members: Sequence[int]) -> tuple[Array, Array]:
         """Log likelihood and sum of held-out log densities (r,) of the model with some of the columns.
 
         Where the only coordinate of a family would go below its bound, it is none.
         """
-        index = [*range(self.n), *(self.n + j for j in members)]
-        blocks, rights = [p[np.ix_(index, index)] for p in self.precisions], [r[index] for r in self.rights]
-        whole, right = sum(blocks, np.diag(self.std[index] ** -2.0)), sum(rights, np.zeros_like(rights[0]))
+        index = np.array([*range(self.n), *(self.n + j for j in members)], dtype=np.intp)
+        blocks, rights = self.precisions[:, index[:, None], index], self.rights[:, index]
+        whole, right = self.prior[np.ix_(index, index)] + blocks.sum(axis=0), rights.sum(axis=0)
         whole = whole + 1e-12 * float(np.trace(whole)) * np.eye(len(index))
         # Of replicates the fitted model is true, and what is known beforehand is about it.
-        right[: self.n, 0] -= self.off / self.std[: self.n] ** 2
-        beta, log_det = np.linalg.solve(whole, right), np.linalg.slogdet(whole)[1]
-        value = self.log_prior + 0.5 * (_dot(right, beta) - sum(self.squares) - sum(self.log_dets))
-        known = self.known
-        off = beta[known].copy()
-        off[:, 0] += self.off[known]
-        held = self.log_prior - 0.5 * ((off / self.std[known, None]) ** 2).sum(axis=0)
-        for block, r, square, own in zip(blocks, rights, self.squares, self.log_dets, strict=True):
-            others = whole - block
-            b = np.linalg.solve(others, right - r)
-            left = r - block @ b
-            held -= 0.5 * (square - _dot(b, 2.0 * r - block @ b) - _dot(left, np.linalg.solve(whole, left)))
-            held -= 0.5 * (own + log_det - np.linalg.slogdet(others)[1])
+        right[: self.n, 0] -= self.h.precision @ self.off
+        inverse, log_det = np.linalg.inv(whole), np.linalg.slogdet(whole)[1]
+        beta = inverse @ right
+        value = self.log_prior + 0.5 * (_dot(right, beta) - self.squares.sum(axis=0) - self.log_dets.sum())
+        off = beta[: self.n].copy()
+        off[:, 0] += self.off
+        held = self.log_prior - 0.5 * ((self.h.whitening @ off)[self.h.known] ** 2).sum(axis=0)
+        # Each push, given the others.
+        others = whole - blocks
+        b = np.linalg.solve(others, right - rights)
+        left = rights - blocks @ b
+        squares = self.squares - _dot(b, rights + left) - _dot(left, inverse @ left)
+        dets = self.log_dets + log_det - np.linalg.slogdet(others)[1]
+        held -= 0.5 * (squares.sum(axis=0) + dets.sum())
         if len(members) == 1:
             c = self.found[members[0]]
             wrong = beta[-1] < c.coordinate.lower - c.null
@@ -156,6 +154,14 @@ class _Table:
         return value, held
 
 
+def _equations(shared: Array, own: Array, weight: float, drawn: Array) -> tuple[Array, Array, Array, float]:
+    """A push's precision (n, n), precision times estimate (n, r), squares (r,) and log determinant of its noise."""
+    factor = cho_factor(np.eye(len(own)) / weight + own @ own.T, lower=True)
+    solved = cho_solve(factor, shared)
+    squares = np.einsum("ij,ij->j", drawn, cho_solve(factor, drawn))
+    return shared.T @ solved, solved.T @ drawn, squares, 2.0 * float(np.log(np.diag(factor[0])).sum())
+
+
 def _dot(first: NDArray[Any], second: NDArray[Any]) -> Array:
-    """Of each column."""
-    return np.asarray((first * second).sum(axis=0), dtype=np.float64)
+    """Of each column, of the last two axes."""
+    return np.asarray((first * second).sum(axis=-2), dtype=np.float64)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from physid_drake.effects import Coordinate, Effect, Family
 from physid_drake.inference.bounded import bounded
 from physid_drake.inference.fit import Fit, Fitter, slope
-from physid_drake.inference.predictions import Ask, Physics
 from physid_drake.inference.push import weighed
+from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.inference.scatter import log_prior_of_scatter, scatters_beside
 
 Array = NDArray[np.float64]
@@ -156,7 +156,7 @@ def _equations(fitter: Fitter, fit: Fit, found: Sequence[Column], scatter: float
     h = fit.hypothesis
     n, value = h.dimension, log_prior_of_scatter(scatter)
     precision, right = np.zeros((n + len(found),) * 2), np.zeros(n + len(found))
-    precision[:n, :n], right[:n] = np.diag(h.std**-2.0), (h.mean - fit.point.z) * h.std**-2.0
+    precision[:n, :n], right[:n] = h.precision, h.precision @ (h.mean - fit.point.z)
     for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(scatter), strict=True)):
         shared = np.column_stack([push.shared, *(c.pushes[i] for c in found)])
         one = weighed(push.residual, shared, push.own, prior, fit.loudness, fit.tail)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.inference.fit import Fit, Fitter, own_slopes, own_steps
-from physid_drake.inference.predictions import Ask, Physics
 from physid_drake.inference.push import weighed
+from physid_drake.inference.rollouts import Ask, Physics
 
 Array = NDArray[np.float64]
 

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 Z90 = float(stats.norm.ppf(0.95))
 FURTHEST = 3.0  # standard deviations
 LEAST_FRICTION = 0.01
+FIRST_GUESS = 4.0  # pushes' worth, of friction's scatter before any push
 
 
 def uncertain_names(model: Model) -> list[str]:
@@ -48,6 +49,11 @@ class Draw:
 
     model: Model
     situation: Situation
+
+
+def scatter_freedom(pushes: int) -> float:
+    """Degrees of freedom with which so many pushes tell friction's scatter: theirs and those of the first guess."""
+    return FIRST_GUESS + pushes
 
 
 def draws_of(

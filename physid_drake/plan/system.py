@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses as dc
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +13,11 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
 from physid_drake.identify import Identification
-from physid_drake.identify.polish import scatter_freedom
 from physid_drake.identify.system import PUSH_PERIOD
 from physid_drake.model import Correlation, Model
 from physid_drake.plan.config import PlanConfig
 from physid_drake.plan.costs import DistanceToGoal
+from physid_drake.plan.draws import scatter_freedom
 from physid_drake.plan.robot import Robot
 from physid_drake.plan.story import Plan, plan
 from physid_drake.plan.task import check_task, default_goal, policy_for
@@ -28,12 +29,12 @@ from physid_drake.pushes.problem import UNKNOWN_HAND, CellSpec, HandUse, PushPro
 from physid_drake.recording import Push
 
 Array = NDArray[np.float64]
-MakePlan = Callable[[Identification], Plan]
+MakePlan = Callable[[Any], Plan]
 _STREAM = 2  # of the run's seed; the identification takes the two before
 
 
 class PolicySystem(LeafSystem):
-    """Plans the next push with what was identified; its state holds that theta and the plan made with it.
+    """Plans the next push with what was identified, or diagnosed; its state holds that theta and the plan with it.
 
     .. pydrake_system::
         name: policy
@@ -48,7 +49,7 @@ class PolicySystem(LeafSystem):
         """Prepare.
 
         Args:
-            make_plan: what to run on an identification.
+            make_plan: what to run on what the port brings, an identification or what was made of one.
             dimension: of the policy's settings; they are nan before the first plan.
             begin: when it first looks at what was identified [s], so as not to plan with what is soon replaced.
         """
@@ -166,10 +167,7 @@ class Planner:
             tick: told stage, steps done and steps in all.
         """
         model = identified_model(result, self.spec, self.name, hand=self.hand)
-        polished = result.polished
-        return self.with_model(
-            model, friction_scatter=polished.friction_scatter, pushes=len(polished.residuals), tick=tick
-        )
+        return self.with_model(model, friction_scatter=result.friction_scatter, pushes=len(result.pushes), tick=tick)
 
     def with_model(self, model: Model, *, friction_scatter: float, pushes: int, tick: Progress | None = None) -> Plan:
         """Plan with a model of the object, such as the one that a diagnosis leaves.
@@ -231,7 +229,7 @@ def identified_model(result: Identification, spec: CellSpec, name: str, *, hand:
     intervals = {f"theta.{e.name}": list(e.ci90) for e in result.estimates}
     return Model(
         recording=name, shape=spec.shape, hand_radius=spec.hand_radius, table=spec.table, config=spec.config,
-        body=result.thetas.body(result.theta), intervals=intervals,
-        correlation=Correlation.of(tuple(intervals), result.polished.correlation),
+        body=result.case.thetas.body(result.theta), intervals=intervals,
+        correlation=Correlation.of(tuple(intervals), result.correlation),
         tip_height=hand.tip_height, contact_height=hand.contact_height, top_speed=hand.top_speed,
     )  # fmt: skip

@@ -12,14 +12,18 @@ from numpy.typing import NDArray
 from physid_drake.cell import Start
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
-from physid_drake.identify.linearise import linearised, prior_slope
+from physid_drake.identify.baseline import plain
+from physid_drake.inference.fit import Fitter
+from physid_drake.inference.predictions import Predictor
+from physid_drake.inference.push import NO_TAIL, weighed
 from physid_drake.policies import PlannedPush
 from physid_drake.policies.planned_push import LEAD
-from physid_drake.pushes.noise import Noise
-from physid_drake.pushes.nuisance import FIRST_SCATTER, nuisance_of
+from physid_drake.pushes.case import UNIT_SCATTER, Case
+from physid_drake.pushes.features import features_of
+from physid_drake.pushes.nuisance import nuisance_of
 from physid_drake.pushes.problem import PushProblem, first_motion
-from physid_drake.pushes.rollouts import RolloutPool
 from physid_drake.pushes.task import Task
+from physid_drake.recording import Push, planar_poses
 
 Array = NDArray[np.float64]
 Pose = tuple[float, float, float]
@@ -49,33 +53,31 @@ class Lesson:
 def most_informative_push(
     pushes: Sequence[PlannedPush],
     *,
-    pool: RolloutPool,
-    noise: Noise,
+    case: Case,
     start: Pose,
     thetas: Array,
     information: Array | None = None,
-    scatter: float = FIRST_SCATTER,
-    inflation: float = 1.0,
+    scatter: float = 1.0,
+    loudness: float = 1.0,
     order: int = 0,
     hand_height: float | None = None,
 ) -> Lesson:
     """Of planned pushes, the one that is expected to teach most about theta.
 
-    A push's information is that of a recording at 100 Hz with the stated noise, its own unknowns marginalised as in
-    the fit: simulated Jacobians, no approximation of the mechanics. But the hand's path is taken for exact: a noisy
-    hand teaches less than is expected. The gain is half the rise of the log-determinant of the Gaussian information,
-    averaged over ``thetas``: what a Gaussian belief is expected to lose in entropy.
+    A push's information is that of a recording at 100 Hz with the recording's noise, its own unknowns marginalised as
+    in the fit: simulated Jacobians, no approximation of the mechanics. But the hand's path is taken for exact: a
+    noisy hand teaches less than is expected. The gain is half the rise of the log-determinant of the Gaussian
+    information, averaged over ``thetas``: what a Gaussian belief is expected to lose in entropy.
 
     Args:
         pushes: to choose from, for instance ``policy.pushes(settings)[0]`` of drawn settings.
-        pool: of the cell that is believed in.
-        noise: of the recording that is expected.
+        case: a recording with the same object, hand and sensors.
         start: of the object, x, y [m], yaw [rad].
         thetas: (d,) the estimate, or (k, d) draws from the belief, each entry in its unit; each costs
-            2 + own unknowns + 2 d rollouts a push.
+            2 + own unknowns + d rollouts a push.
         information: (d, d) what is known, in the unit cube, such as ``OnlineBelief.information``; None is the prior.
-        scatter: of friction from push to push [-].
-        inflation: by which the noise was widened where the cell does not explain the pushes.
+        scatter: of friction from push to push, in units of ``UNIT_SCATTER``.
+        loudness: times the noise, where the cell does not explain the pushes.
         order: number of the push in the recording.
         hand_height: of the tip's contact above the table [m]; None for half the object's height.
 
@@ -86,16 +88,16 @@ def most_informative_push(
     """
     if not pushes:
         raise ConfigError("next push: at least one push is needed to choose from.")
-    if pool.spec.hand_radius is None:
+    if case.pool.spec.hand_radius is None:
         raise ConfigError("next push: the cell has no hand.")
-    space = pool.thetas.space
-    slope = prior_slope(space)
-    known = slope.T @ slope if information is None else information
+    known = plain(case).precision if information is None else information
     points = np.atleast_2d(np.asarray(thetas, dtype=np.float64))
-    problems = [_problem(push, pool, noise, start, order, hand_height) for push in pushes]
+    problems = [
+        dc.replace(_problem(push, case, start, order, hand_height), name=f"next {k}") for k, push in enumerate(pushes)
+    ]
     gains, expected = np.zeros(len(pushes)), np.zeros((len(pushes), *known.shape))
     for theta in points:
-        told = _informations(pool, problems, noise, theta, scatter) / inflation
+        told = _informations(case, problems, theta, scatter, loudness)
         expected += told / len(points)
         gains += 0.5 * (np.linalg.slogdet(known + told)[1] - np.linalg.slogdet(known)[1]) / len(points)
     covariances = np.linalg.inv(known + expected)
@@ -106,46 +108,61 @@ def most_informative_push(
 
 
 def _informations(
-    pool: RolloutPool, problems: Sequence[PushProblem], noise: Noise, theta: Array, scatter: float
+    case: Case, problems: Sequence[PushProblem], theta: Array, scatter: float, loudness: float
 ) -> Array:
     """Information (n, d, d) of each push at theta (d,); zero where the rollout diverged or fell."""
-    nuisances = [nuisance_of(problem, scatter) for problem in problems]
-    foreseen = pool.run(
-        [
-            Task(problem=p, theta=theta, nuisance=n, values=np.zeros(len(n.names)))
-            for p, n in zip(problems, nuisances, strict=True)
-        ]
-    )
+    d = case.thetas.space.dimension
+    told = np.zeros((len(problems), d, d))
+    nuisances = [nuisance_of(problem, UNIT_SCATTER) for problem in problems]
+    foreseen = case.pool.run([
+        Task(problem=p, theta=theta, nuisance=n, values=np.zeros(len(n.names)))
+        for p, n in zip(problems, nuisances, strict=True)
+    ])  # fmt: skip
     # An object that is lost is not pushed again, and what follows its fall would be no measurement.
     kept = {k: p for k, p in enumerate(foreseen) if p is not None and not p.fell}
+    if not kept:
+        return told
     # What is predicted stands for what will be recorded: only the slopes count.
-    recorded = [_foreseen(problems[k], p.poses, noise) for k, p in kept.items()]
-    space = pool.thetas.space
-    told = np.zeros((len(problems), space.dimension, space.dimension))
-    for k, term in zip(
-        kept, linearised(pool, recorded, noise, np.asarray(space.to_unit(theta)), scatter), strict=True
-    ):
-        told[k] = term.information(scatter)
+    recorded = [_foreseen(problems[k], p.poses, case) for k, p in kept.items()]
+    pushes = [_push(problem, case) for problem in recorded]
+    case = dc.replace(
+        case, problems=tuple(recorded), nuisances=tuple(nuisances[k] for k in kept),
+        features=tuple(features_of(p, q, case.noise) for p, q in zip(pushes, recorded, strict=True)),
+    )  # fmt: skip
+    fitter, h = Fitter(case, Predictor(case)), plain(case)
+    z = np.clip(case.thetas.space.to_unit(theta), *h.bounds)
+    point = fitter.points([h], [z], [fitter.at_rest()])[0]
+    if point is None:  # what the twin cannot say of one of them, the cell says of all
+        fitter = Fitter(case, Predictor(case, range(len(recorded))))
+        point = fitter.points([h], [z], [fitter.at_rest()])[0]
+    assert point is not None
+    pushed = fitter.started([h], [point], [None])[0].pushes
+    for k, push, prior in zip(kept, pushed, fitter.priors(scatter), strict=True):
+        told[k] = weighed(push.residual, push.shared, push.own, prior, loudness, NO_TAIL).precision
     return told
 
 
-def _foreseen(problem: PushProblem, poses: Array, noise: Noise) -> PushProblem:
+def _foreseen(problem: PushProblem, poses: Array, case: Case) -> PushProblem:
     """The push as if it had been recorded; the rest before the touch tells nothing of the cell's own error."""
     problem = dc.replace(problem, poses=poses)
-    return dc.replace(problem, moving=(first_motion(problem, noise.position), math.inf))
+    return dc.replace(problem, moving=(first_motion(problem, case.noise.position), math.inf))
 
 
-def _problem(
-    push: PlannedPush, pool: RolloutPool, noise: Noise, start: Pose, order: int, hand_height: float | None
-) -> PushProblem:
+def _push(problem: PushProblem, case: Case) -> Push:
+    height = 0.5 * solid_of(case.pool.spec.shape).height
+    return Push(name=problem.name, object=planar_poses(problem.times, problem.poses, height), hand=None, force=None)
+
+
+def _problem(push: PlannedPush, case: Case, start: Pose, order: int, hand_height: float | None) -> PushProblem:
     """The push as its recording would be fitted; its poses are still to be foreseen."""
-    assert pool.spec.hand_radius is not None
-    solid = solid_of(pool.spec.shape)
-    path = push.path(start, solid.outline, pool.spec.hand_radius)
+    spec = case.pool.spec
+    assert spec.hand_radius is not None
+    solid = solid_of(spec.shape)
+    path = push.path(start, solid.outline, spec.hand_radius)
     times = np.arange(math.ceil((float(path.times[-1]) + AFTER) * RATE)) / RATE
     return PushProblem(
         name="next", order=order, begin=0.0, end=float(times[-1]), start=Start(pose=start),
-        start_std=noise.mean_std(LEAD * RATE), path=path,
+        start_std=case.sensors.mean_std(LEAD * RATE), path=path,
         hand_height=0.5 * solid.height if hand_height is None else hand_height, times=times,
         poses=np.zeros((len(times), 3)), force_times=np.zeros(0), forces=np.zeros((0, 2)), force_std=np.zeros(0),
     )  # fmt: skip

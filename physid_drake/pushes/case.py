@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import CellConfig
-from physid_drake.cell.solid import solid_of
+from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.effects import Surroundings
 from physid_drake.errors import RecordingError
 from physid_drake.pushes.config import ThetaConfig
@@ -24,8 +24,9 @@ from physid_drake.pushes.problem import PushProblem, problems_of, spec_of
 from physid_drake.pushes.refusals import refuse
 from physid_drake.pushes.rollouts import RolloutPool
 from physid_drake.pushes.theta import ThetaMap, friction_names, theta_map
+from physid_drake.pushes.tied_cells import tied_cells
 from physid_drake.pushes.tracker_noise import ForceNoise, TrackerNoise, tracker_noise
-from physid_drake.recording import Push, Recording, rest_segments, thinned
+from physid_drake.recording import ObjectModel, Push, Recording, rest_segments, thinned
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -164,8 +165,7 @@ def case_of(
         dc.replace(_paced(_floored(p), config), order=int(order))
         for p, order in zip(problems_of(recording, sensors, solid.height), orders, strict=True)
     )
-    grid = (config.friction_cells[0], config.friction_cells[1])
-    thetas = theta_map(recording.object, solid, grid, theta, config.default_density_kgpm3)
+    thetas = theta_space(recording.object, solid, config, theta)
     pushes = recording.pushes
     return Case(
         recording=recording,
@@ -180,6 +180,12 @@ def case_of(
         config=config,
         pushes=count,
     )
+
+
+def theta_space(model: ObjectModel, solid: Solid, config: CellConfig, theta: ThetaConfig) -> ThetaMap:
+    """What is unknown of an object, with a prior that ties neighbouring friction cells."""
+    grid = (config.friction_cells[0], config.friction_cells[1])
+    return tied_cells(theta_map(model, solid, grid, theta, config.default_density_kgpm3), solid.outline, theta)
 
 
 def cell_config(recording: Recording, *, contact: str = "point", time_step: float | None = None) -> CellConfig:

@@ -19,11 +19,6 @@ Array = NDArray[np.float64]
 BRAKE_STD = 0.3  # share of the brake's duration
 SPEED_STD = 0.003  # share of the hand's speed
 RESTITUTION_STD = 0.02
-FIRST_SCATTER = 0.02  # of friction, push to push, until the pushes have said more
-# What is left of the cell's own error on sixty pushes against a fine planar integrator, as a constant after
-# the touch: 0.07 mm and 1.7 mrad.
-MODEL_ERROR = np.array([7e-5, 7e-5, 1.7e-3])
-
 START = ("start_x", "start_y", "start_yaw")
 VELOCITY = ("start_vx", "start_vy", "start_wz")
 
@@ -78,7 +73,8 @@ def apply_nuisance(problem: PushProblem, nuisance: Nuisance, values: Array) -> P
     velocity = np.array(problem.start.velocity) + [given.get(name, 0.0) for name in VELOCITY]
     path = problem.path
     if path is not None:
-        path = path.faster(given.get("speed", 0.0)).braking(given.get("brake", 0.0), *problem.moving)
+        brake = path.last_brake(*problem.moving)  # a faster hand brakes at the same knots
+        path = path.faster(given.get("speed", 0.0)).braking(given.get("brake", 0.0), brake)
     start = replace(problem.start, pose=triple(pose), velocity=triple(velocity))
     return PushSetting(
         start=start,

@@ -19,7 +19,6 @@ from physid_drake.cell import Cell, Motion, Outcome
 from physid_drake.effects.rollout import Geometry, Rollout, roll, tracked
 from physid_drake.errors import TippedError, WorkerError
 from physid_drake.processes import ENDED, end_with_parent
-from physid_drake.pushes.by_twin import predicted_by_twin
 from physid_drake.pushes.force_windows import offsets
 from physid_drake.pushes.kept_rollouts import KeptRollouts, key_of
 from physid_drake.pushes.nuisance import apply_nuisance
@@ -30,8 +29,6 @@ from physid_drake.pushes.theta import ThetaMap
 
 Array = NDArray[np.float64]
 
-INTEGRATORS = CELL, TWIN = "cell", "twin"
-TOGETHER = 512  # tasks in a call of the twin
 MOST_CELLS = 24  # kept by a process: effects of shape and pressure build their own
 
 _cells: OrderedDict[str, Cell] = OrderedDict()
@@ -125,7 +122,6 @@ class RolloutPool:
         jobs: int = 0,
         *,
         kept: KeptRollouts | None = None,
-        integrator: str = CELL,
     ) -> None:
         """Prepare.
 
@@ -134,16 +130,15 @@ class RolloutPool:
             thetas: what theta means in it.
             jobs: processes; 0 takes the machine's cores.
             kept: rollouts that need not be made again, and where those that are made are kept; None keeps none.
-            integrator: ``cell``, or ``twin``, which leaves to the cell what it does not know.
         """
-        self.spec, self.thetas, self.kept, self.integrator = spec, thetas, kept, integrator
+        self.spec, self.thetas, self.kept = spec, thetas, kept
         self.jobs = jobs or os.cpu_count() or 1
         self.count = 0
         self.diverged = 0
 
     def of(self, spec: CellSpec) -> RolloutPool:
         """A pool for another cell, which keeps its rollouts in the same place."""
-        return RolloutPool(spec, self.thetas, self.jobs, kept=self.kept, integrator=self.integrator)
+        return RolloutPool(spec, self.thetas, self.jobs, kept=self.kept)
 
     def run(self, tasks: Sequence[Task], tick: Callable[[int], None] | None = None) -> list[Prediction | None]:
         """Predictions in the order of the tasks; ``tick`` is told how many more are done."""
@@ -162,7 +157,7 @@ class RolloutPool:
         self, tasks: Sequence[Task], kept: KeptRollouts, tick: Callable[[int], None] | None
     ) -> Iterable[Prediction | None]:
         """Of the tasks, those that are not kept are made, each of them once."""
-        cell = repr((self.spec, self.thetas, self.integrator))
+        cell = repr((self.spec, self.thetas))
         keys = [key_of(task, cell) for task in tasks]
         fresh = {key: task for key, task in zip(keys, tasks, strict=True) if key not in kept}
         missing, made = iter(fresh), dict[bytes, Prediction | None]()
@@ -177,20 +172,6 @@ class RolloutPool:
         return (made[key] if key in made else kept[key] for key in keys)
 
     def _chunks(self, tasks: Sequence[Task]) -> Iterable[list[Prediction | None]]:
-        if self.integrator == TWIN:
-            return self._by_twin(tasks)
-        return self._by_cell(tasks)
-
-    def _by_twin(self, tasks: Sequence[Task]) -> Iterator[list[Prediction | None]]:
-        """The twin's answers, and the cell's to what it leaves open."""
-        for k in range(0, len(tasks), TOGETHER):
-            some = tasks[k : k + TOGETHER]
-            said = predicted_by_twin(self.spec, self.thetas, some)
-            left = [task for task, answer in zip(some, said, strict=True) if answer is None]
-            rest = iter([answer for chunk in self._by_cell(left) for answer in chunk] if left else [])
-            yield [next(rest) if answer is None else answer for answer in said]
-
-    def _by_cell(self, tasks: Sequence[Task]) -> Iterable[list[Prediction | None]]:
         if self.jobs == 1 or len(tasks) == 1:
             return ([predict(self.spec, self.thetas, task)] for task in tasks)
         size = max(1, min(8, len(tasks) // (2 * self.jobs)))

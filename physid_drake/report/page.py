@@ -6,7 +6,10 @@ from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 
-from physid_drake.identify import CellsTold, Identification
+from physid_drake.diagnose import Examined
+from physid_drake.identify import CellsTold
+from physid_drake.identify.accuracy import accuracy_of
+from physid_drake.identify.estimates import estimates_of
 from physid_drake.plan import Hindsight, Plan
 from physid_drake.report.cells import cells_figure, cells_verdict, combination_text
 from physid_drake.report.panel import with_panel
@@ -16,10 +19,9 @@ from physid_drake.report.tables import accuracy_cells, verdict
 
 _PANEL = """
 <div id="physid"><details open><summary><b>{{ name }}</b></summary>
-  <p>{{ verdict }}</p>
-  {% if diagnosis %}<p><a href="diagnosis.html">Diagnosis</a>, by a fit of its own: <b>{{ diagnosis[0] }}</b>. {{ diagnosis[1] }}
-    <a href="scene.html">With model.yaml in Meshcat</a>.</p>{% endif %}
-  <h2>theta, plain cell</h2>
+  {% if diagnosis %}<p><b>{{ diagnosis.verdict }}</b>. {{ diagnosis.sentence }} <a href="diagnosis.html">How sure, and
+    where</a>; <a href="scene.html">in Meshcat</a>.</p>{% else %}<p>{{ verdict }}</p>{% endif %}
+  <h2>theta{{ with_effects }}</h2>
   <table><tr><th>parameter</th><th>estimate</th><th>90 % interval</th><th>told</th></tr>
   {% for e in estimates %}<tr><td>{{ e.name }}</td><td>{{ "%.4g" % e.value }} {{ "" if e.unit == "-" else e.unit }}</td>
     <td>{{ "%.4g" % e.ci90[0] }} to {{ "%.4g" % e.ci90[1] }}</td>
@@ -30,7 +32,7 @@ _PANEL = """
   <table><tr><th>combination of ln frictions</th><th>singular value</th><th>left</th><th>told</th></tr>
   {% for row in cells.rows %}<tr>{% for c in row %}<td>{{ c }}</td>{% endfor %}</tr>{% endfor %}</table>
   <p>{{ cells.verdict }}</p>{% endif %}
-  <h2>error of prediction (root mean square), plain cell</h2>
+  <h2>error of prediction of each push, left out (root mean square)</h2>
   <table><tr><th></th><th>mm</th><th>deg</th><th>end mm</th><th>end deg</th><th>N</th><th>std</th></tr>
   {% for label, cells in accuracy %}<tr><td>{{ label }}</td>{% for c in cells %}<td>{{ c }}</td>{% endfor %}</tr>{% endfor %}
   </table>
@@ -52,44 +54,46 @@ _PANEL = """
 
 def result_page(
     html: str,
-    result: Identification,
+    examined: Examined,
     *,
     name: str,
     marks: list[tuple[str, float]],
     note: str,
     plan: Plan | None = None,
     hindsight: Hindsight | None = None,
-    diagnosis: tuple[str, str] | None = None,
 ) -> str:
     """Meshcat's static page with a panel of results.
 
     Args:
         html: what Meshcat wrote.
-        result: the identification.
+        examined: what was identified, and diagnosed if it was.
         name: of the recording.
         marks: name and start in the animation [s] of every push shown.
         note: one line on how it was made.
         plan: the plan made with what was found, whose curve is shown; None for none.
         hindsight: what a diagnosis says of the plan that was made before it.
-        diagnosis: its verdict and sentence; None where there is none.
     """
+    known, evidence = examined.known, examined.evidence
+    fitter, fit = (known.fitter, known.fit) if evidence is None else (evidence.fitter, evidence.leaving)
+    names = " and ".join(part.kind.name for part in fit.hypothesis.parts)
     rows = [
-        ("held out, before", result.before),
-        ("held out, after", result.after),
-        ("each push, before it was learned from", result.foreseen),
-        ("fitted, after", result.fitted),
+        ("before any push", known.before),
+        ("before it was learned from", known.foreseen),
+        ("plain cell", known.after),
+        (f"with {names}", accuracy_of(known.case, evidence.errors_after) if evidence is not None and names else None),
     ]
     environment = Environment(undefined=StrictUndefined, autoescape=True)
     panel = environment.from_string(_PANEL).render(
         name=name,
-        verdict=verdict(result),
-        estimates=result.estimates,
+        verdict=verdict(known),
+        with_effects=f", with {names}" if names else ", plain cell",
+        estimates=estimates_of(fitter, fit),
         accuracy=[(label, accuracy_cells(a)) for label, a in rows if a is not None],
         marks=marks,
         note=note,
         plan=None if plan is None else _shown_plan(plan, hindsight),
-        diagnosis=diagnosis,
-        cells=None if result.cells is None else _shown_cells(result.cells),
+        diagnosis=examined.diagnosis,
+        cells=None if known.cells is None else _shown_cells(known.cells),
     )
     return with_panel(html, panel)
 

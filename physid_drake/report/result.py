@@ -1,72 +1,100 @@
-"""``result.json``: the identification with fixed keys, so that others can read it."""
+"""``result.json``: the model that leaves, and how it was identified, with fixed keys so that others can read it."""
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from physid_drake.identify import Accuracy, CellsTold, Identification
+from physid_drake.diagnose import Examined
+from physid_drake.identify import Accuracy, CellsTold, Estimate, Identification
+from physid_drake.identify.accuracy import accuracy_of
+from physid_drake.identify.estimates import estimates_of
+from physid_drake.identify.identify import unknowns_of
+from physid_drake.pushes.case import UNIT_SCATTER
 from physid_drake.pushes.doubts import doubts
 from physid_drake.recording import Recording
 from physid_drake.report.inspection import warning_lines
+from physid_drake.search import SearchResult
 
 FORMAT = "physid-result/1"
 
 
-def result_json(result: Identification, recording: Recording, seed: int, versions: dict[str, str]) -> str:
+def result_json(examined: Examined, recording: Recording, seed: int, versions: dict[str, str]) -> str:
     """The result as JSON text; the same recording, configuration and seed give the same bytes.
 
+    Theta is that of the model that leaves, with the effects that were found where some were; ``baseline`` is there
+    then, too, and has what the plain cell had.
+
     Args:
-        result: the identification.
+        examined: what was identified, and diagnosed if it was.
         recording: what it was made from.
         seed: of the run.
         versions: of the packages.
     """
-    best = int(np.argmax(result.search.belief.p_min))
+    known, evidence, search = examined.known, examined.evidence, examined.known.search
+    fitter, fit = (known.fitter, known.fit) if evidence is None else (evidence.fitter, evidence.leaving)
+    changed = fit is not known.fit
+    after = known.after if evidence is None else accuracy_of(known.case, evidence.errors_after)
+    pushes = list(known.pushes)
     content: dict[str, Any] = {
         "format": FORMAT,
         "recording": recording.name,
-        "theta": {
-            e.name: {
-                "value": e.value,
-                "unit": e.unit,
-                "ci90": list(e.ci90),
-                "identifiable": e.identifiable,
-                "prior": e.prior,
-                "at_bound": e.at_bound,
-            }
-            for e in result.estimates
+        "model": {
+            "verdict": None if examined.diagnosis is None else examined.diagnosis.verdict,
+            "effects": [part.kind.name for part in fit.hypothesis.parts],
         },
-        **({} if result.cells is None else {"cells": _cells(result.cells)}),
-        "held_out": {
-            "pushes": list(result.held_out),
-            "before": _numbers(result.before),
-            "after": _numbers(result.after),
-        },
-        "training": {"pushes": list(result.training), "after": _numbers(result.fitted)},
-        **({} if result.foreseen is None else {"foreseen": _numbers(result.foreseen)}),
-        "reduced_chi2": result.reduced_chi2,
-        "friction_scatter": result.polished.friction_scatter,
-        "push_unknowns": dict(zip(result.training, result.polished.unknowns, strict=True)),
-        "noise": dataclasses.asdict(result.noise),
-        "search": {
-            "stop_reason": result.search.stop_reason,
-            "trials": result.search.belief.n_trials,
-            "failed": result.search.n_failed,
-            "entropies_nats": result.search.entropies.tolist(),
-            "most_likely": result.thetas.space.as_dict(result.search.belief.most_likely),
-            "p_min": float(result.search.belief.p_min[best]),
-        },
-        "rollouts": result.polished.rollouts,
+        "theta": _theta(estimates_of(fitter, fit)),
+        **({"baseline": _baseline(known)} if changed else {}),
+        **({} if known.cells is None else {"cells": _cells(known.cells)}),
+        "held_out": {"pushes": pushes, "before": _numbers(known.before), "after": _numbers(after)},
+        "training": {"pushes": pushes},
+        **({} if known.foreseen is None else {"foreseen": _numbers(known.foreseen)}),
+        "reduced_chi2": fit.reduced_chi2,
+        "friction_scatter": UNIT_SCATTER * fit.scatter,
+        "push_unknowns": unknowns_of(known.case, fit),
+        "noise": known.noise,
+        "search": None if search is None else _search(search, known),
+        "rollouts": known.rollouts if examined.diagnosis is None else examined.diagnosis.rollouts,
         "warnings": [*doubts(recording), *warning_lines(recording)],
+        "pushes": len(recording.pushes),
         "seed": seed,
         "versions": versions,
     }
     return json.dumps(content, indent=2, allow_nan=False) + "\n"
+
+
+def _theta(estimates: Sequence[Estimate]) -> dict[str, Any]:
+    return {
+        e.name: {
+            "value": e.value, "unit": e.unit, "ci90": list(e.ci90), "identifiable": e.identifiable, "prior": e.prior,
+            "at_bound": e.at_bound,
+        }
+        for e in estimates
+    }  # fmt: skip
+
+
+def _baseline(known: Identification) -> dict[str, Any]:
+    """What the plain cell had, where effects were found beside it."""
+    return {
+        "theta": _theta(known.estimates), "held_out": _numbers(known.after), "reduced_chi2": known.reduced_chi2,
+        "friction_scatter": known.friction_scatter,
+    }  # fmt: skip
+
+
+def _search(search: SearchResult, known: Identification) -> dict[str, Any]:
+    best = int(np.argmax(search.belief.p_min))
+    return {
+        "stop_reason": search.stop_reason,
+        "trials": search.belief.n_trials,
+        "failed": search.n_failed,
+        "entropies_nats": search.entropies.tolist(),
+        "most_likely": known.case.thetas.space.as_dict(search.belief.most_likely),
+        "p_min": float(search.belief.p_min[best]),
+    }
 
 
 def _cells(cells: CellsTold) -> dict[str, Any]:
@@ -89,14 +117,14 @@ def _numbers(accuracy: Accuracy | None) -> dict[str, float | int | None] | None:
     """An accuracy with units in its keys."""
     if accuracy is None:
         return None
-    numbers = {
+    numbers: dict[str, float] = {
         "position_rms_m": accuracy.position,
         "rotation_rms_rad": accuracy.rotation,
         "end_position_rms_m": accuracy.end_position,
         "end_rotation_rms_rad": accuracy.end_rotation,
         "force_rms_n": accuracy.force,
-        "sigmas_rms": accuracy.sigmas,
+        "sigmas_rms": accuracy.rms,
         "diverged": accuracy.diverged,
     }
-    # JSON has no infinity, which stands where every rollout diverged.
-    return {key: value if value is None or math.isfinite(value) else None for key, value in numbers.items()}
+    # JSON has no NaN, which stands where nothing was compared.
+    return {key: value if math.isfinite(value) else None for key, value in numbers.items()}

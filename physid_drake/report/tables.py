@@ -42,33 +42,30 @@ def accuracy_table(result: Identification) -> Table:
         "std of sensors",
     ):
         table.add_column(header, justify="left" if header in ("pushes", "theta") else "right")
-    held, fitted = f"{len(result.held_out)} held out", f"{len(result.training)} fitted"
-    after = "after" if result.foreseen is None else "after each"
-    for pushes, theta, accuracy in ((held, "before", result.before), (held, "after", result.after),
-                                    (fitted, "before each", result.foreseen),
-                                    (fitted, after, result.fitted)):  # fmt: skip
+    rows = (
+        ("each, left out", "before", result.before),
+        ("each, left out", "after", result.after),
+        ("each, before it was learned from", "after those before", result.foreseen),
+    )
+    for pushes, theta, accuracy in rows:
         if accuracy is not None:
             table.add_row(pushes, theta, *accuracy_cells(accuracy))
     return table
 
 
 def accuracy_cells(accuracy: Accuracy) -> list[str]:
-    """The numbers of an accuracy as text: mm, degrees, mm, degrees, N, standard deviations."""
-    force = "-" if accuracy.force is None else f"{accuracy.force:.3f}"
-    return [
-        f"{1e3 * accuracy.position:.2f}",
-        f"{math.degrees(accuracy.rotation):.2f}",
-        f"{1e3 * accuracy.end_position:.2f}",
-        f"{math.degrees(accuracy.end_rotation):.2f}",
-        force,
-        f"{accuracy.sigmas:.2f}",
-    ]
+    """The numbers of an accuracy as text: mm, degrees, mm, degrees, N, standard deviations; a dash for none."""
+    numbers = (
+        (1e3 * accuracy.position, 2), (math.degrees(accuracy.rotation), 2), (1e3 * accuracy.end_position, 2),
+        (math.degrees(accuracy.end_rotation), 2), (accuracy.force, 3), (accuracy.rms, 2),
+    )  # fmt: skip
+    return [f"{value:.{digits}f}" if math.isfinite(value) else "-" for value, digits in numbers]
 
 
 def verdict(result: Identification) -> str:
     """In one sentence, how well the plain cell explains the pushes."""
     chi2 = result.reduced_chi2
-    quieter = quieter_by(chi2, result.polished.degrees) if chi2 < FAR_BELOW else None
+    quieter = quieter_by(chi2, result.degrees) if chi2 < FAR_BELOW else None
     if quieter is not None:
         return (
             f"The plain cell leaves far less than the noise that counts (reduced chi-square {chi2:.2g}, 1 expected):"
@@ -78,7 +75,7 @@ def verdict(result: Identification) -> str:
     if result.explains:
         return f"The plain cell explains these pushes to their noise (reduced chi-square {chi2:.2f})."
     if result.reduced_chi2 < EXPLAINED:
-        scatter = 100.0 * result.polished.friction_scatter
+        scatter = 100.0 * result.friction_scatter
         return (
             f"The plain cell does not explain these pushes: it leaves no more than their noise (reduced chi-square"
             f" {chi2:.2f}), but with frictions that differ by {scatter:.0f} % from push to push."

@@ -20,7 +20,7 @@ MORE: dict[str, Any] = {
     "search": {"method": "greedy_entropy", "candidates": 32, "budget": 20, "batch": 2, "jobs": 1, "online": False},
     "plan": {"policy": "push", "goal_m": [0.3, 0.0], "start_m": [0.0, 0.0], "start_deg": 10.0, "tolerance_m": 0.01,
              "budget": 24, "sweep": 5, "draws": 4},
-    "seed": 3, "held_out_share": 0.25, "recording": "eraser_reference",
+    "seed": 3, "pushes": 12, "recording": "eraser_reference",
 }  # fmt: skip
 WORDS = ("", ":", "a:", ":a", "x", "../secret.txt", "/dev/zero", "x" * 5000, "a\0b", "eraser", "sealed",
          "sealed.yaml:sealed",

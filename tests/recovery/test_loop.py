@@ -37,7 +37,7 @@ def test_a_robot_that_knows_nothing_learns_and_comes_nearer_to_the_goal_push_by_
     )  # fmt: skip
 
     def planned(identification):
-        model = identified_model(identification, learner.pool.spec, "believed")
+        model = identified_model(identification, identification.case.pool.spec, "believed")
         return plan(
             model, policy_for("push_speed", model, START, GOAL), DistanceToGoal(goal=GOAL),
             situation=Situation(start=START), rng=np.random.default_rng(0), budget=8, draws=0, sweep=0,
@@ -64,9 +64,9 @@ def test_a_robot_that_knows_nothing_learns_and_comes_nearer_to_the_goal_push_by_
     simulator.AdvanceTo(4.5 * PUSH_PERIOD)
     root = simulator.get_context()
     belief = learning.belief(learning.GetMyContextFromRoot(root))
-    assert len(belief.terms) == 2
+    assert len(belief.pushes) == 2
     np.testing.assert_allclose(belief.theta[1], 0.2, rtol=0.03)
-    ends = [term.problem.poses[-1, :2] for term in belief.terms]
+    ends = [push.object.planar[-1, :2] for push in belief.pushes]
     missed = [math.dist(end, GOAL) for end in ends]
     assert missed[0] > 0.15
     assert missed[1] < 0.05  # measured 0.033: the plan looks at eight speeds

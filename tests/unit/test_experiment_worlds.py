@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("mujoco")
 
 from physid_drake.errors import RobotError
-from physid_drake.experiments.learning import Learner
+from physid_drake.experiments.learning import Learner, plain_task
 from physid_drake.experiments.mit_pushes import PLAYED_SPEED, TICK, played
 from physid_drake.experiments.motion_prediction import MotionPrediction
 from physid_drake.experiments.next_push import most_informative, the_first
@@ -109,7 +109,7 @@ def slow_pushes(shape, speed=0.010):
         times = np.linspace(0.0, 0.05 / speed, 100)
         path = np.column_stack([-0.055 + speed * times, np.full(100, side), np.full(100, 0.0065)])
         still = np.tile([1.0, 0.0, 0.0, 0.0], (100, 1))
-        ends = np.tile([0.0, 0.0, 0.0065], (2, 1))
+        ends = np.array([[0.0, 0.0, 0.0065], [0.02, 0.0, 0.0065]])
         pushes.append(
             Push(
                 name=f"{number}", force=None, hand=PoseStream(times=times, positions=path, quaternions=still),
@@ -127,9 +127,9 @@ def test_a_slow_push_ends_where_it_does_played_faster():
     config = ThetaConfig(parameters=["hand_friction"], nominal={"support_friction": 0.15})
     exact, coarse = (Learner(recording, tick_s=tick, theta=config) for tick in (2e-3, TICK))
     theta = np.array([0.25])
-    slow = np.array([r.poses[-1] for r in exact.predictions(exact.problems, theta)])
+    slow = np.array([r.poses[-1] for r in exact.case.pool.run([plain_task(p, theta) for p in exact.problems])])
     fast = [played(problem, PLAYED_SPEED) for problem in coarse.problems]
-    ends = np.array([r.poses[-1] for r in coarse.predictions(fast, theta)])
+    ends = np.array([r.poses[-1] for r in coarse.case.pool.run([plain_task(p, theta) for p in fast])])
     # What they moved, and by how little the two differ.
     assert np.hypot(*slow[:, :2].T).min() > 0.01 and np.abs(slow[:, 2]).min() > 0.1
     assert np.hypot(*(ends - slow)[:, :2].T).max() < 1e-3

@@ -9,11 +9,11 @@ from physid_drake.belief import Belief
 from physid_drake.cell.outline import rectangle
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError, ParameterError
-from physid_drake.identify.cells import LEVEL_STD, cells_told, tied_cells
-from physid_drake.identify.linearise import prior_slope
-from physid_drake.identify.polish import Polished
+from physid_drake.identify.cells import cells_told
+from physid_drake.inference.hypothesis import Hypothesis
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.pushes.theta import theta_map
+from physid_drake.pushes.tied_cells import LEVEL_STD, tied_cells
 from physid_drake.recording import Box, ObjectModel
 from physid_drake.report.cells import cells_verdict
 from physid_drake.space import Parameter, ParameterSpace
@@ -69,6 +69,13 @@ def test_the_whitened_prior_is_that_of_the_covariance():
     np.testing.assert_allclose((space.prior_whitened(thetas) ** 2).sum(axis=1), wanted)
 
 
+def test_the_fits_prior_is_that_of_the_covariance():
+    space = tied((2, 2), "mass", "support_friction").space
+    h = Hypothesis(space=space, around=None)
+    stds = space.prior_std_unit
+    np.testing.assert_allclose(np.linalg.inv(h.precision), np.outer(stds, stds) * space.correlation, rtol=1e-9)
+
+
 def test_a_saved_belief_keeps_the_ties(tmp_path):
     space = tied((2, 2), "mass", "support_friction").space
     Belief.start(space, space.sample(np.random.default_rng(0), 8, from_prior=True), np.random.default_rng(0)).to_npz(
@@ -99,19 +106,22 @@ def test_a_length_of_nothing_is_refused():
 # What pushes tell, from a Jacobian made by hand.
 
 
-def fit(thetas, rows):
-    """A fit whose whitened residuals are ``rows`` (m, d) of ln theta."""
-    space = thetas.space
-    widths = np.log(space.upper / space.lower)
-    return Polished(
-        theta=space.nominal, jacobian=np.concatenate([np.atleast_2d(rows) * widths, prior_slope(space)]), chi2=0.0,
-        inflation=1.0, samples=1, friction_scatter=0.01, residuals=(), unknowns=(), rollouts=0,
-    )  # fmt: skip
+def told_by(thetas, rows):
+    """What whitened residuals that change by ``rows`` (m, d) with ln theta tell."""
+    prior, posterior = covariances(thetas, rows)
+    return cells_told(thetas, thetas.space.nominal, prior, posterior)
+
+
+def covariances(thetas, rows):
+    """Of theta in the unit cube, before and after."""
+    h = Hypothesis(space=thetas.space, around=None)
+    slopes = np.atleast_2d(rows) * np.log(thetas.space.upper / thetas.space.lower)
+    return np.linalg.inv(h.precision), np.linalg.inv(h.precision + slopes.T @ slopes)
 
 
 def test_pushes_that_feel_only_the_sum_tell_one_combination_with_its_singular_value():
     thetas = tied((2, 2))
-    told = cells_told(thetas, fit(thetas, 10.0 * np.ones(4)))
+    told = told_by(thetas, 10.0 * np.ones(4))
     first, *others = told.combinations
     np.testing.assert_allclose(first.weights, 0.25, atol=1e-6)
     covariance = thetas.space.parameters[0].prior_std ** 2 * np.array(thetas.space.correlation)
@@ -129,20 +139,21 @@ def test_mass_and_friction_of_which_a_force_tells_the_product_vary_against_one_a
     strength = 30.0
     a, b = strength * np.log(thetas.space.upper / thetas.space.lower)  # of ln m + ln mu, in the unit cube
     flat = 12.0  # information of a uniform prior there
-    polished = fit(thetas, [strength, strength])
+    _, covariance = covariances(thetas, [strength, strength])
     rho = -a * b / np.sqrt((a**2 + flat) * (b**2 + flat))
-    np.testing.assert_allclose(polished.correlation, [[1.0, rho], [rho, 1.0]], rtol=1e-6)
+    stds = np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose(covariance / np.outer(stds, stds), [[1.0, rho], [rho, 1.0]], rtol=1e-6)
     std = np.sqrt((b**2 + flat) / ((a**2 + flat) * (b**2 + flat) - (a * b) ** 2))
-    assert np.sqrt(polished.covariance[0, 0]) == pytest.approx(std) and rho < -0.95
+    assert stds[0] == pytest.approx(std) and rho < -0.95
 
 
 def test_what_is_told_does_not_depend_on_the_order_of_what_else_is_unknown():
     """An unknown that the pushes cannot tell from a combination of cells takes that combination away."""
     thetas = tied((2, 1), "mass", "support_friction")
-    told = cells_told(thetas, fit(thetas, [[0.0, 50.0, 50.0], [50.0, 50.0, -50.0]]))
+    told = told_by(thetas, [[0.0, 50.0, 50.0], [50.0, 50.0, -50.0]])
     # The difference is mixed with the mass, whose prior leaves ln(0.9 / 0.1) / sqrt(12) open.
     assert [c.told for c in told.combinations] == [True, False]
-    alone = cells_told(tied((2, 1)), fit(tied((2, 1)), [[50.0, 50.0], [50.0, -50.0]]))
+    alone = told_by(tied((2, 1)), [[50.0, 50.0], [50.0, -50.0]])
     assert alone.told == 2
     assert alone.apart == (("support_friction_0_0", "support_friction_1_0"),)
     assert cells_verdict(alone).endswith("All neighbours are told apart.")

@@ -1,4 +1,4 @@
-"""The identifier: which pushes it fits, how it goes on after an interrupt, how it runs in parallel."""
+"""The identifier: how it goes on after an interrupt, and the pool that rolls out for it."""
 
 from dataclasses import replace
 
@@ -7,9 +7,8 @@ import pytest
 from runs import coarse_identifier, shipped_pushes
 
 from physid_drake.belief import Belief
-from physid_drake.errors import ConfigError
-from physid_drake.identify import Identifier, SearchConfig
-from physid_drake.identify.identify import split_pushes
+from physid_drake.diagnose import Examined
+from physid_drake.identify import SearchConfig, theta_search
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.pushes.nuisance import nuisance_of
 from physid_drake.pushes.task import Task
@@ -28,32 +27,6 @@ def identifier(recording, **more):
     return coarse_identifier(recording, **({"theta": FRICTION, "search": SEARCH} | more))
 
 
-# Which pushes are fitted.
-
-
-@pytest.mark.parametrize(
-    ("count", "share", "held"), [(12, 0.25, 3), (12, 0.0, 0), (4, 0.9, 2), (3, 0.9, 1), (2, 0.9, 0), (1, 0.5, 0)]
-)
-def test_at_least_two_pushes_are_fitted(count, share, held):
-    train, out = split_pushes(count, share, np.random.default_rng(0))
-    assert len(out) == held
-    assert sorted(train + out) == list(range(count))
-
-
-def test_the_seed_chooses_what_is_held_out():
-    def held(seed):
-        return split_pushes(30, 0.3, np.random.default_rng(seed))[1]
-
-    assert held(1) == held(1)
-    assert held(1) != held(2)
-
-
-@pytest.mark.parametrize("share", [-0.1, 1.0, 2.0, float("nan")])
-def test_a_share_that_is_none_is_refused(share):
-    with pytest.raises(ConfigError, match="held_out_share"):
-        split_pushes(10, share, np.random.default_rng(0))
-
-
 # Interrupts.
 
 
@@ -62,15 +35,15 @@ class Trials:
 
     def __init__(self, patch, stop_at=None):
         self.thetas = []
-        objective = Identifier._objective
+        misfits = theta_search.log_misfits
 
-        def counted(this, thetas):
+        def counted(predictor, pushes, owns, thetas):
             if len(self.thetas) + 1 == stop_at:
                 raise KeyboardInterrupt
             self.thetas.append(thetas)
-            return objective(this, thetas)
+            return misfits(predictor, pushes, owns, thetas)
 
-        patch.setattr(Identifier, "_objective", counted)
+        patch.setattr(theta_search, "log_misfits", counted)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +51,7 @@ def uninterrupted(recording):
     with pytest.MonkeyPatch.context() as patch:
         trials = Trials(patch)
         result = identifier(recording).run()
-    return trials.thetas, result_json(result, recording, 0, {})
+    return trials.thetas, result_json(Examined(known=result), recording, 0, {})
 
 
 @pytest.mark.parametrize("stop_at", [2, 5])
@@ -97,7 +70,7 @@ def test_an_interrupted_search_goes_on_with_the_trials_that_it_would_have_made(
         second = Trials(patch)
         result = identifier(recording, state=state).run()
     np.testing.assert_array_equal(np.concatenate(first.thetas + second.thetas), np.concatenate(want))
-    assert result_json(result, recording, 0, {}) == text
+    assert result_json(Examined(known=result), recording, 0, {}) == text
 
 
 def test_an_interrupt_before_the_first_trial_leaves_nothing(recording, tmp_path, monkeypatch):
@@ -109,17 +82,17 @@ def test_an_interrupt_before_the_first_trial_leaves_nothing(recording, tmp_path,
 
 def test_the_state_of_another_search_is_not_taken(recording, tmp_path, monkeypatch):
     state = tmp_path / "belief.npz"
-    identifier(recording, state=state).search()
+    identifier(recording, state=state).run()
     trials = Trials(monkeypatch)
-    identifier(recording, state=state, seed=1).search()
+    identifier(recording, state=state, seed=1).run()
     assert len(trials.thetas) == 6
 
 
 def test_a_finished_search_is_not_repeated(recording, tmp_path, monkeypatch):
     state = tmp_path / "belief.npz"
-    before = identifier(recording, state=state).search()
+    before = identifier(recording, state=state).run().search
     trials = Trials(monkeypatch)
-    after = identifier(recording, state=state).search()
+    after = identifier(recording, state=state).run().search
     assert trials.thetas == []
     np.testing.assert_array_equal(after.belief.p_min, before.belief.p_min)
 
@@ -130,7 +103,7 @@ def test_a_finished_search_is_not_repeated(recording, tmp_path, monkeypatch):
 def tasks_of(one, thetas):
     tasks = []
     for theta in thetas:
-        for problem in one.problems:
+        for problem in one.case.problems:
             nuisance = nuisance_of(problem, 0.02)
             tasks.append(
                 Task(
@@ -143,23 +116,23 @@ def tasks_of(one, thetas):
 def test_predictions_come_in_the_order_of_the_tasks_whatever_was_simulated_before(recording):
     one = identifier(recording)
     tasks = tasks_of(one, [0.2, 0.3, 0.4])
-    forward = one.pool.run(tasks)
-    backward = one.pool.run(tasks[::-1])[::-1]
+    forward = one.case.pool.run(tasks)
+    backward = one.case.pool.run(tasks[::-1])[::-1]
     for a, b in zip(forward, backward, strict=True):
         np.testing.assert_array_equal(a.poses, b.poses)
-    assert one.pool.count == 12
-    assert one.pool.diverged == 0
+    assert one.case.pool.count == 12
+    assert one.case.pool.diverged == 0
 
 
 def test_the_pool_says_how_far_it_is(recording):
     one, done = identifier(recording), []
-    one.pool.run(tasks_of(one, [0.2, 0.3]), tick=done.append)
+    one.case.pool.run(tasks_of(one, [0.2, 0.3]), tick=done.append)
     assert sum(done) == 4
 
 
 def test_more_friction_shortens_the_way(recording):
     one = identifier(recording)
-    low, _, high, _ = one.pool.run(tasks_of(one, [0.15, 0.5]))
+    low, _, high, _ = one.case.pool.run(tasks_of(one, [0.15, 0.5]))
     way = [np.linalg.norm(p.poses[-1, :2] - p.poses[0, :2]) for p in (low, high)]
     assert way[0] > 1.1 * way[1]
 
@@ -169,6 +142,6 @@ def test_a_prediction_keeps_the_turn_in_which_the_yaw_was_recorded(recording):
     task = tasks_of(one, [0.3])[0]
     start = task.problem.start
     turned = replace(start, pose=(start.pose[0], start.pose[1], start.pose[2] + 4.0 * np.pi))
-    plain, more = one.pool.run([task, replace(task, problem=replace(task.problem, start=turned))])
+    plain, more = one.case.pool.run([task, replace(task, problem=replace(task.problem, start=turned))])
     # Stick and slip magnify the rounding of a yaw that is 4 pi larger, to 8e-6 rad on some processors.
     np.testing.assert_allclose(more.poses - plain.poses, np.tile([0, 0, 4 * np.pi], (len(plain.poses), 1)), atol=1e-4)

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from runs import shipped_pushes
 
-from physid_drake.diagnose.hypotheses import baseline, halved, settled, with_one_more, with_tolerances
+from physid_drake.diagnose.hypotheses import halved, with_one_more
 from physid_drake.diagnose.proposals import Proposal, with_part
-from physid_drake.effects import applicable
 from physid_drake.effects.drag import ViscousDrag
 from physid_drake.effects.fields import TableTilt
 from physid_drake.effects.friction import AnisotropicTable
+from physid_drake.identify.baseline import baseline, settled, with_tolerances
 from physid_drake.inference.fit import Fitter, normal_equations
-from physid_drake.inference.hypothesis import Hypothesis
-from physid_drake.inference.predictions import Ask, Physics, Predictor
+from physid_drake.inference.predictions import Predictor
+from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.inference.scores import columns, scores
 from physid_drake.inference.seats import reseated
 from physid_drake.pushes.case import case_of, cell_config
@@ -28,8 +28,7 @@ def fitter_of(recording):
 
 
 def plain_of(fitter):
-    hypothesis = Hypothesis(space=fitter.case.thetas.space, around=fitter.case.around)
-    return baseline(fitter, hypothesis, np.random.default_rng(0))
+    return baseline(fitter, np.random.default_rng(0))
 
 
 @pytest.fixture(scope="module")
@@ -41,13 +40,13 @@ def eraser():
 @pytest.fixture(scope="module")
 def grain():
     fitter = fitter_of(shipped_pushes(8, "sealed_01"))
-    return fitter, *with_tolerances(fitter, plain_of(fitter), applicable(fitter.case.around))
+    return fitter, with_tolerances(fitter, plain_of(fitter))
 
 
 def test_the_baseline_is_identified_within_its_own_uncertainty(eraser):
     fitter, fit = eraser
     space, h = fitter.case.thetas.space, fit.hypothesis
-    precision, _ = normal_equations(fit.weighed, h.mean - fit.point.z, h.std)
+    precision, _ = normal_equations(fit.weighed, h.mean - fit.point.z, h.precision)
     stds = np.sqrt(np.diag(np.linalg.inv(precision)))
     truth = np.asarray(space.to_unit([TRUTH.get(p.name, p.prior_mean) for p in space.parameters]))
     assert fit.loudness == 1.0
@@ -82,7 +81,7 @@ def test_null_effects_change_not_a_bit(eraser):
 
 
 def test_score_tests_and_fits_find_the_grain_and_its_size(grain):
-    fitter, plain, _ = grain
+    fitter, plain = grain
     found = columns(fitter, plain, [AnisotropicTable, TableTilt, ViscousDrag])
     assert scores(fitter, plain, found)[0].kind is AnisotropicTable
     fits = with_one_more(fitter, plain, found)
@@ -94,7 +93,7 @@ def test_score_tests_and_fits_find_the_grain_and_its_size(grain):
 
 
 def test_a_fit_starts_where_it_is_proposed_and_stays_within_bounds(grain):
-    fitter, plain, _ = grain
+    fitter, plain = grain
     h = with_part(plain.hypothesis, ViscousDrag, np.array([0.5]))
     n = plain.hypothesis.simulated
     z = np.concatenate([plain.point.z[:n], [0.5], plain.point.z[n:]])

@@ -13,6 +13,7 @@ from physid_drake.inference.push import (
     held_out,
     loudness_of,
     weighed,
+    without,
 )
 
 RNG = np.random.default_rng(0)
@@ -81,6 +82,15 @@ def test_loudness_is_found_and_is_no_less_than_it_may_be(scale):
     assert loudness_of(squares, [count] * 400, 1.0, TAIL) >= 1.0
 
 
+def test_coordinates_that_act_alike_leave_what_is_known_beforehand():
+    """Two that cannot be told apart, in units that are far from each other's: rounding must not make one certain."""
+    rng, prior = np.random.default_rng(3), np.diag([1e-6, 1e6])
+    shared = rng.normal(size=(12, 1)) @ np.array([[1.0, 1e6]])
+    found = [weighed(rng.normal(size=12), shared, np.zeros((12, 0)), np.zeros(0), 1.0, NO_TAIL) for _ in range(3)]
+    _, root = without([0], np.zeros(2), prior, found)
+    np.testing.assert_allclose(root @ root.T, np.linalg.inv(prior + 2.0 * shared.T @ shared), rtol=0.05)
+
+
 def test_held_out_density_is_the_ratio_of_two_marginal_ones():
     rng = np.random.default_rng(2)
     mean, std = np.zeros(3), np.array([1.0, 2.0, 0.7])
@@ -95,7 +105,7 @@ def test_held_out_density_is_the_ratio_of_two_marginal_ones():
         spread = blocks + (shared * std**2) @ shared.T
         return stats.multivariate_normal(cov=spread).logpdf(np.concatenate([p.residual for p in some]))
 
-    scores = held_out(pushes, [PRIOR] * 4, mean, std, 1.0, found, NO_TAIL)
+    scores = held_out(pushes, [PRIOR] * 4, mean, np.diag(std**-2.0), 1.0, found, NO_TAIL)
     for i, score in enumerate(scores):
         others = [p for k, p in enumerate(pushes) if k != i]
         assert score == pytest.approx(marginal(pushes) - marginal(others), rel=1e-4)

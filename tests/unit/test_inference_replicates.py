@@ -40,8 +40,9 @@ def problem(rng, amount=0.0):
         for (shared, own), column in zip(shapes, columns[0].pushes, strict=True)
     )
     hypothesis = SimpleNamespace(
-        dimension=SHARED, mean=np.zeros(SHARED), std=np.full(SHARED, 10.0), known=np.arange(SHARED)
-    )
+        dimension=SHARED, mean=np.zeros(SHARED), known=np.arange(SHARED), precision=1e-2 * np.eye(SHARED),
+        whitening=0.1 * np.eye(SHARED),
+    )  # fmt: skip
     fit = SimpleNamespace(
         hypothesis=hypothesis, pushes=pushes, scatter=SCATTER, loudness=1.0, tail=1e6,
         point=SimpleNamespace(z=np.zeros(SHARED)),

@@ -204,7 +204,7 @@ def test_a_robot_pushes_learns_plans_and_pushes_again():
         search=SearchConfig(candidates=32, budget=4, jobs=1),
     )
     result = identifier.run()
-    learnt = identified_model(result, identifier.pool.spec, "learnt")
+    learnt = identified_model(result, identifier.case.pool.spec, "learnt")
     assert float(learnt.body.support_friction[0]) == pytest.approx(0.20, rel=0.05)
     start, goal = robot.see(), (0.3, 0.0)
     chosen = plan(

@@ -196,7 +196,7 @@ def test_an_estimate_at_its_bound_is_said_to_be():
 
 
 def test_pushes_that_fit_by_frictions_alone_are_not_said_to_be_explained():
-    told = SimpleNamespace(reduced_chi2=1.1, explains=False, polished=SimpleNamespace(friction_scatter=0.14))
+    told = SimpleNamespace(reduced_chi2=1.1, explains=False, friction_scatter=0.14)
     assert "frictions that differ by 14 %" in verdict(told)
     told.explains = True
     assert verdict(told).startswith("The plain cell explains")

@@ -224,6 +224,7 @@ def test_the_brake_that_may_vary_is_the_one_that_lets_the_object_go(recording, t
     begins, _ = problem.path.last_brake(*problem.moving)
     assert problem.path.times[begins] == pytest.approx(stop, abs=0.06)
     assert nuisance_of(problem, 0.02).index("brake") >= 0
-    longer, shorter = (problem.path.braking(share, *problem.moving).positions(problem.times) for share in (0.5, -0.5))
+    brake = problem.path.last_brake(*problem.moving)
+    longer, shorter = (problem.path.braking(share, brake).positions(problem.times) for share in (0.5, -0.5))
     moved = np.linalg.norm(longer - shorter, axis=1)
     assert abs(problem.times[np.argmax(moved)] - stop) < 0.15

@@ -94,6 +94,6 @@ def test_a_brake_keeps_knots_in_order_on_any_path():
             times=np.cumsum(rng.uniform(2e-3, 0.3, k)), velocities=rng.uniform(-0.5, 0.5, (k, 2)), start=np.zeros(2)
         )
         for share in (-0.9, 0.9, 3.0):
-            changed = path.braking(share)
+            changed = path.braking(share, path.last_brake())
             assert (np.diff(changed.times) > 0.0).all()
             np.testing.assert_allclose(changed.knot_positions()[-1], path.knot_positions()[-1], atol=1e-12)

@@ -160,7 +160,7 @@ def test_noise_far_above_what_is_left_is_no_explanation():
     assert quieter_by(0.5, 500) is None and quieter_by(1.0, 500) is None and quieter_by(0.0, 0) is None
     said = sentence("consistent", (), None, quieter=quieter_by(1e-4, 500))
     assert "is 100 times what is left, and nothing smaller than it can be seen" in said
-    result = SimpleNamespace(reduced_chi2=1e-4, explains=True, polished=SimpleNamespace(degrees=500.0))
+    result = SimpleNamespace(reduced_chi2=1e-4, explains=True, degrees=500)
     assert "nothing smaller than it can be seen" in verdict(result) and "explains" not in verdict(result)
 
 

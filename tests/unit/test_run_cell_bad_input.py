@@ -257,7 +257,7 @@ def failing(monkeypatch, which, error):
 def test_rollouts_that_diverge_are_counted_and_not_fatal(tmp_path, recording, capsys, monkeypatch, error):
     # The second trial of the search: its three pushes.
     failing(monkeypatch, lambda rollout: rollout in (4, 5), error)
-    assert quick(tmp_path / "out", recording=recording, held_out_share=0.0) == 0
+    assert quick(tmp_path / "out", recording=recording, search={"integrator": "cell"}) == 0
     captured = capsys.readouterr()
     assert "2 of " in captured.out
     assert "rollouts diverged and count as failed" in captured.out
@@ -278,7 +278,7 @@ def test_an_object_that_flies_away_has_diverged(recording, tmp_path, capsys, mon
             self._state.set_twist((1e3, 0.0, 0.0))
 
     monkeypatch.setattr(Stepper, "_begin_at", thrown)
-    assert quick(tmp_path / "out", recording=recording, held_out_share=0.0) == 0
+    assert quick(tmp_path / "out", recording=recording, search={"integrator": "cell"}) == 0
     assert "3 of " in capsys.readouterr().out
 
 

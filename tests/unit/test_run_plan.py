@@ -75,12 +75,12 @@ def test_plain_plans_without_the_effects_and_says_what_they_make_of_it(folder, t
 def test_the_results_beside_a_model_give_scatter_and_order(folder, tmp_path, few_rows):
     (folder / "model.yaml").write_text(replace(MODEL, intervals={}).dump())
     assert json.loads(planned_files(folder, tmp_path / "one")["plan.json"])["belief"] is None
-    content = {"friction_scatter": 0.05, "held_out": {"pushes": ["a"]}, "training": {"pushes": ["b", "c"]}}
+    content = {"friction_scatter": 0.05, "training": {"pushes": ["b", "c"]}, "pushes": 3}
     (folder / "result.json").write_text(json.dumps(content))
     belief = json.loads(planned_files(folder, tmp_path / "two")["plan.json"])["belief"]
     assert belief["ends"][0]["x_m"] != belief["ends"][1]["x_m"]
-    # Two pushes tell no scatter, so that it is as sure as its first guess; five add theirs.
-    assert run_plan._learnt(folder) == run_plan.Learnt(friction_scatter=0.05, scatter_freedom=4.0, pushes=3)
+    # The first guess is worth four pushes; the others add theirs.
+    assert run_plan._learnt(folder) == run_plan.Learnt(friction_scatter=0.05, scatter_freedom=6.0, pushes=3)
     diagnosis = {
         "friction_scatter": 0.02, "fit": {"per_push": [1, 2, 3, 4, 5]}, "pushes": 30, "verdict": "explained",
         "effects": [{"name": "table_tilt", "indistinguishable_from": []}],
@@ -325,8 +325,8 @@ def test_the_main_job_refuses_a_plan_it_cannot_make(tmp_path, capsys, plan_secti
 
 def test_the_planner_starts_where_the_recording_began():
     identifier = coarse_identifier(shipped_pushes(2))
-    planner = planner_of(PlanConfig(), identifier.pool.spec, identifier.problems, "eraser", 0)
-    assert planner.situation.start == identifier.problems[0].start.pose
+    planner = planner_of(PlanConfig(), identifier.case.pool.spec, identifier.case.problems, "eraser", 0)
+    assert planner.situation.start == identifier.case.problems[0].start.pose
     assert planner.situation.order == 2 and planner.situation.hand_height == pytest.approx(0.015)
     assert planner.goal == pytest.approx((planner.situation.start[0] + 0.3, planner.situation.start[1]))
     assert planner.dimension == 3

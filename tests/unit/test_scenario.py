@@ -65,9 +65,9 @@ def test_an_empty_scenario_is_the_defaults(tmp_path):
 
 
 def test_a_template_serves_scenarios_and_is_none(tmp_path):
-    file = config(tmp_path, "_base: &base {seed: 7}\nmine: {<<: *base, held_out_share: 0.5}\n")
+    file = config(tmp_path, "_base: &base {seed: 7}\nmine: {<<: *base, pushes: 5}\n")
     name, scenario = load_scenario(file, None)
-    assert (name, scenario.seed, scenario.held_out_share) == ("mine", 7, 0.5)
+    assert (name, scenario.seed, scenario.pushes) == ("mine", 7, 5)
     assert "there is no scenario '_base'" in refusal(f"{file}:_base")
 
 
@@ -222,14 +222,14 @@ def test_an_unknown_scenario_is_answered_with_the_known_ones():
         ("cell.friction_cells", [0, 1]),
         ("cell.default_density_kgpm3", 0.0),
         ("cell.default_density_kgpm3", 1e4),
-        ("held_out_share", 1.0),
-        ("held_out_share", -0.1),
+        ("pushes", 0),
+        ("pushes", -1),
         ("search.budget", 0),
         ("search.candidates", 1),
         ("search.batch", 0),
         ("search.patience", 0),
         pytest.param("seed", -1),
-        pytest.param("held_out_share", 10**400),
+        pytest.param("plan.tolerance_m", 10**400),
         pytest.param("search.jobs", -1),
         pytest.param("search.entropy_tolerance_nats", -1.0),
         pytest.param("cell.contact.dissipation_s_per_m", -1.0),

@@ -7,13 +7,15 @@ the cell's residuals and the twin's derivatives.
 from __future__ import annotations
 
 import dataclasses as dc
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell import CellConfig
 from physid_drake.inference.fit import Fit, Fitter
-from physid_drake.inference.predictions import Ask, Physics
+from physid_drake.inference.hypothesis import Hypothesis
+from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.pushes.problem import spec_of
 
 Array = NDArray[np.float64]
@@ -53,23 +55,26 @@ class Judge:
             best = other
         return best
 
-    def left_out(self, fit: Fit) -> tuple[Array, ...]:
-        """Recorded less predicted (m_i,) of each push, in the features' units, simulated without having seen it.
+    def errors(self, h: Hypothesis, zs: Sequence[Array]) -> list[Array | None]:
+        """Recorded less predicted (m_i,) of each push at a z of its own, in the features' units; None of no rollout.
 
         Nothing of a push is known to its prediction but the start of the object and the hand's path.
         """
-        h, count = fit.hypothesis, len(fit.pushes)
-        zs = [self.fitter.without(fit, i) for i in range(count)]
-        rests = self.fitter.at_rest()
+        rests, predictor = self.fitter.at_rest(), self.fitter.predictor
         asks = [Ask(i, Physics(h.theta(z), h.effects(z)), rests[i]) for i, z in enumerate(zs)]
-        errors = list[Array]()
-        for i, vector in enumerate(self.fitter.predictor.vectors(asks)):
-            push = fit.pushes[i]
-            left = push.residual - push.shared @ (zs[i] - fit.point.z)
-            if vector is not None:
-                left = self.fitter.predictor.recorded[i] - vector
-            errors.append(np.asarray(np.linalg.solve(self.fitter.predictor.whitening[i], left), dtype=np.float64))
-        return tuple(errors)
+        pairs = zip(predictor.vectors(asks), predictor.recorded, predictor.whitening, strict=True)
+        return [None if one is None else np.asarray(np.linalg.solve(w, y - one)) for one, y, w in pairs]
+
+    def left_out(self, fit: Fit) -> tuple[Array, ...]:
+        """The errors (m_i,) of each push, simulated with what all others say; linearly, where it cannot be."""
+        zs = [self.fitter.without(fit, i) for i in range(len(fit.pushes))]
+        made = []
+        for push, z, whitening, error in zip(
+            fit.pushes, zs, self.fitter.predictor.whitening, self.errors(fit.hypothesis, zs), strict=True
+        ):
+            left = push.residual - push.shared @ (z - fit.point.z)
+            made.append(np.asarray(np.linalg.solve(whitening, left)) if error is None else error)
+        return tuple(made)
 
 
 def stiff(config: CellConfig) -> CellConfig:

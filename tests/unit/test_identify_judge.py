@@ -3,7 +3,7 @@
 import dataclasses as dc
 
 from physid_drake.cell import CellConfig
-from physid_drake.diagnose.judge import HAND_FREQUENCY, REST_DEPTH, STICTION, TICK, stiff
+from physid_drake.identify.judge import HAND_FREQUENCY, REST_DEPTH, STICTION, TICK, stiff
 
 
 def test_the_judges_contacts_hardly_give():

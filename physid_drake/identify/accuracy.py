@@ -1,0 +1,65 @@
+"""How well pushes are predicted: errors in units that a person can check."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.pushes.case import Case
+
+Array = NDArray[np.float64]
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Accuracy:
+    """Root mean square errors of pushes, over the windows that are compared.
+
+    Attributes:
+        rms: of their poses, in standard deviations.
+        per_push: the same of each.
+        position, rotation: of place and yaw [m, rad].
+        end_position, end_rotation: in the last window of each [m, rad].
+        force: of the hand's force [N]; NaN where none was compared.
+        force_per_push: of the force of each, in standard deviations; NaN of those without.
+        diverged: pushes that could not be simulated, which are left out.
+    """
+
+    rms: float
+    per_push: tuple[float, ...]
+    position: float
+    rotation: float
+    end_position: float
+    end_rotation: float
+    force: float
+    force_per_push: tuple[float, ...]
+    diverged: int = 0
+
+
+def accuracy_of(case: Case, errors: Sequence[Array | None]) -> Accuracy:
+    """Of what was recorded less what was predicted of each push (m_i,), in the features' units; None: no rollout."""
+    made = [(f, e) for f, e in zip(case.features, errors, strict=True) if e is not None]
+    poses = [f.poses(e) for f, e in made]
+    forces = [f.forces(e) for f, e in made]
+    scaled = [p / f.sigmas for (f, _), p in zip(made, poses, strict=True)]
+    scaled_forces = [p / f.force_sigmas for (f, _), p in zip(made, forces, strict=True)]
+    every, last = _joined(poses), np.array([p[-1] for p in poses]).reshape(-1, 3)
+    return Accuracy(
+        rms=rms(_joined(scaled)), per_push=tuple(rms(s) for s in scaled),
+        position=math.sqrt(2.0) * rms(every[:, :2]), rotation=rms(every[:, 2]),
+        end_position=math.sqrt(2.0) * rms(last[:, :2]), end_rotation=rms(last[:, 2]),
+        force=math.sqrt(2.0) * rms(_joined(forces, 2)), force_per_push=tuple(rms(s) for s in scaled_forces),
+        diverged=len(errors) - len(made),
+    )  # fmt: skip
+
+
+def _joined(parts: Sequence[Array], width: int = 3) -> Array:
+    return np.concatenate([np.zeros((0, width)), *parts])
+
+
+def rms(values: Array) -> float:
+    """Root mean square; NaN of nothing."""
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else math.nan

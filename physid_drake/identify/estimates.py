@@ -1,0 +1,86 @@
+"""Theta with intervals, of any hypothesis."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from physid_drake.inference.fit import Fit, Fitter
+from physid_drake.pushes.theta import cell_error, range_of
+from physid_drake.space import Parameter, ParameterSpace
+
+Array = NDArray[np.float64]
+
+Z90 = float(stats.norm.ppf(0.95))
+TOLD = 0.5  # share of the prior's standard deviation that may be left of what counts as told
+AT_BOUND = 2e-3  # of the unit cube
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """One parameter of theta, as these pushes tell it.
+
+    Attributes:
+        name, unit: which.
+        value: best estimate.
+        ci90: 90 % interval; of what is not told, no wider than the prior's.
+        identifiable: whether the pushes leave at most half of the prior's spread (``TOLD``).
+        prior: its value before.
+        at_bound: whether it ran into a bound that is none of physics: the truth may lie beyond.
+    """
+
+    name: str
+    unit: str
+    value: float
+    ci90: tuple[float, float]
+    identifiable: bool
+    prior: float
+    at_bound: bool = False
+
+
+def t_factor(fit: Fit) -> float:
+    """How much wider than a normal interval one is with so few pushes; the cell's own error does not grow with it."""
+    free = max(2, len(fit.pushes) - fit.hypothesis.simulated)
+    return float(stats.t.ppf(0.95, free)) / Z90
+
+
+def estimates_of(fitter: Fitter, fit: Fit) -> tuple[Estimate, ...]:
+    """Theta under a model: by the curvature of its likelihood, the pushes' own unknowns integrated out.
+
+    As wide as a Student t of so few pushes has it, and no narrower than the cell's own error, which pushes share.
+    """
+    h = fit.hypothesis
+    space, u, here = h.space, fit.point.z[: h.space.dimension], h.theta(fit.point.z)
+    stds = np.sqrt(np.diag(fitter.covariance(fit)))
+    made = []
+    for j, parameter in enumerate(space.parameters):
+        told = bool(stds[j] < TOLD * h.std[j])
+        if told or parameter.prior_std is not None:
+            reach = Z90 * min(math.hypot(t_factor(fit) * stds[j], cell_error(space, here, j)), h.std[j])
+            ends = max(0.0, u[j] - reach), min(1.0, u[j] + reach)
+        else:
+            ends = min(0.05, u[j]), max(0.95, u[j])  # of a uniform prior, and where the value is
+        low, high = (_moved(space, u, j, end) for end in ends)
+        made.append(Estimate(
+            name=parameter.name, unit=parameter.unit, value=float(here[j]), ci90=(low, high), identifiable=told,
+            prior=parameter.prior_mean, at_bound=_may_lie_beyond(parameter, float(u[j])),
+        ))  # fmt: skip
+    return tuple(made)
+
+
+def _moved(space: ParameterSpace, u: Array, j: int, value: float) -> float:
+    """Parameter j of the point u (d,) of the unit cube with its entry j moved to ``value``."""
+    point = u.copy()
+    point[j] = value
+    return float(space.from_unit(point)[j])
+
+
+def _may_lie_beyond(parameter: Parameter, place: float) -> bool:
+    """Whether a value, at a place in its bounds from 0 to 1, is at one that the search chose, and not physics."""
+    beyond = range_of(parameter.name)
+    low = place < AT_BOUND and parameter.lower > max(beyond.above, beyond.least)
+    return low or (place > 1.0 - AT_BOUND and parameter.upper < min(beyond.most, beyond.below))

@@ -1,0 +1,87 @@
+"""Frictions that wander along a push's way, under the object and at the tip: learned from what a model leaves.
+
+Repeated pushes of a real object end millimetres apart, however quiet the tracker is (K.-T. Yu et al., IROS 2016;
+M. Bauza and A. Rodriguez, ICRA 2017). That is noise of the process, which no deterministic model explains. It is
+learned from what the richest hypothesis leaves, so that it does not take missing physics for noise, and counts from
+then on beside the sensors' noise.
+"""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from physid_drake.inference.fit import Fit, Fitter
+from physid_drake.inference.push import LinearPush, loudness_of, weighed
+from physid_drake.inference.rollouts import Physics
+from physid_drake.inference.scatter import SCATTERS, log_prior_of_scatter
+
+Array = NDArray[np.float64]
+
+SHARES = (0.0, 0.02, 0.04, 0.08, 0.16, 0.32)  # of friction, standard deviation
+EVEN = 0.5  # probability beforehand that both surfaces are even
+ROUNDS = 4  # in which loudness and weights find each other
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class ProcessNoise:
+    """Standard deviations of frictions along the way [-]: with the table, and at the tip."""
+
+    table: float = 0.0
+    tip: float = 0.0
+
+    @property
+    def is_none(self) -> bool:
+        """Whether both surfaces are even."""
+        return self.table == 0.0 and self.tip == 0.0
+
+
+EVEN_SURFACES = ProcessNoise()
+
+
+def learned(fitter: Fitter, fit: Fit) -> tuple[ProcessNoise, list[Array]]:
+    """The likeliest process noise beside a fit, and what it adds to the noise (m, m) of each push, in units of it."""
+    h, point = fit.hypothesis, fit.point
+    found = fitter.predictor.wanders(point.own, Physics(h.theta(point.z), h.effects(point.z)))
+
+    def covariances(noise: ProcessNoise) -> list[Array]:
+        return [noise.table**2 * w @ w.T + noise.tip**2 * v @ v.T for w, v in found]
+
+    choices = [ProcessNoise(table=table, tip=tip) for table, tip in itertools.product(SHARES, SHARES)]
+    uneven = math.log((1.0 - EVEN) / (len(choices) - 1) / EVEN)
+    values = [
+        _log_likelihood(fitter, fit, covariances(one)) + (0.0 if one.is_none else uneven) for one in choices
+    ]  # fmt: skip
+    best = choices[int(np.argmax(values))]
+    return best, covariances(best)
+
+
+def _log_likelihood(fitter: Fitter, fit: Fit, added: Sequence[Array]) -> float:
+    """Of the pushes where the fit is, with more noise, at the likeliest scatter of friction and loudness."""
+    roots: list[Array] = [np.asarray(np.linalg.cholesky(np.eye(len(one)) + one), dtype=np.float64) for one in added]
+    pushes = [_whitened(push, root) for push, root in zip(fit.pushes, roots, strict=True)]
+    dets = sum(float(np.log(np.diag(root)).sum()) for root in roots)
+    return max(_with_scatter(fitter, fit, pushes, scatter) for scatter in SCATTERS[::2]) - dets
+
+
+def _whitened(push: LinearPush, root: Array) -> LinearPush:
+    residual, own = (solve_triangular(root, one, lower=True) for one in (push.residual, push.own))
+    return LinearPush(residual=residual, shared=np.zeros((len(residual), 0)), own=own)
+
+
+def _with_scatter(fitter: Fitter, fit: Fit, pushes: Sequence[LinearPush], scatter: float) -> float:
+    loudness, priors = fit.loudness, fitter.priors(scatter)
+    for _ in range(ROUNDS):
+        found = [
+            weighed(push.residual, push.shared, push.own, prior, loudness, fit.tail)
+            for push, prior in zip(pushes, priors, strict=True)
+        ]
+        squares, counts = [one.square for one in found], [len(push.residual) for push in pushes]
+        loudness = loudness_of(squares, counts, fitter.least, fit.tail)
+    return sum(one.log_density for one in found) + log_prior_of_scatter(scatter)
