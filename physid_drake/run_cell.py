@@ -15,7 +15,7 @@ from rich.console import Console
 from physid_drake.diagnose import Diagnosis, DiagnosisSystem, Examined, diagnose_from, model_of
 from physid_drake.door import DONE, Parser, enter, path
 from physid_drake.errors import ConfigError
-from physid_drake.identify import Identification, Identifier, OnlineIdentifier, in_the_cell
+from physid_drake.identify import Identification, Identifier, OnlineIdentifier, in_the_cell, with_prior
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
 from physid_drake.model import Model
 from physid_drake.plan import Hindsight, Plan, caveat_of, outcome_under
@@ -234,7 +234,7 @@ class Work:
     def _examined(self, known: Identification, bar: Progress) -> Examined:
         if self._scenario.search.online:
             bar("in the Drake cell", 0, 0)
-            known = in_the_cell(known)
+            known = with_prior(in_the_cell(known))
         if not self._diagnosing:
             return Examined(known=known)
         diagnosis, evidence = diagnose_from(known, seed=self._scenario.seed, alpha=ALPHA, tick=bar)

@@ -234,30 +234,6 @@ class ParameterSpace:
         u: Array = sobol.random_base2(int(np.ceil(np.log2(n))))[:n]
         return self._from_scale(self._inverse_prior_cdf(u)) if from_prior else self.from_unit(u)
 
-    def prior_whitened(self, theta: npt.ArrayLike) -> Array:
-        """Residuals of the prior for least squares: (x - mean) / std on the scale, 0 where uniform.
-
-        Correlated priors are whitened by the Cholesky factor of their correlation: a residual is then what the
-        parameters before it in the space do not say.
-
-        Args:
-            theta: Points (..., d), each entry in its unit.
-
-        Returns:
-            Residuals (..., d), in standard deviations.
-
-        Raises:
-            ParameterError: As `check`.
-        """
-        self.check(theta)
-        x = self._to_scale(self._shaped(theta))
-        mean = self._to_scale(self.nominal)
-        inverse = np.array([0.0 if p.prior_std is None else 1.0 / p.prior_std for p in self.parameters])
-        scores = (x - mean) * inverse
-        if not self.correlation:
-            return np.asarray(scores)
-        return np.asarray(np.linalg.solve(self._factor, scores[..., np.newaxis])[..., 0])
-
     def as_dict(self, theta: npt.ArrayLike) -> dict[str, float]:
         """Point (d,) as a mapping from name to value in its unit.
 

@@ -94,7 +94,7 @@ def gathered(
         best, after = None, before  # likelier, and yet no nearer
     evidence = Evidence(
         known=known, found=found, decision=decision, fitter=judge.fitter, best=best, errors_after=after,
-        errors_partly=None if decision.partly is None else judge.left_out(judge.judged(decision.partly.fit)),
+        errors_partly=None if decision.partly is None else judge.left_out(decision.partly.fit),
     )  # fmt: skip
     if decision.verdict in ("consistent", "underpowered"):
         return evidence

@@ -193,11 +193,6 @@ class Effect:
         """Which values each parameter can have."""
         return {f.name: f.metadata["values"] for f in dc.fields(cls)}
 
-    def reaches(self, places: Array, around: Surroundings) -> bool:
-        """Whether an object that was at places (n, 2) [m] may have felt it."""
-        del places, around
-        return True
-
     # Chart.
 
     @classmethod

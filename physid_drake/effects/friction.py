@@ -21,7 +21,6 @@ LEAST_LEFT = 0.05  # of the friction of the first push
 SLIGHT_SHARE = 0.015  # of the friction
 BASE = 0.6  # of the distance between two places: a patch's radius that covers the gaps
 WIDE = (2.0, 3.5)  # times that radius: larger patches are made of those
-WIDER, NEARBY = 1.3, 0.02  # times a patch's radius, and m: a fit may move its edge by so much
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -161,11 +160,6 @@ class FrictionPatch(Effect):
             for x, y in places.tolist()
         )
         return (*simulated, *wide)
-
-    def reaches(self, places: Array, around: Surroundings) -> bool:
-        """Whether a corner of the object may have been on the patch, which a fit may still make a little larger."""
-        away = np.hypot(places[:, 0] - self.x, places[:, 1] - self.y)
-        return bool(away.min() < WIDER * self.radius + 0.5 * float(np.hypot(*around.size)) + NEARBY)
 
     def frictions(self, facts: PushFacts) -> tuple[FrictionLaw, ...]:
         """The law; none of a patch that the push does not reach: the contact holds no more friction than it must."""

@@ -10,6 +10,7 @@ from physid_drake.identify.identify import Identifier as Identifier
 from physid_drake.identify.identify import identified as identified
 from physid_drake.identify.identify import identified_with as identified_with
 from physid_drake.identify.identify import in_the_cell as in_the_cell
+from physid_drake.identify.identify import with_prior as with_prior
 from physid_drake.identify.online import OnlineBelief as OnlineBelief
 from physid_drake.identify.online import OnlineIdentifier as OnlineIdentifier
 from physid_drake.pushes.config import ThetaConfig as ThetaConfig

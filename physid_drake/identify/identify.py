@@ -199,7 +199,8 @@ def identified_with(
         tick: told the stage.
     """
     finder = Fitter(known.case, known.finder.predictor.noisier(added))
-    return _identified(finder, seed, [known.theta], known.search, rough, tick)
+    again = _identified(finder, seed, [known.theta], known.search, rough, tick)
+    return dc.replace(again, before=known.before, foreseen=known.foreseen)
 
 
 def _identified(
@@ -221,11 +222,14 @@ def in_the_cell(known: Identification) -> Identification:
     """The same with what the Drake cell says of it."""
     judge = Judge(known.finder)
     fit = judge.judged(known.found)
-    h = fit.hypothesis
-    before = judge.errors(h, [h.mean] * len(fit.pushes))
-    return dc.replace(
-        known, fitter=judge.fitter, fit=fit, before=accuracy_of(known.case, before), errors=judge.left_out(fit)
-    )
+    return dc.replace(known, fitter=judge.fitter, fit=fit, errors=judge.left_out(fit))
+
+
+def with_prior(known: Identification) -> Identification:
+    """The same with the accuracy of the prior's theta."""
+    h = known.fit.hypothesis
+    errors = Judge(known.finder).errors(h, [h.mean] * len(known.fit.pushes))
+    return dc.replace(known, before=accuracy_of(known.case, errors))
 
 
 class Identifier:
@@ -275,4 +279,4 @@ class Identifier:
         say: Progress = progress or (lambda stage, done, total: None)
         rng = np.random.default_rng(np.random.SeedSequence(self._seed).spawn(2)[1])
         search = ThetaSearch(self._search, rng, self._state, say)
-        return identified(self.case, seed=self._seed, search=search, tick=say)
+        return with_prior(identified(self.case, seed=self._seed, search=search, tick=say))

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 TICK, LONGEST_TICK = 5e-4, 1e-3  # s: of the judge; of a hand that is not slow
 HAND_FREQUENCY, REST_DEPTH, STICTION = 3000.0, 3e-7, 1e-5  # rad/s, m, m/s: a contact that hardly gives
-STEPS = 2
+STEPS, SETTLED = 2, 0.3  # at most; of log likelihood: a step that gained less is the last
 
 
 class Judge:
@@ -50,9 +50,10 @@ class Judge:
             if moved is None:
                 break
             other = self.fitter.seen_at(best, moved)
-            if other.log_likelihood <= best.log_likelihood:
+            gained = other.log_likelihood - best.log_likelihood
+            best = other if gained > 0.0 else best
+            if gained < SETTLED:
                 break
-            best = other
         return best
 
     def errors(self, h: Hypothesis, zs: Sequence[Array]) -> list[Array | None]:

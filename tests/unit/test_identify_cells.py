@@ -59,16 +59,6 @@ def test_drawn_frictions_have_the_correlation_asked_for_and_stay_inside():
     narrow.check(narrow.sample(np.random.default_rng(0), 512, from_prior=True))
 
 
-def test_the_whitened_prior_is_that_of_the_covariance():
-    space = tied((2, 2)).space
-    rng = np.random.default_rng(1)
-    thetas = space.sample(rng, 16, from_prior=True)
-    x = np.log(thetas) - np.log(space.nominal)
-    covariance = space.parameters[0].prior_std ** 2 * np.array(space.correlation)
-    wanted = np.einsum("ni,ij,nj->n", x, np.linalg.inv(covariance), x)
-    np.testing.assert_allclose((space.prior_whitened(thetas) ** 2).sum(axis=1), wanted)
-
-
 def test_the_fits_prior_is_that_of_the_covariance():
     space = tied((2, 2), "mass", "support_friction").space
     h = Hypothesis(space=space, around=None)
