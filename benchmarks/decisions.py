@@ -21,13 +21,11 @@ from rich.table import Table
 
 from physid_drake.diagnose import decide
 from physid_drake.diagnose.decide import decided, loudest
-from physid_drake.diagnose.hypotheses import baseline, with_tolerances
 from physid_drake.diagnose.search import searched
 from physid_drake.effects import applicable
-from physid_drake.inference.fit import Fitter
-from physid_drake.inference.hypothesis import Hypothesis
-from physid_drake.inference.predictions import Predictor
+from physid_drake.identify.baseline import baseline, fitter_of, with_tolerances
 from physid_drake.inference.replicates import gains_by_chance, p_value
+from physid_drake.inference.scores import columns
 from physid_drake.prove.score import Outcome
 from physid_drake.pushes.case import case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
@@ -64,19 +62,18 @@ def truth_of(folder):
     return json.loads((folder.parents[1] / "sealed" / f"{folder.name}.json").read_text())
 
 
-def fitter_of(folder):
+def identified_in(folder):
+    """The baseline, fitted on the twin, and what fitted it."""
     recording = read_recording(folder)
-    case = case_of(recording, cell_config(recording), ThetaConfig())
-    return Fitter(case, Predictor(case))
+    finder = fitter_of(case_of(recording, cell_config(recording), ThetaConfig()), 0)
+    return finder, with_tolerances(finder, baseline(finder, np.random.default_rng(0)))
 
 
 def chance(folder):
     """The p-value of a recording, whose effects are looked for by their columns alone."""
-    fitter, rng = fitter_of(folder), np.random.default_rng(0)
-    plain = baseline(fitter, Hypothesis(space=fitter.case.thetas.space, around=fitter.case.around), rng)
-    plain, found = with_tolerances(fitter, plain, applicable(fitter.case.around))
-    seen, by_chance = gains_by_chance(fitter, plain, found, rng)
-    p = p_value(seen, by_chance)
+    finder, plain = identified_in(folder)
+    found = columns(finder, plain, applicable(finder.case.around))
+    p = p_value(*gains_by_chance(finder, plain, found, np.random.default_rng(0)))
     print(f"{folder.name} p {p:.2g}", flush=True)
     return p
 
@@ -84,9 +81,9 @@ def chance(folder):
 def answered(folder, truth):
     """What is wrong with the answer, None where nothing is, with all constants and without each of them."""
     begin = time.process_time()
-    fitter = fitter_of(folder)
-    case = fitter.case
-    found = searched(fitter, applicable(case.around), seed=0, alpha=0.01, tick=lambda *_: None)
+    finder, plain = identified_in(folder)
+    case = finder.case
+    found = searched(finder, plain, applicable(case.around), seed=0, alpha=0.01, tick=lambda *_: None)
     faults = {}
     for name, changes in WITHOUT.items():
         with patch.multiple(decide, **changes):

@@ -18,7 +18,7 @@ from physid_drake.diagnose.regimes import regime_gains, standard_error
 from physid_drake.diagnose.sentence import sentence
 from physid_drake.diagnose.values import Detectable, Diagnosis, EffectFinding, FitQuality, Location, Partly
 from physid_drake.identify.accuracy import accuracy_of
-from physid_drake.inference.replicates import p_value
+from physid_drake.inference.replicates import p_value, without_best
 from physid_drake.pushes.case import UNIT_SCATTER
 from physid_drake.pushes.stated import quieter_by
 
@@ -81,7 +81,7 @@ def p_value_of(evidence: Evidence, alpha: float) -> float:
         return 1.0
     if found.p_value < alpha or evidence.decision.verdict in ("consistent", "underpowered"):
         return found.p_value
-    whole = {kinds_of(one)[0].name: one.gain for one in found.named if len(kinds_of(one)) == 1}
+    whole = {kinds_of(one)[0].name: float(without_best(one.gains)) for one in found.named if len(kinds_of(one)) == 1}
     looks = [found.p_value, p_value(whole, found.by_chance), found.alike]
     if found.plain.loudness > loudest(noise):
         squares = sum(one.square for one in found.plain.weighed) / loudest(noise) ** 2

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from physid_drake.diagnose.search import Found, Weighed
 from physid_drake.effects import Effect
 from physid_drake.identify import Accuracy
-from physid_drake.inference.replicates import surprise
+from physid_drake.inference.replicates import surprise, without_best
 from physid_drake.pushes.tracker_noise import TrackerNoise
 
 Array = NDArray[np.float64]
@@ -88,7 +88,7 @@ def decided(found: Found, *, most: float) -> Decision:
     if best is None:
         return Decision(verdict="unexplained", best=nameless)
     beaten = any(surely_better(one.gains - best.gains) for one in found.unnamed)
-    little = found.left >= ADEQUATE or found.left_gain < LITTLE * best.gain
+    little = found.left >= ADEQUATE or found.left_gain < LITTLE * float(without_best(best.gains))
     enough = little and best.fit.loudness <= most and best.alike >= ADEQUATE
     if beaten or not enough:
         return Decision(verdict="unexplained", best=nameless, partly=best)
@@ -101,18 +101,13 @@ def is_own_error(left_out: Accuracy) -> bool:
     return left_out.position < OWN_ERROR[0] and left_out.rotation < OWN_ERROR[1]
 
 
-def without_best(gains: Array) -> float:
-    """Sum of gains (n,) over another hypothesis, without the largest [nats]."""
-    return float(gains.sum() - gains.max())
-
-
 def confirmed(found: Found, one: Weighed, beside: Weighed | None = None) -> bool:
     """Whether pushes that were left out confirm what a hypothesis has beside another, or beside the baseline.
 
     Its gain is compared with what such an effect gains by chance; that of what has no name with the effect that
     gains most.
     """
-    gained = np.array([without_best(one.gains if beside is None else one.gains - beside.gains)])
+    gained = without_best(one.gains if beside is None else one.gains - beside.gains)[None]
     present = () if beside is None else kinds_of(beside)
     names = [kind.name for kind in kinds_of(one) if kind not in present and kind.name in found.by_chance]
     least = min(float(surprise(gained, found.by_chance[name])[0]) for name in names or found.by_chance)
@@ -121,7 +116,7 @@ def confirmed(found: Found, one: Weighed, beside: Weighed | None = None) -> bool
 
 def surely_better(gains: Array) -> bool:
     """Whether gains (n,) over another hypothesis do not rest on one push."""
-    return without_best(gains) > MARGIN
+    return bool(without_best(gains) > MARGIN)
 
 
 def kinds_of(one: Weighed) -> tuple[type[Effect], ...]:

@@ -11,7 +11,7 @@ from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.regimes import standard_error
 from physid_drake.diagnose.search import Weighed
 from physid_drake.diagnose.values import Ranked
-from physid_drake.inference.replicates import surprise
+from physid_drake.inference.replicates import surprise, without_best
 from physid_drake.inference.scores import scores
 
 
@@ -28,11 +28,12 @@ def ranking_of(evidence: Evidence, classes: Sequence[Sequence[str]]) -> tuple[Ra
     named = {kind.name for kind in evidence.decision.effects} if evidence.named else set()
     alike = {name for names in classes for name in names}
     gains = found.linearly | {name: one.gain for name, one in alone.items()}
+    sure = found.linearly | {name: float(without_best(one.gains)) for name, one in alone.items()}
     return tuple(
         Ranked(
             name=name,
             gain=2.0 * max(0.0, scored[name]),
-            p_value=float(np.exp(-surprise(np.array([gains[name]]), found.by_chance[name])[0])),
+            p_value=float(np.exp(-surprise(np.array([sure[name]]), found.by_chance[name])[0])),
             held_out_gain=gains[name] if np.isfinite(gains[name]) else None,
             held_out_se=standard_error(alone[name].gains) if name in alone else None,
             why=_why(name, alone.get(name), named, alike, evidence),

@@ -60,13 +60,13 @@ class Found:
         plain: the baseline, with tolerances.
         alike: of the baseline, as of ``Weighed``.
         columns: of the catalogue beside it.
-        linearly: what each effect gains by these columns, by its name [nats].
+        linearly: what each effect gains by these columns, its best push not counted, by its name [nats].
         p_value: that the best gain of the catalogue over the baseline is chance.
         by_chance: (r,) the same in replicates of this recording in which the baseline is true, by name.
         odd: whether the p-value is below what was asked for, or friction scatters by much.
         named: hypotheses of the catalogue, best first; empty where none was looked for.
         left: that the best gain of the catalogue over the first of them is chance; 1 where none was looked for.
-        left_gain: that gain, linearly [nats].
+        left_gain: that gain, linearly, its best push not counted [nats].
         unnamed: hypotheses of smooth forces and frictions without a name, best first.
     """
 

@@ -30,7 +30,7 @@ MOST_GAIN = 1e6  # nats
 def gains_by_chance(
     fitter: Fitter, fit: Fit, found: Sequence[Column], rng: np.random.Generator
 ) -> tuple[dict[str, float], dict[str, Array]]:
-    """Held-out gains, linearly, of the best family of each effect, by its name.
+    """Held-out gains, linearly, of the best family of each effect, by its name; the best push of each not counted.
 
     A push that is odd in the fit is as loud in all replicates.
 
@@ -45,10 +45,15 @@ def gains_by_chance(
     null = _best([table.scored([]) for table in tables])
     best: dict[str, Array] = {}
     for members in by_family(found):
-        gains = _best([table.scored(members) for table in tables]) - null
+        gains = without_best(_best([table.scored(members) for table in tables]) - null)
         name = found[members[0]].kind.name
         best[name] = np.maximum(best.get(name, gains), gains)
     return {name: float(g[0]) for name, g in best.items()}, {name: g[1:] for name, g in best.items()}
+
+
+def without_best(gains: Array) -> Array:
+    """Sum of gains (n, ...) of pushes over another hypothesis, without the largest: no push decides alone [nats]."""
+    return np.asarray(gains.sum(axis=0) - np.where(np.isfinite(gains).all(axis=0), gains.max(axis=0), 0.0))
 
 
 def surprise(values: Array, replicates: Array) -> Array:
@@ -99,10 +104,10 @@ def _drawn(own: Array, prior: Array, loudness: float, rng: np.random.Generator) 
 
 
 def _best(scored: Sequence[tuple[Array, Array]]) -> Array:
-    """Held-out densities at the scatter that is likeliest, replicate by replicate."""
+    """Held-out densities (n, r) of pushes at the scatter that is likeliest, replicate by replicate."""
     values = np.array([value for value, _ in scored])
     held = np.array([one for _, one in scored])
-    return np.asarray(held[np.argmax(values, axis=0), np.arange(held.shape[1])])
+    return np.asarray(held[np.argmax(values, axis=0), :, np.arange(held.shape[2])].T)
 
 
 class _Table:
@@ -124,7 +129,7 @@ class _Table:
         self.precisions, self.rights, self.squares, self.log_dets = map(np.array, zip(*made, strict=True))
 
     def scored(self, members: Sequence[int]) -> tuple[Array, Array]:
-        """Log likelihood and sum of held-out log densities (r,) of the model with some of the columns.
+        """Log likelihood (r,) and held-out log densities (n, r) of the model with some of the columns.
 
         Where the only coordinate of a family would go below its bound, it is none.
         """
@@ -139,14 +144,14 @@ class _Table:
         value = self.log_prior + 0.5 * (_dot(right, beta) - self.squares.sum(axis=0) - self.log_dets.sum())
         off = beta[: self.n].copy()
         off[:, 0] += self.off
-        held = self.log_prior - 0.5 * ((self.h.whitening @ off)[self.h.known] ** 2).sum(axis=0)
-        # Each push, given the others.
+        cost = 0.5 * ((self.h.whitening @ off)[self.h.known] ** 2).sum(axis=0) - self.log_prior
+        # Each push, given the others; each bears its part of what is unlikely beforehand.
         others = whole - blocks
         b = np.linalg.solve(others, right - rights)
         left = rights - blocks @ b
         squares = self.squares - _dot(b, rights + left) - _dot(left, inverse @ left)
         dets = self.log_dets + log_det - np.linalg.slogdet(others)[1]
-        held -= 0.5 * (squares.sum(axis=0) + dets.sum())
+        held = -0.5 * (squares + dets[:, None]) - cost / len(blocks)
         if len(members) == 1:
             c = self.found[members[0]]
             wrong = beta[-1] < c.coordinate.lower - c.null
