@@ -78,10 +78,10 @@ class Found:
     p_value: float
     by_chance: dict[str, Array]
     odd: bool
-    named: tuple[Weighed, ...]
-    left: float
-    left_gain: float
-    unnamed: tuple[Weighed, ...]
+    named: tuple[Weighed, ...] = ()
+    left: float = 1.0
+    left_gain: float = 0.0
+    unnamed: tuple[Weighed, ...] = ()
 
     @property
     def richest(self) -> Fit:
@@ -104,42 +104,77 @@ def searched(
         alpha: a p-value below which something is missing.
         tick: told the stage.
     """
-    rng = np.random.default_rng(seed)
-
-    def polished(fit: Fit) -> Fit:
-        return settled(fitter, freed(fitter, fit), rng)
-
+    search = _Search(fitter, plain, kinds, np.random.default_rng(seed), alpha)
     tick("is anything missing?", 0, 0)
-    found = columns(fitter, plain, kinds)
-    seen, by_chance = gains_by_chance(fitter, plain, found, rng)
-    p = p_value(seen, by_chance)
-    before = fitter.held_out(plain)
+    found = search.begun()
+    if found.odd or plain.loudness > 1.0:
+        tick("effects, one at a time", 0, 0)
+        found = search.with_singles(found)
+    if not found.odd or not found.named:
+        return found
+    found = search.with_left(found)
+    if found.left < alpha or found.named[0].fit.scatter > ODD_SCATTER:
+        tick("pairs of effects", 0, 0)
+        found = search.with_pairs(found)
+    tick("physics without a name", 0, 0)
+    return dc.replace(found, unnamed=search.ranked(unnamed(fitter, plain)))
 
-    def ranked(fits: Sequence[Fit]) -> tuple[Weighed, ...]:
-        made = [Weighed(fit=fit, gains=fitter.held_out(fit) - before, alike=_alike(fitter, fit)) for fit in fits]
+
+class _Search:
+    """Hypotheses beside a baseline."""
+
+    def __init__(
+        self, fitter: Fitter, plain: Fit, kinds: Sequence[type[Effect]], rng: np.random.Generator, alpha: float
+    ) -> None:
+        self._fitter, self._plain, self._kinds, self._rng, self._alpha = fitter, plain, kinds, rng, alpha
+        self._before = fitter.held_out(plain)
+
+    def begun(self) -> Found:
+        """The baseline, and what is said of it by columns alone."""
+        fitter, plain = self._fitter, self._plain
+        found = columns(fitter, plain, self._kinds)
+        seen, by_chance = gains_by_chance(fitter, plain, found, self._rng)
+        p = p_value(seen, by_chance)
+        return Found(
+            fitter=fitter, plain=plain, alike=_alike(fitter, plain), columns=tuple(found), linearly=seen, p_value=p,
+            by_chance=by_chance, odd=p < self._alpha or plain.scatter > ODD_SCATTER,
+        )  # fmt: skip
+
+    def with_singles(self, found: Found) -> Found:
+        """Each effect alone, the best one polished where something is odd."""
+        named = self.ranked(with_one_more(self._fitter, self._plain, found.columns))
+        if found.odd and named:
+            named = self.ranked([self._polished(named[0].fit), *(one.fit for one in named[1:])])
+        return dc.replace(found, named=named)
+
+    def with_pairs(self, found: Found) -> Found:
+        """The best effects, each with others beside it; and both effects of the best pair alone."""
+        singles = [one.fit for one in found.named]
+        pairs = [one.fit for one in self.ranked(with_two(self._fitter, singles[:SINGLES], self._kinds))]
+        pairs[:1] = map(self._polished, pairs[:1])
+        alone = each_alone(self._fitter, pairs[0]) if pairs else ()
+        return self.with_left(dc.replace(found, named=self.ranked([*better_of(singles, alone), *pairs])))
+
+    def with_left(self, found: Found) -> Found:
+        """Whether the best gain of the catalogue beside the best hypothesis is chance, and that gain."""
+        fit = found.named[0].fit
+        present = {part.kind for part in fit.hypothesis.parts}
+        beside = columns(self._fitter, fit, [kind for kind in self._kinds if kind not in present])
+        if not beside:
+            return dc.replace(found, left=1.0, left_gain=0.0)
+        seen, by_chance = gains_by_chance(self._fitter, fit, beside, self._rng)
+        return dc.replace(found, left=p_value(seen, by_chance), left_gain=max(seen.values()))
+
+    def ranked(self, fits: Sequence[Fit]) -> tuple[Weighed, ...]:
+        """The fits with what each gains over the baseline, best first."""
+        made = [
+            Weighed(fit=fit, gains=self._fitter.held_out(fit) - self._before, alike=_alike(self._fitter, fit))
+            for fit in fits
+        ]
         return tuple(sorted(made, key=lambda one: -one.gain))
 
-    named, left, without = tuple[Weighed, ...](), (1.0, 0.0), tuple[Weighed, ...]()
-    odd = p < alpha or plain.scatter > ODD_SCATTER
-    if odd or plain.loudness > 1.0:
-        tick("effects, one at a time", 0, 0)
-        named = ranked(with_one_more(fitter, plain, found))
-    if odd and named:
-        named = ranked([polished(named[0].fit), *(one.fit for one in named[1:])])
-        left = _left(fitter, named[0].fit, kinds, rng)
-        if left[0] < alpha or named[0].fit.scatter > ODD_SCATTER:
-            tick("pairs of effects", 0, 0)
-            singles = [one.fit for one in named]
-            pairs = [one.fit for one in ranked(with_two(fitter, singles[:SINGLES], kinds))]
-            pairs[:1] = map(polished, pairs[:1])
-            named = ranked([*better_of(singles, each_alone(fitter, pairs[0]) if pairs else ()), *pairs])
-            left = _left(fitter, named[0].fit, kinds, rng)
-        tick("physics without a name", 0, 0)
-        without = ranked(unnamed(fitter, plain))
-    return Found(
-        fitter=fitter, plain=plain, alike=_alike(fitter, plain), columns=tuple(found), linearly=seen, p_value=p,
-        by_chance=by_chance, odd=odd, named=named, left=left[0], left_gain=left[1], unnamed=without,
-    )  # fmt: skip
+    def _polished(self, fit: Fit) -> Fit:
+        return settled(self._fitter, freed(self._fitter, fit), self._rng)
 
 
 def better_of(fits: Sequence[Fit], others: Sequence[Fit]) -> list[Fit]:
@@ -154,13 +189,3 @@ def _alike(fitter: Fitter, fit: Fit) -> float:
     """By a chi-square of the frictions' squares, the largest not counted: what is odd of one push is no physics."""
     squares = np.sort((fitter.frictions(fit) / SCATTER) ** 2)[:-1]
     return float(stats.chi2.sf(squares.sum(), len(squares)))
-
-
-def _left(fitter: Fitter, fit: Fit, kinds: Sequence[type[Effect]], rng: np.random.Generator) -> tuple[float, float]:
-    """That the best gain of the catalogue beside a hypothesis is chance, and that gain."""
-    present = {part.kind for part in fit.hypothesis.parts}
-    beside = columns(fitter, fit, [kind for kind in kinds if kind not in present])
-    if not beside:
-        return 1.0, 0.0
-    seen, by_chance = gains_by_chance(fitter, fit, beside, rng)
-    return p_value(seen, by_chance), max(seen.values())
