@@ -2,10 +2,10 @@
 
 Simulation-based calibration (S. Talts et al., arXiv 1804.06788, 2018) on worlds of the twin: theta, an effect and
 each push's own unknowns are drawn, the pushes of a shipped recording are made with them and with noise as the
-objective has it, and the hypothesis with that effect is fitted as a diagnosis fits it. If intervals are right, the rank of the
-truth in what the fit believes is uniform. For every effect and coordinate: in how many worlds the 90 % interval holds
-the truth, the same of those in which the effect was confirmed, and the p-value of a uniform rank (Kolmogorov and
-Smirnov); with ``--out`` one figure of all ranks. 1,000 worlds take about an hour on one core.
+objective has it, and the hypothesis with that effect is fitted as a diagnosis fits it. If intervals are right, the
+rank of the truth in what the fit believes is uniform. For every effect and coordinate: in how many worlds the 90 %
+interval holds the truth, the same of those in which the effect was confirmed, and the p-value of a uniform rank
+(Kolmogorov and Smirnov); with ``--out`` one figure of all ranks. 1,000 worlds take about an hour on one core.
 """
 
 import argparse

@@ -164,6 +164,9 @@ def _left(evidence: Evidence) -> str:
     scatter = 100.0 * UNIT_SCATTER * after.scatter
     trend = friction_trend(evidence.fitter, after)
     friction = f"friction scatters by {scatter:.0f} % from push to push" + ("" if trend is None else f", {trend}")
+    rough = evidence.known.rough
+    if not rough.is_none:
+        friction += f", and by {100 * rough.table:.0f} % along its way ({100 * rough.tip:.0f} % at the tip)"
     nameless = "" if evidence.named or evidence.best is None else "beside a force without a name, "
     if after.loudness <= loudest(evidence.case.noise):
         return f"{nameless}no more than noise; {friction}"

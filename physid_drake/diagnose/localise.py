@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.cell.solid import solid_of
-from physid_drake.inference.fit import Fit, Fitter, slope
+from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.push import NO_TAIL, weighed
-from physid_drake.inference.rollouts import Ask, Physics
+from physid_drake.inference.rollouts import Ask
+from physid_drake.inference.slopes import slope
 from physid_drake.pushes.case import Case
 from physid_drake.twin.twin import Wander
 
@@ -72,8 +73,8 @@ def missing_wrenches(fitter: Fitter, plain: Fit) -> tuple[MissingWrench, ...]:
     force = case.around.friction * case.around.weight
     units = np.array([force, force, force * 0.5 * case.around.radius])
     windows = [_windows(case, i) for i in range(len(case.problems))]
-    theta, present = h.theta(point.z), h.effects(point.z)
-    asks = [Ask(i, Physics(theta, present), point.own[i]) for i in range(len(windows))]
+    physics = h.physics(point.z)
+    asks = [Ask(i, physics, point.own[i]) for i in range(len(windows))]
     for i, mine in enumerate(windows):
         for spell in mine:
             c, s = PULSE * math.cos(spell.heading), PULSE * math.sin(spell.heading)

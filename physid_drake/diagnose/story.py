@@ -20,7 +20,6 @@ from physid_drake.effects import applicable
 from physid_drake.identify import Identification, identified, identified_with
 from physid_drake.identify.accuracy import accuracy_of
 from physid_drake.identify.judge import Judge
-from physid_drake.inference.fit import Fit
 from physid_drake.inference.process_noise import learned
 from physid_drake.inference.rollouts import Physics
 from physid_drake.progress import Progress
@@ -110,9 +109,5 @@ def _rivals(named: Sequence[Weighed], decision: Decision) -> list[Physics]:
     if best is None or decision.verdict == "unexplained":
         return []
     others = [one for one in named if one is not best and len(kinds_of(one)) == len(kinds_of(best))]
-    return [physics_of(one.fit) for one in (best, *(decision.rivals[:RIVALS] or others[:1]))]
-
-
-def physics_of(fit: Fit) -> Physics:
-    """Theta and effects of a fit."""
-    return Physics(fit.hypothesis.theta(fit.point.z), fit.hypothesis.effects(fit.point.z))
+    fits = [one.fit for one in (best, *(decision.rivals[:RIVALS] or others[:1]))]
+    return [fit.hypothesis.physics(fit.point.z) for fit in fits]

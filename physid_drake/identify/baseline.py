@@ -106,7 +106,7 @@ def with_tolerances(fitter: Fitter, fit: Fit) -> Fit:
     centre and clocks.
     """
     h, predictor = fit.hypothesis, fitter.predictor
-    predictor.with_directions(predictor.path_errors(fit.point.own, Physics(h.theta(fit.point.z))))
+    predictor.with_directions(predictor.path_errors(fit.point.own, h.physics(fit.point.z)))
     fit = fitted_at(fitter, h, fit.point.z, fit)
     found = columns(fitter, fit, tolerated(fitter.case.around))
     slight = [c for c in found if c.coordinate.tolerance > 0.0 and c.family.size == 1.0]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import CellConfig
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.hypothesis import Hypothesis
-from physid_drake.inference.rollouts import Ask, Physics
+from physid_drake.inference.rollouts import Ask
 from physid_drake.pushes.problem import spec_of
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ class Judge:
         Nothing of a push is known to its prediction but the start of the object and the hand's path.
         """
         rests, predictor = self.fitter.at_rest(), self.fitter.predictor
-        asks = [Ask(i, Physics(h.theta(z), h.effects(z)), rests[i]) for i, z in enumerate(zs)]
+        asks = [Ask(i, h.physics(z), rests[i]) for i, z in enumerate(zs)]
         pairs = zip(predictor.vectors(asks), predictor.recorded, predictor.whitening, strict=True)
         return [None if one is None else np.asarray(np.linalg.solve(w, y - one)) for one, y, w in pairs]
 

@@ -23,14 +23,14 @@ from physid_drake.inference.push import (
     weighed,
     without,
 )
-from physid_drake.inference.rollouts import Ask, Physics
+from physid_drake.inference.rollouts import Ask
 from physid_drake.inference.scatter import SCATTERS, log_prior_of_scatter
+from physid_drake.inference.slopes import own_slopes, own_steps, slope
 from physid_drake.pushes.case import Case
 
 Array = NDArray[np.float64]
 Own = tuple[Array, ...]
 
-OWN_STEP = 0.5  # of the prior's standard deviation, for differences
 MOST_OWN, MOST_FRICTION = 3.0, 8.0  # standard deviations: unknowns go no further out
 MOST_THETA_MOVE = 0.25  # of the unit cube in one step
 RENEWED = 5.0  # of the cost, per push: a step that gained as much has left the place of its derivatives
@@ -136,7 +136,7 @@ class Fitter:
         """What hypotheses predict at z with the pushes' unknowns; None where the twin cannot say it of a push."""
         asks = []
         for h, z, own in zip(hypotheses, zs, owns, strict=True):
-            physics = Physics(h.theta(z), h.effects(z))
+            physics = h.physics(z)
             asks += [Ask(i, physics, own[i]) for i in range(self.count)]
         vectors = iter(self.predictor.vectors(asks))
         points: list[Point | None] = []
@@ -217,8 +217,8 @@ class Fitter:
         for step in np.diag(h.steps(point.z))[skipped:]:
             z = point.z.copy()
             z[: h.simulated] += step
-            moved.append(Physics(h.theta(z), h.effects(z)))
-        here = Physics(h.theta(point.z), h.effects(point.z))
+            moved.append(h.physics(z))
+        here = h.physics(point.z)
         asks = []
         for i in range(self.count):
             asks += [Ask(i, physics, point.own[i]) for physics in moved]
@@ -393,22 +393,3 @@ def normal_equations(found: Sequence[Weighed], mean: Array, precision: Array) ->
     right = sum((one.right for one in found), precision @ mean)
     ridge = 1e-12 * float(np.trace(whole)) * np.eye(len(right))
     return np.asarray(whole + ridge), np.asarray(right)
-
-
-def own_steps(own: Array) -> list[Array]:
-    """Each of a push's unknowns (k,) stepped, towards its middle."""
-    return [own + step for step in np.diag(_own_sizes(own))]
-
-
-def own_slopes(base: Array, own: Array, vectors: Iterator[Array | None]) -> Array:
-    """Derivatives (m, k) by a push's unknowns, from the rollouts of ``own_steps``."""
-    return np.column_stack([slope(base, next(vectors), size) for size in _own_sizes(own)])
-
-
-def _own_sizes(own: Array) -> Array:
-    return np.where(own <= 0.0, OWN_STEP, -OWN_STEP)
-
-
-def slope(base: Array, moved: Array | None, step: float) -> Array:
-    """Of a prediction (m,); none where the step cannot be rolled out."""
-    return np.zeros_like(base) if moved is None else (moved - base) / step

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.effects import Coordinate, Effect, Surroundings
+from physid_drake.inference.rollouts import Physics
 from physid_drake.space import ParameterSpace
 
 Array = NDArray[np.float64]
@@ -124,6 +125,10 @@ class Hypothesis:
         sizes = np.concatenate([np.full(d, THETA_STEP), [c.step for c in self.coordinates]])
         middle = np.concatenate([np.full(d, 0.5), self.bounds[1][d:n] - sizes[d:]])
         return np.asarray(np.where(z[:n] <= middle, sizes, -sizes))
+
+    def physics(self, z: Array) -> Physics:
+        """What all pushes share at z."""
+        return Physics(self.theta(z), self.effects(z))
 
     def theta(self, z: Array) -> Array:
         """The baseline's parameters (d,), each in its unit."""

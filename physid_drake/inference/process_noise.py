@@ -19,7 +19,6 @@ from scipy.linalg import solve_triangular
 
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.push import LinearPush, loudness_of, weighed
-from physid_drake.inference.rollouts import Physics
 from physid_drake.inference.scatter import SCATTERS, log_prior_of_scatter
 
 Array = NDArray[np.float64]
@@ -47,8 +46,7 @@ EVEN_SURFACES = ProcessNoise()
 
 def learned(fitter: Fitter, fit: Fit) -> tuple[ProcessNoise, list[Array]]:
     """The likeliest process noise beside a fit, and what it adds to the noise (m, m) of each push, in units of it."""
-    h, point = fit.hypothesis, fit.point
-    found = fitter.predictor.wanders(point.own, Physics(h.theta(point.z), h.effects(point.z)))
+    found = fitter.predictor.wanders(fit.point.own, fit.hypothesis.physics(fit.point.z))
 
     def covariances(noise: ProcessNoise) -> list[Array]:
         return [noise.table**2 * w @ w.T + noise.tip**2 * v @ v.T for w, v in found]

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from physid_drake.effects import Coordinate, Effect, Family
 from physid_drake.inference.bounded import bounded
-from physid_drake.inference.fit import Fit, Fitter, slope
+from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.push import weighed
 from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.inference.scatter import log_prior_of_scatter, scatters_beside
+from physid_drake.inference.slopes import slope
 
 Array = NDArray[np.float64]
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.inference.fit import Fit, Fitter, own_slopes, own_steps
+from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.push import weighed
-from physid_drake.inference.rollouts import Ask, Physics
+from physid_drake.inference.rollouts import Ask
+from physid_drake.inference.slopes import own_slopes, own_steps
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ def reseated(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
     if not odd:
         return fit
     h, point = fit.hypothesis, fit.point
-    physics, priors = Physics(h.theta(point.z), h.effects(point.z)), fitter.priors(fit.scatter)
+    physics, priors = h.physics(point.z), fitter.priors(fit.scatter)
     added = [more @ point.z[h.simulated :] for more in fitter.tolerances]
 
     def cost(i: int, own: Array, predicted: Array) -> float:
