@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from physid_drake.diagnose.estimates import correlation_of, parameters_of
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.identify.estimates import estimates_of
 from physid_drake.model import AS_W, Axes, Correlation, Model, turned
 from physid_drake.pushes.problem import HandUse, PushProblem
-
-Array = NDArray[np.float64]
 
 SAME = 0.9  # determinant of the mean of frames: they lie within about 25 degrees of each other
 

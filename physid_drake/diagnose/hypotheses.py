@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from physid_drake.diagnose.proposals import Proposal, proposals
 from physid_drake.effects import Effect
@@ -17,8 +16,6 @@ from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.hypothesis import Part
 from physid_drake.inference.push import TAIL
 from physid_drake.inference.scores import Column, columns, scores
-
-Array = NDArray[np.float64]
 
 FIRST, SECOND = 2, 4  # steps of a fit before the halvings
 FINALISTS = 8

@@ -5,9 +5,6 @@ from __future__ import annotations
 import dataclasses as dc
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from physid_drake.diagnose.conclude import conclude
 from physid_drake.diagnose.decide import Decision, decided, is_own_error, kinds_of, loudest
 from physid_drake.diagnose.evidence import Evidence
@@ -25,8 +22,6 @@ from physid_drake.inference.rollouts import Physics
 from physid_drake.progress import Progress
 from physid_drake.pushes.case import Case
 from physid_drake.pushes.kept_rollouts import KeptRollouts
-
-Array = NDArray[np.float64]
 
 RIVALS = 3  # at most, that a push is looked for which tells them apart
 

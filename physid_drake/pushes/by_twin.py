@@ -8,7 +8,6 @@ from collections import OrderedDict
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.cell.support import FrictionGrid
@@ -17,8 +16,6 @@ from physid_drake.errors import CellError
 from physid_drake.pushes.problem import CellSpec
 from physid_drake.twin.compiled import is_compiled
 from physid_drake.twin.twin import Trace, Twin
-
-Array = NDArray[np.float64]
 
 MOST_TWINS = 24  # kept by a process: effects of shape and pressure have their own
 

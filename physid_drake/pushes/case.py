@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from physid_drake.cell import CellConfig
 from physid_drake.cell.solid import Solid, solid_of
@@ -28,7 +27,6 @@ from physid_drake.pushes.tied_cells import tied_cells
 from physid_drake.pushes.tracker_noise import ForceNoise, TrackerNoise, tracker_noise
 from physid_drake.recording import ObjectModel, Push, Recording, rest_segments, thinned
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 # Of the hand between two ticks [m]. Measured on forty drawn pushes against ticks of half a millisecond: 0.02 mm and

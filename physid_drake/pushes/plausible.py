@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.pushes.force_windows import windows_of
 from physid_drake.pushes.frames import HEAVIEST, LIGHTEST, MOVED
 from physid_drake.recording import Push, Recording
 from physid_drake.recording.clocks import FEWEST
-
-Array = NDArray[np.float64]
 
 FEW_NAMES = 5
 WIDE_TABLE = 20.0  # m: longer than any in a laboratory
