@@ -8,10 +8,12 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from physid_drake.errors import ConfigError
 from physid_drake.progress import Progress
 
+Array = NDArray[np.float64]
 Record = dict[str, Any]
 """What one repetition found: names to numbers, texts, lists and further records, as JSON has them."""
 
