@@ -140,6 +140,8 @@ def _register_prove(subparsers: Subparsers) -> None:
                         help="diagnoses at a time (default: the machine's cores)")  # fmt: skip
     parser.add_argument("--timeout", type=float, default=1800.0, metavar="S",
                         help="a diagnosis that takes longer has failed (default 1800)")  # fmt: skip
+    parser.add_argument("--cluster", metavar="ADDRESS",
+                        help="of a Dask scheduler, to diagnose there (pip install '.[cluster]')")  # fmt: skip
     parser.add_argument("--retry", action="store_true", help="diagnose again what failed before")
     parser.add_argument("--open", action="store_true",
                         help="score what has been diagnosed so far, and diagnose no more")  # fmt: skip

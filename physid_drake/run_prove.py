@@ -18,6 +18,7 @@ from types import FrameType
 from rich.console import Console
 
 from physid_drake.errors import ConfigError, ProofError
+from physid_drake.prove.cluster import Cluster
 from physid_drake.prove.diagnosing import (
     GRACE,
     Attempt,
@@ -204,7 +205,12 @@ def run_tasks(tasks: Sequence[Task], arguments: argparse.Namespace, console: Con
         tick("diagnosed", 0, left)
         done = iter(range(1, left + 1))
         ended = functools.partial(_tell, console, tick, done, left)
-        diagnose_all(tasks, jobs=arguments.jobs, timeout=arguments.timeout, ended=ended, again=arguments.retry)
+        settings = {"timeout": arguments.timeout, "ended": ended, "again": arguments.retry}
+        if arguments.cluster is None:
+            diagnose_all(tasks, jobs=arguments.jobs, **settings)
+            return
+        with Cluster(arguments.cluster, arguments.timeout) as cluster:
+            diagnose_all(tasks, jobs=cluster.width, begin=cluster.begin, **settings)
 
 
 def _tell(

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Final
+from typing import IO, Final, Protocol
 
 from physid_drake.errors import ProofError
 from physid_drake.prove.blindfold import HIDDEN_BY
@@ -35,6 +35,8 @@ LOG: Final = "log.txt"
 _POLL: Final = 0.05  # s
 GRACE: Final = 10.0  # s that an interrupted diagnosis has to keep its stages
 _LONGEST_LINE: Final = 300
+THREADS: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+"""One each: several diagnoses run side by side."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,6 +124,7 @@ def diagnose_all(
     timeout: float,
     ended: Callable[[Task, Attempt], None],
     again: bool = False,
+    begin: Callable[[Task], Running] | None = None,
 ) -> None:
     """Run every task that has not ended before.
 
@@ -131,16 +134,18 @@ def diagnose_all(
         timeout: after which a task is stopped and counts as failed [s].
         ended: is told of every task that ends.
         again: also run those that failed before.
+        begin: starts one; by default as a process of this machine.
 
     Raises:
         KeyboardInterrupt: when interrupted; what runs is told so first, so that it can keep its stages.
     """
     waiting = [task for task in tasks if is_open(task, again)]
-    running: list[_Running] = []
+    running: list[Running] = []
+    start = begin or _Running.begin
     try:
         while waiting or running:
             while waiting and len(running) < jobs:
-                running.append(_Running.begin(waiting.pop(0)))
+                running.append(start(waiting.pop(0)))
             time.sleep(_POLL)
             for one in tuple(running):
                 attempt = one.look(timeout)
@@ -170,7 +175,7 @@ def code_digest() -> str:
     return total.hexdigest()
 
 
-def _note(run: _Running, attempt: Attempt) -> None:
+def _note(run: Running, attempt: Attempt) -> None:
     content = {
         "seconds": round(attempt.seconds, 3),
         "error": attempt.error,
@@ -178,6 +183,63 @@ def _note(run: _Running, attempt: Attempt) -> None:
         "hidden_by": attempt.hidden_by,
     }
     RunFolder.begin(run.task.folder, DIAGNOSE).write(ATTEMPT, json.dumps(content, indent=2) + "\n")
+
+
+class Running(Protocol):
+    """A diagnosis that runs."""
+
+    @property
+    def task(self) -> Task:
+        """Which."""
+        ...
+
+    @property
+    def code(self) -> str:
+        """Digest of the revision that answers; known when it has ended."""
+        ...
+
+    def look(self, timeout: float) -> Attempt | None:
+        """How it ended; None while it runs."""
+        ...
+
+    def interrupt(self) -> None:
+        """Ask it to end."""
+        ...
+
+    def stop(self, grace: float = 0.0) -> None:
+        """Wait so long [s], then end it."""
+        ...
+
+
+def begun(task: Task) -> RunFolder:
+    """A task's folder, without what an attempt that failed left there."""
+    folder = RunFolder.begin(task.folder, DIAGNOSE)
+    for name in (ATTEMPT, RESULT, FRESH_ERRORS, *OTHERS):
+        folder.forget(name)
+    return folder
+
+
+def ending(task: Task, code: int | None, seconds: float, timeout: float) -> Attempt:
+    """How a command ended that has written its answer, if any, and its log; ``code`` is None where it was stopped."""
+    said = _said(task.folder / LOG)
+    hidden_by = next((line.removeprefix(HIDDEN_BY) for line in said if line.startswith(HIDDEN_BY)), None)
+    return Attempt(seconds=seconds, error=_error(task, code, timeout, said), hidden_by=hidden_by)
+
+
+def _error(task: Task, code: int | None, timeout: float, said: Sequence[str]) -> str | None:
+    """One line on why it failed; None where it did not."""
+    if code is None:
+        return f"stopped after {timeout:g} s (--timeout)."
+    if code == 0 and (task.folder / RESULT).is_file():
+        try:
+            verdict_of(task.folder)
+        except ProofError as error:
+            return str(error)
+        return None
+    last = _last_line(said)
+    if code < 0:  # killed: its last line may tell how far it was, but hardly why
+        return f"signal {-code}, after '{last}'."
+    return last or f"exit status {code}, without a word."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,15 +254,10 @@ class _Running:
 
     @classmethod
     def begin(cls, task: Task) -> _Running:
-        folder = RunFolder.begin(task.folder, DIAGNOSE)
-        for name in (ATTEMPT, RESULT, FRESH_ERRORS, *OTHERS):  # of an attempt that failed
-            folder.forget(name)
-        log = folder.own(LOG).open("wb")
-        # One thread each: several diagnoses run side by side.
-        threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+        log = begun(task).own(LOG).open("wb")
         child = subprocess.Popen(
             task.words, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, start_new_session=True,
-            env={**os.environ, **threads},
+            env={**os.environ, **THREADS},
         )  # fmt: skip
         return cls(task=task, child=child, log=log, since=time.monotonic(), code=code_digest())
 
@@ -210,24 +267,7 @@ class _Running:
         if code is None and seconds < timeout:
             return None
         self.stop()
-        said = _said(self.task.folder / LOG)
-        hidden_by = next((line.removeprefix(HIDDEN_BY) for line in said if line.startswith(HIDDEN_BY)), None)
-        return Attempt(seconds=seconds, error=self._error(code, timeout, said), hidden_by=hidden_by)
-
-    def _error(self, code: int | None, timeout: float, said: Sequence[str]) -> str | None:
-        """One line on why it failed; None where it did not."""
-        if code is None:
-            return f"stopped after {timeout:g} s (--timeout)."
-        if code == 0 and (self.task.folder / RESULT).is_file():
-            try:
-                verdict_of(self.task.folder)
-            except ProofError as error:
-                return str(error)
-            return None
-        last = _last_line(said)
-        if code < 0:  # killed: its last line may tell how far it was, but hardly why
-            return f"signal {-code}, after '{last}'."
-        return last or f"exit status {code}, without a word."
+        return ending(self.task, code, seconds, timeout)
 
     def interrupt(self) -> None:
         self._signal(signal.SIGINT)
