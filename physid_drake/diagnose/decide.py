@@ -88,7 +88,7 @@ def decided(found: Found, *, most: float) -> Decision:
     if best is None:
         return Decision(verdict="unexplained", best=nameless)
     beaten = any(surely_better(one.gains - best.gains) for one in found.unnamed)
-    little = found.left >= ADEQUATE or found.left_gain < LITTLE * float(without_best(best.gains))
+    little = found.left >= ADEQUATE or found.left_gain < LITTLE * best.gain
     enough = little and best.fit.loudness <= most and best.alike >= ADEQUATE
     if beaten or not enough:
         return Decision(verdict="unexplained", best=nameless, partly=best)

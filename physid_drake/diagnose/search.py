@@ -14,7 +14,7 @@ from physid_drake.effects import Effect
 from physid_drake.identify.baseline import settled
 from physid_drake.identify.identify import MOST_SCATTER
 from physid_drake.inference.fit import Fit, Fitter
-from physid_drake.inference.replicates import gains_by_chance, p_value
+from physid_drake.inference.replicates import gains_by_chance, of_all, p_value
 from physid_drake.inference.scores import Column, columns
 from physid_drake.progress import Progress
 from physid_drake.pushes.case import UNIT_SCATTER
@@ -66,7 +66,7 @@ class Found:
         odd: whether the p-value is below what was asked for, or friction scatters by much.
         named: hypotheses of the catalogue, best first; empty where none was looked for.
         left: that the best gain of the catalogue over the first of them is chance; 1 where none was looked for.
-        left_gain: that gain, linearly, its best push not counted [nats].
+        left_gain: that gain, linearly [nats].
         unnamed: hypotheses of smooth forces and frictions without a name, best first.
     """
 
@@ -162,7 +162,7 @@ class _Search:
         beside = columns(self._fitter, fit, [kind for kind in self._kinds if kind not in present])
         if not beside:
             return dc.replace(found, left=1.0, left_gain=0.0)
-        seen, by_chance = gains_by_chance(self._fitter, fit, beside, self._rng)
+        seen, by_chance = gains_by_chance(self._fitter, fit, beside, self._rng, of_all)
         return dc.replace(found, left=p_value(seen, by_chance), left_gain=max(seen.values()))
 
     def ranked(self, fits: Sequence[Fit]) -> tuple[Weighed, ...]:

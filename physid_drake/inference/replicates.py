@@ -7,7 +7,7 @@ by linear algebra on the score tests' columns.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,12 +27,34 @@ LEAST_SCALE = 1.0  # nats, of a tail: a likelihood ratio of x nats has a chance 
 MOST_GAIN = 1e6  # nats
 
 
+def without_best(gains: Array) -> Array:
+    """Sum of gains (n, ...) of pushes over another hypothesis, without the largest: no push decides alone [nats]."""
+    return np.asarray(gains.sum(axis=0) - np.where(np.isfinite(gains).all(axis=0), gains.max(axis=0), 0.0))
+
+
+def of_all(gains: Array) -> Array:
+    """Sum of gains (n, ...) of pushes over another hypothesis [nats]."""
+    return np.asarray(gains.sum(axis=0))
+
+
 def gains_by_chance(
-    fitter: Fitter, fit: Fit, found: Sequence[Column], rng: np.random.Generator
+    fitter: Fitter,
+    fit: Fit,
+    found: Sequence[Column],
+    rng: np.random.Generator,
+    summed: Callable[[Array], Array] = without_best,
 ) -> tuple[dict[str, float], dict[str, Array]]:
-    """Held-out gains, linearly, of the best family of each effect, by its name; the best push of each not counted.
+    """Held-out gains, linearly, of the best family of each effect, by its name.
 
     A push that is odd in the fit is as loud in all replicates.
+
+    Args:
+        fitter: of the recording.
+        fit: what is true in the replicates.
+        found: the columns of effects beside it.
+        rng: draws the replicates.
+        summed: what the gains (n, ...) of pushes come to. That there is an effect, no push decides alone; whether a
+            model is enough, any push may.
 
     Returns:
         Of the recording, and (REPLICATES,) where the fitted model is true [nats].
@@ -45,15 +67,10 @@ def gains_by_chance(
     null = _best([table.scored([]) for table in tables])
     best: dict[str, Array] = {}
     for members in by_family(found):
-        gains = without_best(_best([table.scored(members) for table in tables]) - null)
+        gains = summed(_best([table.scored(members) for table in tables]) - null)
         name = found[members[0]].kind.name
         best[name] = np.maximum(best.get(name, gains), gains)
     return {name: float(g[0]) for name, g in best.items()}, {name: g[1:] for name, g in best.items()}
-
-
-def without_best(gains: Array) -> Array:
-    """Sum of gains (n, ...) of pushes over another hypothesis, without the largest: no push decides alone [nats]."""
-    return np.asarray(gains.sum(axis=0) - np.where(np.isfinite(gains).all(axis=0), gains.max(axis=0), 0.0))
 
 
 def surprise(values: Array, replicates: Array) -> Array:
