@@ -12,10 +12,9 @@ from rich.table import Table
 from physid_drake.diagnose import Diagnosis
 from physid_drake.diagnose.values import EffectFinding, FitQuality, Location, Partly
 from physid_drake.effects import effect_named
+from physid_drake.report.numbers import rounded
 
 FORMAT = "physid-diagnosis/1"
-DIGITS = 6
-TIMES = ("start_s", "end_s")
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> str:
@@ -62,7 +61,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> str:
         "noise": d.noise,
         "warnings": list(d.warnings),
     }  # fmt: skip
-    return json.dumps(_rounded(content), indent=2) + "\n"
+    return json.dumps(rounded(content), indent=2) + "\n"
 
 
 def _effect(effect: EffectFinding) -> dict[str, Any]:
@@ -106,20 +105,6 @@ def _location(location: Location) -> dict[str, Any]:
         "frame": location.frame,
         "windows": [{"push": w.push, "start_s": w.start, "end_s": w.end} for w in location.windows],
     }
-
-
-def _rounded(value: Any) -> Any:
-    """Six significant digits: what comes after them is not knowledge, but in times, whose origin may be far.
-
-    JSON has no infinity.
-    """
-    if isinstance(value, dict):
-        return {k: round(v, 4) if k in TIMES else _rounded(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_rounded(v) for v in value]
-    if isinstance(value, float):
-        return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
-    return value
 
 
 def findings_table(diagnosis: Diagnosis) -> Table:

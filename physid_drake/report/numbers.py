@@ -4,6 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
+
+TIMES = ("start_s", "end_s")
+DIGITS = 6
+
+
+def rounded(value: Any) -> Any:
+    """What a file of answers has: six significant digits, since what comes after them is not knowledge.
+
+    Times have four decimals, whose origin may be far. JSON has no infinity.
+    """
+    if isinstance(value, dict):
+        return {k: round(v, 4) if k in TIMES else rounded(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [rounded(v) for v in value]
+    if isinstance(value, float):
+        return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
+    return value
 
 
 def number(value: float | None, digits: int = 3) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,6 +17,7 @@ from physid_drake.pushes.case import UNIT_SCATTER
 from physid_drake.pushes.doubts import doubts
 from physid_drake.recording import Recording
 from physid_drake.report.inspection import warning_lines
+from physid_drake.report.numbers import rounded
 from physid_drake.search import SearchResult
 
 FORMAT = "physid-result/1"
@@ -64,7 +64,7 @@ def result_json(examined: Examined, recording: Recording, seed: int, versions: d
         "seed": seed,
         "versions": versions,
     }
-    return json.dumps(content, indent=2, allow_nan=False) + "\n"
+    return json.dumps(rounded(content), indent=2, allow_nan=False) + "\n"
 
 
 def _theta(estimates: Sequence[Estimate]) -> dict[str, Any]:
@@ -113,11 +113,11 @@ def _cells(cells: CellsTold) -> dict[str, Any]:
     }
 
 
-def _numbers(accuracy: Accuracy | None) -> dict[str, float | int | None] | None:
+def _numbers(accuracy: Accuracy | None) -> dict[str, float] | None:
     """An accuracy with units in its keys."""
     if accuracy is None:
         return None
-    numbers: dict[str, float] = {
+    return {
         "position_rms_m": accuracy.position,
         "rotation_rms_rad": accuracy.rotation,
         "end_position_rms_m": accuracy.end_position,
@@ -126,5 +126,3 @@ def _numbers(accuracy: Accuracy | None) -> dict[str, float | int | None] | None:
         "sigmas_rms": accuracy.rms,
         "diverged": accuracy.diverged,
     }
-    # JSON has no NaN, which stands where nothing was compared.
-    return {key: value if math.isfinite(value) else None for key, value in numbers.items()}

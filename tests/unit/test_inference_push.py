@@ -91,6 +91,14 @@ def test_coordinates_that_act_alike_leave_what_is_known_beforehand():
     np.testing.assert_allclose(root @ root.T, np.linalg.inv(prior + 2.0 * shared.T @ shared), rtol=0.05)
 
 
+def test_a_coordinate_that_no_other_push_tells_is_as_good_as_free():
+    shared = np.column_stack([RNG.normal(size=12), np.zeros(12)])
+    one = weighed(RNG.normal(size=12), shared, np.zeros((12, 0)), np.zeros(0), 1.0, NO_TAIL)
+    dz, root = without([0], np.zeros(2), np.diag([1.0, 0.0]), [one, one])
+    assert np.all(np.isfinite(root)) and dz[1] == 0.0
+    assert (root @ root.T)[1, 1] > 1e6
+
+
 def test_held_out_density_is_the_ratio_of_two_marginal_ones():
     rng = np.random.default_rng(2)
     mean, std = np.zeros(3), np.array([1.0, 2.0, 0.7])

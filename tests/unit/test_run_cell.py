@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from runs import laid_over, quick, write_small
+import yaml
+from runs import QUICK, laid_over, quick, write_small
 
 from physid_drake import run_cell
 from physid_drake.identify import identify, theta_search
@@ -311,3 +312,28 @@ def test_a_flag_that_leaves_a_result_out_does_not_drop_the_one_that_is_there(
     for other in (["--seed", "5", flag], ["--seed", "5"], ["--seed", "5", "--host", "nonsense"]):
         refused(capsys, *asked, *other)
         assert (tmp_path / "out" / file).exists()
+
+
+@pytest.mark.slow
+def test_all_files_of_a_run_say_the_same(tmp_path):
+    """One theta, one set of errors, one verdict, to the digit."""
+    out, recording = tmp_path / "out", write_small(tmp_path / "recording", 4)
+    override = json.dumps(laid_over(QUICK, {"theta": {"parameters": ["hand_friction", "support_friction"]}}))
+    arguments = ["--recording", recording, "--out", out, "--set", override, "--no-view", "--no-plan"]
+    assert run_cell.main([str(a) for a in arguments]) == 0
+    result, said = result_of(out), json.loads((out / "diagnosis.json").read_text())
+    model = yaml.safe_load((out / "model.yaml").read_text())
+    assert result["model"]["verdict"] == said["verdict"] == "consistent"
+    for name, told in result["theta"].items():
+        assert told["value"] == said["theta"][name]["value"] == said["theta"][name]["before"]
+        assert (
+            told["ci90"]
+            == said["theta"][name]["ci90"]
+            == pytest.approx(model["intervals"][f"theta.{name}"], rel=1e-5)
+        )
+        assert told["value"] == pytest.approx(np.ravel(model["theta"][name])[0], rel=1e-5)
+    errors = result["held_out"]["after"]
+    assert errors["position_rms_m"] == said["fit"]["held_out_rms_after_m"]
+    assert errors["rotation_rms_rad"] == said["fit"]["held_out_rms_after_rad"]
+    assert result["reduced_chi2"] == said["reduced_chi2_before"] == said["reduced_chi2_after"]
+    assert (result["friction_scatter"], result["noise"]) == (said["friction_scatter"], said["noise"])
