@@ -167,10 +167,9 @@ def without(fold: Sequence[int], mean: Array, precision: Array, found: Sequence[
     information = sum((one.precision for one in kept), precision)
     right = sum((one.right for one in kept), precision @ mean)
     # In units in which each coordinate alone is known to one: theirs are far apart, and some no push may tell.
-    told = np.diag(information)
-    least = TOO_ALIKE * float(told.mean()) if len(told) else 0.0
-    scale = np.maximum(told, least) ** -0.5
-    raised = information + np.diag(np.maximum(least - told, 0.0))
-    values, vectors = np.linalg.eigh(raised * np.outer(scale, scale))
+    nothing = np.where(np.diag(information) > 0.0, 0.0, TOO_ALIKE * np.trace(information))
+    information = information + np.diag(nothing)
+    scale = np.diag(information) ** -0.5
+    values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
     root = scale[:, None] * vectors / np.sqrt(np.maximum(values, TOO_ALIKE))
     return root @ (root.T @ right), root
