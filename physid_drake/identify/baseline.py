@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 CANDIDATES, STARTS = 64, 4  # points of theta that are looked at, and from which the baseline is fitted
 LAST = 8  # steps of a fit
-RESEATINGS, WORTH = 3, 1.0  # at most, while one gains so much log likelihood
+RESEATINGS, WORTH = 12, 1.0  # at most, while one gains so much log likelihood
 TRIED = 8  # thetas, and the nominal one, at which a push must fail to be left to the cell, or out
 STICKS = "static_ratio"  # of theta: what sticks before it slips is the cell's
 
