@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 
 SCATTER = MOST_SCATTER / UNIT_SCATTER
 ODD_SCATTER = 0.5 * SCATTER  # of a model beside which more is looked for: what orders frictions looks like scatter
+POLISHINGS = 4  # of a best hypothesis, at most
 SINGLES = 4  # effects, beside each of which a second one is looked for
 
 
@@ -128,6 +129,7 @@ class _Search:
     ) -> None:
         self._fitter, self._plain, self._kinds, self._rng, self._alpha = fitter, plain, kinds, rng, alpha
         self._before = fitter.held_out(plain)
+        self._polished_fits: list[Fit] = []
 
     def begun(self) -> Found:
         """The baseline, and what is said of it by columns alone."""
@@ -142,10 +144,8 @@ class _Search:
 
     def with_singles(self, found: Found) -> Found:
         """Each effect alone, the best one polished where something is odd."""
-        named = self.ranked(with_one_more(self._fitter, self._plain, found.columns))
-        if found.odd and named:
-            named = self.ranked([self._polished(named[0].fit), *(one.fit for one in named[1:])])
-        return dc.replace(found, named=named)
+        fits = with_one_more(self._fitter, self._plain, found.columns)
+        return dc.replace(found, named=self._with_best_polished(fits) if found.odd else self.ranked(fits))
 
     def with_pairs(self, found: Found) -> Found:
         """The best effects, each with others beside it; and both effects of the best pair alone."""
@@ -153,7 +153,7 @@ class _Search:
         pairs = [one.fit for one in self.ranked(with_two(self._fitter, singles[:SINGLES], self._kinds))]
         pairs[:1] = map(self._polished, pairs[:1])
         alone = each_alone(self._fitter, pairs[0]) if pairs else ()
-        return self.with_left(dc.replace(found, named=self.ranked([*better_of(singles, alone), *pairs])))
+        return self.with_left(dc.replace(found, named=self._with_best_polished([*better_of(singles, alone), *pairs])))
 
     def with_left(self, found: Found) -> Found:
         """Whether the best gain of the catalogue beside the best hypothesis is chance, and that gain."""
@@ -173,8 +173,18 @@ class _Search:
         ]
         return tuple(sorted(made, key=lambda one: -one.gain))
 
+    def _with_best_polished(self, fits: Sequence[Fit]) -> tuple[Weighed, ...]:
+        """Ranked, when the best one is polished: it may not have been the best before."""
+        ranked = self.ranked(fits)
+        for _ in range(POLISHINGS):
+            if not ranked or any(ranked[0].fit is fit for fit in self._polished_fits):
+                break
+            ranked = self.ranked([self._polished(ranked[0].fit), *(one.fit for one in ranked[1:])])
+        return ranked
+
     def _polished(self, fit: Fit) -> Fit:
-        return settled(self._fitter, freed(self._fitter, fit), self._rng)
+        self._polished_fits.append(settled(self._fitter, freed(self._fitter, fit), self._rng))
+        return self._polished_fits[-1]
 
 
 def better_of(fits: Sequence[Fit], others: Sequence[Fit]) -> list[Fit]:

@@ -89,13 +89,19 @@ def baseline(fitter: Fitter, rng: np.random.Generator, starts: Sequence[Array] =
 
 
 def settled(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
-    """The fit with each push on the better of its ways, fitted again while that helps."""
+    """The fit with each push on the better of its ways, fitted again while that helps.
+
+    Ways are looked for from draws: once in vain does not say that there are none.
+    """
+    in_vain = 0
     for _ in range(RESEATINGS):
-        again = fitter.fitted([reseated(fitter, fit, rng).again()], LAST)[0]
+        seated = reseated(fitter, fit, rng)
+        again = fitter.fitted([seated.again()], LAST)[0]
         gained = again.log_likelihood - fit.log_likelihood
+        in_vain = 0 if gained > WORTH else in_vain + 1
+        if in_vain > 1 or (in_vain and seated is fit):
+            return again if gained > 0.0 else fit
         fit = again if gained > 0.0 else fit
-        if gained < WORTH:
-            break
     return fit
 
 
