@@ -87,7 +87,7 @@ def test_pushes_are_predicted_by_the_others_better_than_before_any(shipped):
     before, after = shipped.before, shipped.after
     assert len(after.per_push) == 8
     assert after.rms < 0.5 * before.rms
-    assert after.rms < 1.7
+    assert after.rms < 1.0  # of means over windows: 0.59 of all twelve
     assert after.end_position < before.end_position
     assert before.diverged == after.diverged == 0
 
