@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
-import warnings
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from physid_drake.door import Parser, enter, path
 from physid_drake.errors import ConfigError
-from physid_drake.recording import read_recording
+from physid_drake.recording import Recording
+from physid_drake.run_folder import write_whole
 
 if TYPE_CHECKING:
     Subparsers = argparse._SubParsersAction[Parser]
@@ -49,52 +48,93 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _register_inspect(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser("inspect", help="check a recording and show what is in it")
-    parser.add_argument("folder", type=path, metavar="FOLDER", help="the recording")
+    parser.add_argument("recording", metavar="RECORDING", help="a FOLDER, or the name of a recording that ships")
     parser.add_argument("--out", type=path, metavar="FILE.png", help="also draw all pushes from above into this file")
+    parser.add_argument("--no-fit", action="store_true", help="do not fit pushes to see whether conventions hold")
     parser.set_defaults(run=_run_inspect)
 
 
 def _run_inspect(arguments: argparse.Namespace) -> int:
-    # Matplotlib takes half a second to import and Drake a second, which the other commands need not wait for.
-    from physid_drake.pushes.doubts import doubts  # noqa: PLC0415
-    from physid_drake.pushes.refusals import refusals  # noqa: PLC0415
-    from physid_drake.report.inspection import draw_pushes, inspection_table, warning_lines  # noqa: PLC0415
-    from physid_drake.report.picture import check_picture, write_picture  # noqa: PLC0415
-    from physid_drake.report.terminal import terminal  # noqa: PLC0415
+    # Drake takes a second to import, which the other commands need not wait for.
+    from physid_drake.run_inspect import run  # noqa: PLC0415
 
-    picture: Path | None = arguments.out
-    if picture is not None:
-        check_picture(picture)
-    recording = read_recording(arguments.folder)
-    terminal().print(inspection_table(recording))
-    refused = (f"would be refused: {said}" for said in refusals(recording))
-    for line in (*warning_lines(recording), *doubts(recording), *refused):
-        warnings.warn(line, UserWarning, stacklevel=1)
-    if picture is not None:
-        write_picture(draw_pushes(recording), picture)
-        print(f"drawn: {picture}")
-    return 0
+    return run(arguments)
 
 
 def _register_convert(subparsers: Subparsers) -> None:
-    parser = subparsers.add_parser("convert", help="turn a published data set into a recording")
-    parser.add_argument("layout", choices=["cmu", "mit", "cube"], help="whose layout SOURCE is in")
-    parser.add_argument("source", type=path, metavar="SOURCE", help="a published file, or a folder of them")
-    parser.add_argument("folder", type=path, metavar="FOLDER", help="where the recording goes; new or empty")
-    parser.add_argument("--limit", type=int, metavar="N", help="draw N pushes at random")
+    parser = subparsers.add_parser("convert", help="turn a log of your own or published data into a recording")
+    parser.add_argument(
+        "layout",
+        choices=["table", "bag", "cmu", "mit", "cube"],
+        help="table: numbers that a map explains (CSV, npz, HDF5, Parquet); bag: of ROS 1 or 2, the same; else whose"
+        " published layout SOURCE is in",
+    )
+    parser.add_argument("source", type=path, metavar="SOURCE", help="a file, or a folder of them")
+    parser.add_argument(
+        "folder", type=path, nargs="?", metavar="FOLDER", help="where the recording goes; new or empty"
+    )
+    parser.add_argument(
+        "--guess",
+        action="store_true",
+        help="of table and bag: show what is in SOURCE, and write a first map",
+    )
+    parser.add_argument(
+        "--map", type=path, metavar="FILE.yaml", help="of table and bag: says what the columns or topics are"
+    )
+    parser.add_argument("--limit", type=int, metavar="N", help="of a published layout: draw N pushes at random")
     parser.add_argument("--seed", type=int, metavar="N", default=0, help="seed of that draw (default 0)")
     parser.set_defaults(run=_run_convert)
 
 
 def _run_convert(arguments: argparse.Namespace) -> int:
+    if arguments.guess:
+        return _guess(arguments)
+    if arguments.folder is None:
+        raise ConfigError("FOLDER is needed: where the recording goes; new or empty.")
+    if arguments.layout in ("table", "bag"):
+        if arguments.map is None:
+            what = {"table": "columns", "bag": "topics"}[arguments.layout]
+            raise ConfigError(f"--map is needed: a file that says what the {what} are (docs/bring_your_data.md).")
+        from physid_drake.convert import convert_bag, convert_table  # noqa: PLC0415
+
+        convert = {"table": convert_table, "bag": convert_bag}[arguments.layout]
+        recording = convert(arguments.source, arguments.folder, arguments.map)
+    else:
+        recording = _published(arguments)
+    print(f"{recording.name}: {len(recording.pushes)} pushes written to {arguments.folder}")
+    return 0
+
+
+def _guess(arguments: argparse.Namespace) -> int:
+    from physid_drake.convert import guess_map  # noqa: PLC0415
+    from physid_drake.report.inspection import log_table  # noqa: PLC0415
+    from physid_drake.report.terminal import terminal  # noqa: PLC0415
+
+    if arguments.layout not in ("table", "bag"):
+        raise ConfigError(f"--guess is of table and bag: the layout of {arguments.layout} is known; leave it out.")
+    if arguments.folder is not None:
+        raise ConfigError("FOLDER is of a conversion: --guess writes no recording; leave it out.")
+    if arguments.map is not None and arguments.map.exists():
+        raise ConfigError(f"--map '{arguments.map}': is there; choose another name for the map that is guessed.")
+    guess = guess_map(arguments.source)
+    terminal().print(log_table(arguments.source.name, guess.rows))
+    if arguments.map is None:
+        print(guess.text, end="")
+        return 0
+    write_whole(arguments.map, guess.text.encode())
+    print(f"written: {arguments.map}; correct it, then convert with it")
+    return 0
+
+
+def _published(arguments: argparse.Namespace) -> Recording:
     from physid_drake.recording.adapters import convert_cmu, convert_cube, convert_mit  # noqa: PLC0415
 
+    if arguments.map is not None:
+        raise ConfigError(f"--map is of table and bag: the layout of {arguments.layout} is known; leave it out.")
     if arguments.seed < 0:
         raise ConfigError(f"--seed must be at least 0, but is {arguments.seed}.")
     convert = {"cmu": convert_cmu, "mit": convert_mit, "cube": convert_cube}[arguments.layout]
-    recording = convert(arguments.source, arguments.folder, limit=arguments.limit, seed=arguments.seed)
-    print(f"{recording.name}: {len(recording.pushes)} pushes written to {arguments.folder}")
-    return 0
+    return convert(arguments.source, arguments.folder, limit=arguments.limit, seed=arguments.seed)
 
 
 def _register_diagnose(subparsers: Subparsers) -> None:

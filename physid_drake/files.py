@@ -6,9 +6,11 @@ is open.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import stat
+import sys
 from pathlib import Path
 from typing import Any, Final
 
@@ -69,6 +71,43 @@ def read_bytes(path: Path | str, *, most: int = MOST_BYTES) -> bytes:
     if len(content) > most:
         raise FileError(_too_large(most))
     return content
+
+
+def check_plain(path: Path | str) -> None:
+    """Refuse what is no plain file, before a library opens it.
+
+    Raises:
+        MissingFileError: if it is not there.
+        FileError: if it is a folder, a pipe or a device, or cannot be looked at.
+    """
+    try:
+        _check(os.stat(path), most=sys.maxsize)  # noqa: PTH116  # Path.stat has words of its own for a NUL
+    except FileError:
+        raise
+    except FileNotFoundError as error:
+        raise MissingFileError("there is no such file") from error
+    except (OSError, ValueError) as error:
+        cause = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise FileError(f"cannot be read: {cause[:80]}") from error
+
+
+def sha256_of(path: Path | str) -> str:
+    """SHA-256 of a plain file of any size.
+
+    Raises:
+        MissingFileError: if it is not there.
+        FileError: if it is no plain file, or cannot be read.
+    """
+    check_plain(path)
+    try:
+        with open(path, "rb", opener=_without_waiting) as file:  # Path.open takes no opener
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except (OSError, ValueError) as error:
+        raise FileError(f"cannot be read: {str(error)[:80]}") from error
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY)
 
 
 def read_text(path: Path | str, *, most: int = MOST_BYTES) -> str:

@@ -27,7 +27,7 @@ from physid_drake.pushes.kept_rollouts import KeptRollouts
 from physid_drake.pushes.problem import HandUse
 from physid_drake.pushes.rollouts import simulate
 from physid_drake.pushes.task import Task
-from physid_drake.recording import Recording, digest_of, read_recording
+from physid_drake.recording import Recording, digest_of, read_recording, recording_folder
 from physid_drake.report.cells import cells_table
 from physid_drake.report.inspection import warning_lines
 from physid_drake.report.page import result_page
@@ -37,7 +37,7 @@ from physid_drake.report.result import result_json
 from physid_drake.report.stage import LOOPBACK, ShownMotion, Stage, served
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
 from physid_drake.report.terminal import terminal
-from physid_drake.run_diagnose import ALPHA, STATE, recording_folder, show, write
+from physid_drake.run_diagnose import ALPHA, STATE, show, write
 from physid_drake.run_folder import RunFolder, made_with, named_after, versions
 from physid_drake.run_plan import FILES as PLAN
 from physid_drake.run_plan import forget as forget_plan

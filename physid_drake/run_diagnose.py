@@ -21,16 +21,14 @@ from physid_drake.pushes.config import ThetaConfig
 from physid_drake.pushes.kept_rollouts import KeptRollouts
 from physid_drake.pushes.rollouts import simulate
 from physid_drake.pushes.task import Task
-from physid_drake.recording import digest_of, read_recording
+from physid_drake.recording import digest_of, read_recording, recording_folder
 from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
 from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.scene_page import scene_page
 from physid_drake.report.stage import MOST_ARROW, ShownMotion, Stage
 from physid_drake.report.terminal import terminal
-from physid_drake.resources import shipped
 from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text, versions
-from physid_drake.wording import shown
 
 COMMAND = "diagnose"
 STATE = "rollouts.bin"
@@ -103,21 +101,6 @@ def run_case(
     """Diagnose with a progress bar."""
     with progress_bar(console) as tick:
         return diagnose(case, seed=seed, alpha=alpha, effects=effects, tick=tick, kept=kept)
-
-
-def recording_folder(text: str) -> Path:
-    """A folder, or a recording that ships with the project.
-
-    Raises:
-        ConfigError: if no folder can have such a name.
-    """
-    path = Path(text)
-    try:
-        if not path.exists() and path.parent == Path() and (shipped("recordings") / text).is_dir():
-            return shipped("recordings") / text
-    except (OSError, ValueError) as error:  # too long a name, a NUL in it
-        raise ConfigError(f"recording {shown(text)}: nothing can have such a name.") from error
-    return path
 
 
 def show(console: Console, diagnosis: Diagnosis) -> None:

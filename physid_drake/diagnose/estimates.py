@@ -210,7 +210,7 @@ def _motion(found: Found, column: Column) -> float:
     """How far the object moves for a unit of a column, root mean square over all windows [standard deviations]."""
     case: Case = found.fitter.case
     poses = [
-        np.linalg.solve(w, pushed)[: 3 * len(f.middles)]
+        np.linalg.solve(w, pushed)[: f.pose_numbers]
         for w, pushed, f in zip(found.fitter.predictor.whitening, column.pushes, case.features, strict=True)
     ]
     return rms(np.concatenate(poses))

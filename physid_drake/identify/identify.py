@@ -113,9 +113,11 @@ class Identification:
             hand["hand_correlation_time_s"] = case.sensors.hand_memory
         if any(len(problem.force_times) for problem in case.problems):
             hand["force_n"] = case.sensors.force
+        turned = any(features.dofs == 3 for features in case.features)
+        turn = {"rotation_rad": case.noise.rotation} if turned else {}
         rough = {} if self.rough.is_none else {"friction_along_way": dc.asdict(self.rough)}
         return {
-            "position_m": case.noise.position, "rotation_rad": case.noise.rotation,
+            "position_m": case.noise.position, **turn,
             "correlation_time_s": list(case.noise.correlation_time), "jitter_s": case.noise.jitter, **hand, **rough,
         }  # fmt: skip
 

@@ -34,7 +34,7 @@ def discrepancy(problem: PushProblem, features: PushFeatures) -> Array:
     alike = np.exp(-np.abs(way[:, None] - way[None, :]) / ALIKE)
     moving = features.middles > problem.moving[0]
     covariance, count = np.zeros((len(features.recorded),) * 2), len(way)
-    for dof in range(3):
+    for dof in range(features.dofs):
         part = slice(dof * count, (dof + 1) * count)
         own = WANDERS[dof] ** 2 * alike + WHITE[dof] ** 2 * np.eye(count)
         covariance[part, part] = own * np.outer(moving, moving) / features.sigmas[dof] ** 2
@@ -44,7 +44,7 @@ def discrepancy(problem: PushProblem, features: PushFeatures) -> Array:
 def sensor_noise(features: PushFeatures) -> Array:
     """The features' noise (m, m) without the cell's own error, of which ``discrepancy`` is another account."""
     noise, count = features.noise.copy(), len(features.middles)
-    for dof in range(3):
+    for dof in range(features.dofs):
         part = slice(dof * count, (dof + 1) * count)
         noise[part, part] -= (FLOOR[dof] / features.sigmas[dof]) ** 2 * (0.9 + 0.1 * np.eye(count))
     return noise

@@ -26,7 +26,7 @@ def as_loud_as_left(fitter: Fitter, fit: Fit) -> Case:
     forces: list[Array] = []
     for i, (push, features) in enumerate(zip(fit.pushes, fitter.case.features, strict=True)):
         left = np.linalg.solve(fitter.predictor.whitening[i], push.residual - push.own @ fit.point.own[i])
-        forces.append(np.asarray(left[3 * len(features.middles) :].reshape(2, -1).T, dtype=np.float64))
+        forces.append(np.asarray(left[features.pose_numbers :].reshape(2, -1).T, dtype=np.float64))
     return fitter.case.louder(max(1.0, fit.loudness), _force_noise(fitter.case, forces))
 
 

@@ -26,7 +26,7 @@ FLOOR = np.array([5e-5, 5e-5, 1.0e-3])
 
 @dc.dataclass(frozen=True, kw_only=True)
 class PushFeatures:
-    """One push as a vector: x of all windows, y, yaw, then force components.
+    """One push as a vector: x of all windows, y, yaw if it was measured, then force components.
 
     Attributes:
         averaging: (w, n) takes samples to windows.
@@ -37,6 +37,7 @@ class PushFeatures:
         force_std: (k,) of each force window [N].
         force_way: (k,) how far the hand has gone by each [m].
         force_size: root mean square of the force [N].
+        dofs: that were measured: three, or two where the yaw was not.
     """
 
     averaging: Array
@@ -47,6 +48,7 @@ class PushFeatures:
     force_std: Array
     force_way: Array
     force_size: float
+    dofs: int = 3
 
     def of(self, prediction: Prediction) -> Array:
         """Features (m,) of a rollout."""
@@ -54,7 +56,7 @@ class PushFeatures:
 
     def _vector(self, poses: Array, forces: Array) -> Array:
         windows = (self.averaging @ poses) / self.sigmas
-        return np.concatenate([windows.T.ravel(), (forces / self.force_std[:, None]).T.ravel()])
+        return np.concatenate([windows[:, : self.dofs].T.ravel(), (forces / self.force_std[:, None]).T.ravel()])
 
     def force_noise(self, forces: ForceNoise) -> Array:
         """Covariance (k, k) of a component in all windows, in deviations: white, wandering, off as a whole."""
@@ -64,14 +66,19 @@ class PushFeatures:
         return np.eye(len(self.force_std)) + scaled
 
     def poses(self, vector: Array) -> Array:
-        """Window means (w, 3) [m, m, rad] of a vector (m,)."""
-        count = len(self.middles)
-        poses: Array = vector[: 3 * count].reshape(3, count).T * self.sigmas
-        return poses
+        """Window means (w, 3) [m, m, rad] of a vector (m,); a yaw that was not measured is zero."""
+        poses = np.zeros((len(self.middles), 3))
+        poses[:, : self.dofs] = vector[: self.pose_numbers].reshape(self.dofs, -1).T
+        return np.asarray(poses * self.sigmas)
+
+    @property
+    def pose_numbers(self) -> int:
+        """How many of the numbers are of poses; the rest are of forces."""
+        return self.dofs * len(self.middles)
 
     def forces(self, vector: Array) -> Array:
         """Force components (k, 2) [N] of a vector (m,)."""
-        forces: Array = vector[3 * len(self.middles) :].reshape(2, -1).T * self.force_std[:, None]
+        forces: Array = vector[self.pose_numbers :].reshape(2, -1).T * self.force_std[:, None]
         return forces
 
     @property
@@ -86,9 +93,10 @@ def features_of(push: Push, problem: PushProblem, noise: TrackerNoise) -> PushFe
     count = len(averaging)
     times = problem.times
     force_std = problem.force_std
-    blocks = np.zeros((3 * count + 2 * len(force_std),) * 2)
+    dofs = 2 if push.object.rotation == "none" else 3
+    blocks = np.zeros((dofs * count + 2 * len(force_std),) * 2)
     speeds = _speeds(times, problem.poses)
-    for dof in range(3):
+    for dof in range(dofs):
         covariance = noise.correlation(times, dof)
         # A jittered stamp is white noise of the speed.
         covariance = covariance + np.diag((noise.jitter * speeds[:, dof] / noise.sigmas[dof]) ** 2)
@@ -104,8 +112,9 @@ def features_of(push: Push, problem: PushProblem, noise: TrackerNoise) -> PushFe
         force_std=force_std,
         force_way=_way(problem),
         force_size=float(np.sqrt((problem.forces**2).sum(axis=1).mean())) if len(force_std) else 0.0,
+        dofs=dofs,
     )
-    blocks[3 * count :, 3 * count :] = np.kron(np.eye(2), made.force_noise(noise.forces))
+    blocks[dofs * count :, dofs * count :] = np.kron(np.eye(2), made.force_noise(noise.forces))
     return dc.replace(made, recorded=made._vector(problem.poses, problem.forces))
 
 

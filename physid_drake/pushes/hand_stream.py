@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +115,7 @@ def while_pushing(push: Push, hand: PoseStream) -> PoseStream:
 
 
 def _part_of(hand: PoseStream, part: slice) -> PoseStream:
-    return PoseStream(times=hand.times[part], positions=hand.positions[part], quaternions=hand.quaternions[part])
+    return replace(hand, times=hand.times[part], positions=hand.positions[part], quaternions=hand.quaternions[part])
 
 
 def _runs_of(flags: NDArray[np.bool_], times: Array) -> list[slice]:

@@ -138,7 +138,7 @@ def _last_height(push: Push) -> float:
 
 def _never_turning(recording: Recording) -> tuple[str, ...]:
     """A rotation that is filled in, and was not measured."""
-    turns = [push.object.quaternions for push in recording.pushes if _moves(push)]
+    turns = [push.object.quaternions for push in recording.pushes if _moves(push) and push.object.rotation != "none"]
     if not turns or any((turn != turns[0][0]).any() for turn in turns):
         return ()
     return (

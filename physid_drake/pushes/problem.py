@@ -34,6 +34,10 @@ STANDING = 0.3  # area that the x and y axes of the tip span in the plane: less,
 FEWEST_SEEN = 4  # poses that must be left to compare
 UNSURE = 3.0  # times the standard deviation of a free motion's start: the samples that tell it are compared, too
 NOTABLE_ERROR = 0.05  # of the tracker's deviation: what less of the hand does to the object is not seen
+UNMEASURED = (
+    0.3,
+    3.0,
+)  # rad, rad/s: standard deviations of a yaw that was not measured as a push begins, and its rate
 FIRST_SIGMAS = 4.0  # of the tracker: motion that is surely none of its noise
 
 
@@ -148,6 +152,8 @@ def _problem(
     path_errors = tuple(replace(error, path=error.path.with_run_up(begin)) for error in fitted[1])
     planar = push.object.planar
     start, start_std, first = _start_of(push, planar, noise, free=path is None)
+    if push.object.rotation == "none":
+        start_std[2::3] = UNMEASURED[: len(start_std) // 3]
     forces = force_windows(push, path, noise.force, float(start_std[0]))
     until = hand_seen_until(recording, push)
     if np.count_nonzero(push.object.times[first:] <= until) < FEWEST_SEEN:
@@ -245,7 +251,11 @@ def _start_of(push: Push, planar: Array, noise: Noise, *, free: bool) -> tuple[S
     if rests and rests[0].start == 0:
         still = planar[rests[0]]
         # Its last sample is compared, too: the motion begins there.
-        return Start(pose=triple(still.mean(axis=0))), noise.mean_std(len(still)), min(len(still), len(planar)) - 1
+        return (
+            Start(pose=triple(still.mean(axis=0))),
+            noise.mean_std(len(still)).copy(),
+            min(len(still), len(planar)) - 1,
+        )
     return Start(pose=triple(planar[0])), noise.sigmas.copy(), 1
 
 

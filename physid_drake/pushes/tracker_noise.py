@@ -117,6 +117,7 @@ def tracker_noise(recording: Recording) -> tuple[TrackerNoise, Noise]:
         tau_yaw = tau_xy
     elif seen_xy is None:  # or nothing moves but the yaw
         tau_xy = tau_yaw
+    unturned = all(push.object.rotation == "none" for push in recording.pushes)
     believed = not warnings
     warnings += _quieter("position", plain, seen_xy, "mm", 1e3)
     warnings += _quieter("rotation", plain, seen_yaw, "deg", math.degrees(1.0))
@@ -127,7 +128,7 @@ def tracker_noise(recording: Recording) -> tuple[TrackerNoise, Noise]:
         correlation_time=(tau_xy, tau_yaw),
         jitter=_jitter(recording.pushes),
         stated=plain.source["position"] == "stated" and believed,
-        known=_known(plain, "position", seen_xy) and _known(plain, "rotation", seen_yaw),
+        known=_known(plain, "position", seen_xy) and (unturned or _known(plain, "rotation", seen_yaw)),
         doubt=math.hypot(2.0 * position.doubt, rotation.doubt) / 3.0,  # two of three degrees of freedom are places
         warnings=tuple(warnings),
     )

@@ -1,6 +1,7 @@
 """Recordings: what was measured, how it is read and written, and what it says about its own noise."""
 
 from physid_drake.recording.digest import digest_of
+from physid_drake.recording.naming import recording_folder
 from physid_drake.recording.outlines import outline_distance, polygon_centroid
 from physid_drake.recording.planar import planar_poses
 from physid_drake.recording.reading import read_recording
@@ -15,6 +16,7 @@ from physid_drake.recording.statistics import (
 from physid_drake.recording.thinning import thinned
 from physid_drake.recording.values import (
     Box,
+    Conversion,
     Cylinder,
     ForceStream,
     Hand,
@@ -32,6 +34,7 @@ from physid_drake.recording.writing import write_recording
 
 __all__ = [
     "Box",
+    "Conversion",
     "Cylinder",
     "ForceStream",
     "Hand",
@@ -53,6 +56,7 @@ __all__ = [
     "planar_poses",
     "polygon_centroid",
     "read_recording",
+    "recording_folder",
     "rest_segments",
     "summarise",
     "thinned",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +20,7 @@ from physid_drake.recording.obj import check_solid, read_obj
 from physid_drake.recording.values import (
     REFLEX_SF_TIP_RADIUS,
     Box,
+    Conversion,
     Cylinder,
     CylinderAxis,
     Hand,
@@ -44,9 +45,9 @@ _SHAPE_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "prism": ("polygon_m", "height_m"),
     "mesh": ("file", "scale"),
 }
-_TOP_KEYS: Final = ("format", "name", "description", "object", "table", "hand", "sensors", "pushes")
-_TEXT_KEYS: Final = ("name", "description", "file", "note")
-_LINES_KEYS: Final = ("description", "note")
+_TOP_KEYS: Final = ("format", "name", "description", "object", "table", "hand", "sensors", "pushes", "converted")
+_TEXT_KEYS: Final = ("name", "description", "file", "note", "source", "source_sha256", "map", "map_sha256")
+_LINES_KEYS: Final = ("description", "note", "map")
 _LOOKS: Final = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("int", "float", "bool", "timestamp"))
 _SENSOR_KEYS: Final = ("object_position_std", "object_rotation_std", "hand_position_std", "force_std")
 _SENSOR_UNITS: Final = ("_m", "_rad", "_m", "_n")
@@ -164,7 +165,20 @@ def load_description(folder: Path) -> Section:
     Raises:
         RecordingError: if it is missing, not UTF-8, not YAML, or of another format.
     """
-    file = folder / DESCRIPTION_FILE
+    return load_section(folder / DESCRIPTION_FILE, FORMAT, _TOP_KEYS)
+
+
+def load_section(file: Path, known: str, keys: Sequence[str]) -> Section:
+    """Opens a file of YAML that says its format, and checks that and its top-level keys.
+
+    Args:
+        file: of text.
+        known: the format that it must say.
+        keys: that may stand at its top.
+
+    Raises:
+        RecordingError: if it is missing, not UTF-8, not YAML, or of another format.
+    """
     text = read_text(file, most=MOST_BYTES)
     place = named(file)
     try:
@@ -185,10 +199,10 @@ def load_description(folder: Path) -> Section:
     if not isinstance(values, dict):
         raise RecordingError(f"{place}: line 1: must be a mapping of keys to values, but got {shown(values)}.")
     top = Section(file=file, path="", values=values, lines=lines)
-    if top.values.get("format") != FORMAT:
+    if top.values.get("format") != known:
         got = shown(top.values.get("format"))
-        raise top.refuse("format", f"unknown format {got}; this reader knows {FORMAT!r}.")
-    top.check_keys(*_TOP_KEYS)
+        raise top.refuse("format", f"unknown format {got}; this reader knows {known!r}.")
+    top.check_keys(*keys)
     return top
 
 
@@ -265,6 +279,21 @@ def sensors_from(top: Section) -> Sensors:
     values = [section.maybe_number(key) for key in keys]
     with section.naming():
         return Sensors(**dict(zip(_SENSOR_KEYS, values, strict=True)))
+
+
+def conversion_from(top: Section) -> Conversion | None:
+    """What ``recording.yaml`` says it was converted from; None where nothing did."""
+    section = top.section("converted", required=False)
+    if section is None:
+        return None
+    section.check_keys("source", "source_sha256", "map", "map_sha256")
+    with section.naming():
+        return Conversion(
+            source=section.text("source"),
+            source_sha256=section.text("source_sha256"),
+            map=section.text("map"),
+            map_sha256=section.text("map_sha256"),
+        )
 
 
 def push_entries(top: Section, folder: Path) -> list[tuple[str, Path, str]]:

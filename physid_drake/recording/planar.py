@@ -6,16 +6,19 @@ import numpy as np
 import numpy.typing as npt
 
 from physid_drake.recording.reading import unit_quaternions
-from physid_drake.recording.values import Array, PoseStream
+from physid_drake.recording.values import Array, PoseStream, RotationKind
 
 
-def planar_poses(times: npt.ArrayLike, planar: npt.ArrayLike, height: float) -> PoseStream:
+def planar_poses(
+    times: npt.ArrayLike, planar: npt.ArrayLike, height: float, rotation: RotationKind = "full"
+) -> PoseStream:
     """Poses of a body at a fixed height.
 
     Args:
         times: (n,) in s.
         planar: (n, 3) x and y in m, yaw in rad.
         height: z of the body's origin in m.
+        rotation: how much of it was measured.
     """
     values = np.asarray(planar, dtype=np.float64)
     positions = np.column_stack([values[:, :2], np.full(len(values), height)])
@@ -26,6 +29,7 @@ def planar_poses(times: npt.ArrayLike, planar: npt.ArrayLike, height: float) -> 
         times=np.asarray(times, dtype=np.float64),
         positions=positions,
         quaternions=unit_quaternions(quaternions),
+        rotation=rotation,
     )
 
 

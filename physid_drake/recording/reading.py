@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import difflib
 import io
 import math
 import os
@@ -34,14 +35,18 @@ HAND_POSITION: Final = ("hand_x_m", "hand_y_m", "hand_z_m")
 HAND_QUATERNION: Final = ("hand_qw", "hand_qx", "hand_qy", "hand_qz")
 OBJECT_POSITION: Final = ("object_x_m", "object_y_m", "object_z_m")
 OBJECT_QUATERNION: Final = ("object_qw", "object_qx", "object_qy", "object_qz")
+OBJECT_YAW: Final = "object_yaw_rad"
 FORCE: Final = ("force_x_n", "force_y_n", "force_z_n")
 MOST_ROWS: Final = 200_000
 """Of one table: three minutes at 1 kHz. A push takes seconds, and each of its rows some 20 us to read."""
 
+MOST_YAW: Final = 1e3
+"""rad: of a heading, turns included. Degrees and counts of an encoder are more."""
+
 CLOSEST: Final = 1e-9
 """In s between samples of one stream: less is round-off, and a speed over it overflows."""
 
-COLUMNS: Final = (TIME, *HAND_POSITION, *HAND_QUATERNION, *OBJECT_POSITION, *OBJECT_QUATERNION, *FORCE)
+COLUMNS: Final = (TIME, *HAND_POSITION, *HAND_QUATERNION, *OBJECT_POSITION, *OBJECT_QUATERNION, OBJECT_YAW, *FORCE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,6 +100,7 @@ def read_recording(folder: Path) -> Recording:
     hand = description.hand_from(top)
     shape = description.object_from(top, folder)
     table, sensors = description.table_from(top), description.sensors_from(top)
+    conversion = description.conversion_from(top)
     pushes = [
         _read_push(file, push_name, note, with_hand=hand is not None)
         for push_name, file, note in description.push_entries(top, folder)
@@ -109,13 +115,18 @@ def read_recording(folder: Path) -> Recording:
             sensors=sensors,
             pushes=tuple(pushes),
             folder=folder,
+            conversion=conversion,
         )
 
 
 def _read_push(file: Path, name: str, note: str, *, with_hand: bool) -> Push:
     table = _read_table(file, with_hand)
     warnings: list[str] = []
-    object_stream = _pose_stream(table, "object", OBJECT_POSITION, OBJECT_QUATERNION, warnings)
+    object_stream = (
+        _yaw_stream(table, warnings)
+        if table.has([OBJECT_YAW])
+        else _pose_stream(table, "object", OBJECT_POSITION, OBJECT_QUATERNION, warnings)
+    )
     if object_stream is None or len(object_stream) < 2:
         got = 0 if object_stream is None else len(object_stream)
         raise RecordingError(
@@ -168,13 +179,20 @@ def _read_header(file: Path, fields: list[str], line: int) -> tuple[str, ...]:
     header = tuple(field.strip() for field in fields)
     for k, column in enumerate(header):
         if column not in COLUMNS:
-            hint = "separate columns by commas" if len(header) == 1 else "the format lists the columns it knows"
+            hint = "separate columns by commas" if len(header) == 1 else _near(column)
             raise RecordingError(f"{file}: row {line}: column {shown(column)}: is unknown; {hint}.")
         if column in header[:k]:
             raise RecordingError(f"{file}: row {line}: column {column}: stands twice; remove one.")
     if TIME not in header:
         raise RecordingError(f"{file}: row {line}: column {TIME}: is missing; add it.")
     return header
+
+
+def _near(column: str) -> str:
+    """Which columns somebody may have meant, and where all of them are described."""
+    close = difflib.get_close_matches(column.lower(), COLUMNS, n=2, cutoff=0.6)
+    meant = f"is it {' or '.join(close)}" if close else "columns are time_s, object_x_m, hand_x_m and so on"
+    return f"{meant} (docs/recording.md)? A log of another layout: `convert table`, docs/bring_your_data.md"
 
 
 def _read_row(file: Path, header: tuple[str, ...], fields: list[str], line: int) -> list[float]:
@@ -257,8 +275,12 @@ def _check_times(table: _PushTable) -> None:
 
 
 def _check_columns(file: Path, header: tuple[str, ...], with_hand: bool) -> None:
-    required = (*OBJECT_POSITION, *OBJECT_QUATERNION, *(HAND_POSITION if with_hand else ()))
-    for group in (FORCE, HAND_QUATERNION) if with_hand else ():
+    required = (*OBJECT_POSITION, *(HAND_POSITION if with_hand else ()))
+    if OBJECT_YAW in header and any(column in header for column in OBJECT_QUATERNION):
+        raise RecordingError(
+            f"{file}: row 1: column {OBJECT_YAW}: stands beside {OBJECT_QUATERNION[0]}; give one of them."
+        )
+    for group in (OBJECT_QUATERNION, *((FORCE, HAND_QUATERNION) if with_hand else ())):
         if any(column in header for column in group):
             required = (*required, *group)
     for column in required:
@@ -281,8 +303,8 @@ def _refuse_hand(table: _PushTable) -> None:
 def _pose_stream(
     table: _PushTable, what: str, position: Sequence[str], quaternion: Sequence[str], warnings: list[str]
 ) -> PoseStream | None:
-    # A hand's quaternion may be absent, also as columns that are empty throughout.
-    turned = table.has(quaternion) and not (what == "hand" and np.isnan(table.group(quaternion)).all())
+    # Absent, also as columns that are empty throughout: the rotation was not measured.
+    turned = table.has(quaternion) and not np.isnan(table.group(quaternion)).all()
     rows = table.filled([*position, *quaternion] if turned else position)
     if len(rows) == 0:
         return None
@@ -302,6 +324,31 @@ def _pose_stream(
         times=times[screened.keep],
         positions=positions[screened.keep],
         quaternions=unit_quaternions(quaternions[screened.keep]),
+        rotation="full" if turned else "none",
+    )
+
+
+def _yaw_stream(table: _PushTable, warnings: list[str]) -> PoseStream | None:
+    """The object's stream where of its rotation the yaw was measured."""
+    rows = table.filled([*OBJECT_POSITION, OBJECT_YAW])
+    if len(rows) == 0:
+        return None
+    times, positions = table.group([TIME])[rows, 0], table.group(OBJECT_POSITION)[rows]
+    yaw = table.group([OBJECT_YAW])[rows, 0]
+    _check_seconds(table, times, "object")
+    _check_near(table, rows, OBJECT_POSITION, FURTHEST, "m")
+    _check_near(table, rows, [OBJECT_YAW], MOST_YAW, "rad")
+    zeros = np.zeros(len(yaw))
+    quaternions = np.column_stack([np.cos(0.5 * yaw), zeros, zeros, np.sin(0.5 * yaw)])
+    screened = screen_poses(times, positions, quaternions, [table.lines[k] for k in rows], "object", turned=False)
+    warnings.extend(screened.warnings)
+    if not screened.keep.any():
+        return None
+    return PoseStream(
+        times=times[screened.keep],
+        positions=positions[screened.keep],
+        quaternions=unit_quaternions(quaternions[screened.keep]),
+        rotation="yaw",
     )
 
 

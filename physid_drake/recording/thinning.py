@@ -57,8 +57,8 @@ def _motion(push: Push) -> tuple[float, float]:
 
 def _poses(stream: PoseStream, span: tuple[float, float], most: int) -> PoseStream:
     rows = _rows(stream.times, span, most)
-    return PoseStream(
-        times=stream.times[rows], positions=stream.positions[rows], quaternions=stream.quaternions[rows]
+    return replace(
+        stream, times=stream.times[rows], positions=stream.positions[rows], quaternions=stream.quaternions[rows]
     )
 
 

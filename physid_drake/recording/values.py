@@ -36,6 +36,7 @@ Array: TypeAlias = npt.NDArray[np.float64]
 TipShape = Literal["cylinder", "sphere", "capsule", "reflex_sf"]
 HandStream = Literal["measured", "commanded"]
 CylinderAxis = Literal["z", "y"]
+RotationKind = Literal["full", "yaw", "none"]
 
 QUATERNION_TOLERANCE: Final = 1e-3
 """A quaternion whose norm is further from 1 than this is refused."""
@@ -55,17 +56,21 @@ class PoseStream:
         times: (n,) in s, strictly increasing.
         positions: (n, 3) in m.
         quaternions: (n, 4) as w, x, y, z, of norm 1 within 1e-3.
+        rotation: how much of the rotation was measured: all of it, the yaw, or nothing. What was not is upright in
+            the quaternions, and aligned with W.
     """
 
     times: Array
     positions: Array
     quaternions: Array
+    rotation: RotationKind = "full"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times", frozen(self.times, "times", None))
         object.__setattr__(self, "positions", frozen(self.positions, "positions", 3))
         object.__setattr__(self, "quaternions", frozen(self.quaternions, "quaternions", 4))
         check_times(self.times)
+        check_choice("rotation", self.rotation, get_args(RotationKind))
         if not len(self.times) == len(self.positions) == len(self.quaternions):
             lengths = f"{len(self.times)}, {len(self.positions)} and {len(self.quaternions)}"
             raise RecordingError(f"times, positions and quaternions must be equally long, but got {lengths} rows.")
@@ -89,6 +94,7 @@ class PoseStream:
             np.array_equal(self.times, other.times)
             and np.array_equal(self.positions, other.positions)
             and np.array_equal(self.quaternions, other.quaternions)
+            and self.rotation == other.rotation
         )
 
     __hash__ = None  # type: ignore[assignment]
@@ -154,8 +160,8 @@ class Push:
 
     name: str
     object: PoseStream
-    hand: PoseStream | None
-    force: ForceStream | None
+    hand: PoseStream | None = None
+    force: ForceStream | None = None
     note: str = ""
     warnings: tuple[str, ...] = field(default=(), compare=False)
 
@@ -344,20 +350,44 @@ class Sensors:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Conversion:
+    """What a recording was converted from.
+
+    Attributes:
+        source: name of the file or folder.
+        source_sha256: of its bytes; of several files, of their hashes.
+        map: the map's text.
+        map_sha256: of it.
+    """
+
+    source: str
+    source_sha256: str
+    map: str
+    map_sha256: str
+
+    def __post_init__(self) -> None:
+        for name in ("source", "source_sha256", "map_sha256"):
+            check_text(name, getattr(self, name))
+        check_text("map", self.map, lines=True)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Recording:
     """Pushes of one object on one table with one hand, in the order in which they were made.
 
-    ``folder`` is where it was read from, or None; two recordings are equal whatever their folders.
+    ``folder`` is where it was read from, or None, and ``conversion`` what it was made of; two recordings are equal
+    whatever these are.
     """
 
     name: str
-    description: str
+    description: str = ""
     object: ObjectModel
     table: Table
-    hand: Hand | None
-    sensors: Sensors
+    hand: Hand | None = None
+    sensors: Sensors = field(default_factory=Sensors)
     pushes: tuple[Push, ...]
     folder: Path | None = field(default=None, compare=False)
+    conversion: Conversion | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         check_text("name", self.name)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import shutil
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
+import numpy as np
 import yaml
 
 from physid_drake.errors import OutputError
@@ -18,6 +21,7 @@ from physid_drake.recording.reading import (
     HAND_QUATERNION,
     OBJECT_POSITION,
     OBJECT_QUATERNION,
+    OBJECT_YAW,
     TIME,
 )
 from physid_drake.recording.values import (
@@ -26,6 +30,7 @@ from physid_drake.recording.values import (
     Hand,
     MeshShape,
     ObjectModel,
+    PoseStream,
     Prism,
     Push,
     Recording,
@@ -97,18 +102,8 @@ def _write_push(push: Push, path: Path) -> None:
     columns: list[str] = [TIME]
     rows: dict[float, dict[str, float]] = {}
     if push.hand is not None:
-        columns += [*HAND_POSITION, *HAND_QUATERNION]
-        for time, position, quaternion in zip(
-            push.hand.times, push.hand.positions, push.hand.quaternions, strict=True
-        ):
-            row = rows.setdefault(float(time), {})
-            row.update(zip((*HAND_POSITION, *HAND_QUATERNION), (*position, *quaternion), strict=True))
-    columns += [*OBJECT_POSITION, *OBJECT_QUATERNION]
-    for time, position, quaternion in zip(
-        push.object.times, push.object.positions, push.object.quaternions, strict=True
-    ):
-        row = rows.setdefault(float(time), {})
-        row.update(zip((*OBJECT_POSITION, *OBJECT_QUATERNION), (*position, *quaternion), strict=True))
+        columns += _add_poses(rows, push.hand, HAND_POSITION, HAND_QUATERNION)
+    columns += _add_poses(rows, push.object, OBJECT_POSITION, OBJECT_QUATERNION)
     if push.force is not None:
         columns += FORCE
         for time, force in zip(push.force.times, push.force.forces, strict=True):
@@ -119,6 +114,22 @@ def _write_push(push: Push, path: Path) -> None:
         for time in sorted(rows):
             row = rows[time]
             writer.writerow([repr(time), *(repr(float(row[c])) if c in row else "" for c in columns[1:])])
+
+
+def _add_poses(
+    rows: dict[float, dict[str, float]], stream: PoseStream, position: Sequence[str], quaternion: Sequence[str]
+) -> list[str]:
+    """The columns of a stream, filled in: of its rotation, only what was measured."""
+    columns, values = [*position], stream.positions
+    if stream.rotation == "full":
+        columns += quaternion
+        values = np.column_stack([values, stream.quaternions])
+    elif stream.rotation == "yaw":
+        columns.append(OBJECT_YAW)
+        values = np.column_stack([values, stream.planar[:, 2]])
+    for time, row in zip(stream.times, values, strict=True):
+        rows.setdefault(float(time), {}).update(zip(columns, row, strict=True))
+    return columns
 
 
 def _describe(recording: Recording, files: list[str], staging: Path) -> dict[str, object]:
@@ -138,6 +149,8 @@ def _describe(recording: Recording, files: list[str], staging: Path) -> dict[str
         {"file": file, "note": push.note} if push.note else {"file": file}
         for push, file in zip(recording.pushes, files, strict=True)
     ]
+    if recording.conversion is not None:
+        described["converted"] = dataclasses.asdict(recording.conversion)
     return described
 
 

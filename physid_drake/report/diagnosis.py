@@ -161,7 +161,7 @@ def fit_table(diagnosis: Diagnosis) -> Table:
     for column in ("model", "mm", "deg", *(("N",) if forced else ()), "sigmas", "reduced chi-square"):
         table.add_column(column, justify="right")
     for name, figures in held_out_figures(diagnosis):
-        table.add_row(name, *(f"{value:.2f}" for value in figures))
+        table.add_row(name, *(f"{value:.2f}" if math.isfinite(value) else "-" for value in figures))
     return table
 
 

@@ -74,7 +74,10 @@ def error_figure(view: TableView, k: int, noise: Mapping[str, Any]) -> tuple[str
     )
     for row, (label, scale, key) in enumerate(scales):
         axes = figure.add_axes((0.22, 0.365 - 0.145 * row, 0.75, 0.125))
-        _draw_error(axes, push, row, scale, 2.0 * scale * float(noise.get(key, math.nan)))
+        if key in noise:
+            _draw_error(axes, push, row, scale, 2.0 * scale * float(noise[key]))
+        else:
+            axes.text(0.5, 0.5, "not measured", ha="center", va="center", transform=axes.transAxes, color="#5b6472")
         axes.set_ylabel(label)
         axes.set_xlabel("time [s]" if row == 2 else "")
         axes.tick_params(labelbottom=row == 2)

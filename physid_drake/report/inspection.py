@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
@@ -11,6 +14,9 @@ from rich.table import Table
 
 from physid_drake.recording.statistics import NoiseEstimate, PushSummary, estimate_noise, summarise
 from physid_drake.recording.values import Array, Box, Cylinder, Prism, Recording, Shape
+
+MOST_KINDS = 8
+"""Lines of warnings for a recording."""
 
 _MANY_PUSHES = 12
 
@@ -41,9 +47,36 @@ def inspection_table(recording: Recording) -> Table:
     return table
 
 
+def log_table(name: str, rows: Sequence[tuple[str, ...]]) -> Table:
+    """What a foreign log holds: a row for each column or topic."""
+    table = Table(title=name, title_justify="left")
+    table.add_column("column or topic", overflow="fold")
+    for heading in ("samples", "rate\n[Hz]", "least", "largest"):
+        table.add_column(heading, justify="right")
+    for row in rows:
+        table.add_row(*row)
+    return table
+
+
 def warning_lines(recording: Recording) -> list[str]:
     """Every warning of every push, one line each."""
     return [f"{push.name}: {warning}" for push in recording.pushes for warning in push.warnings]
+
+
+def warnings_by_kind(recording: Recording) -> list[str]:
+    """Warnings that are alike but for their numbers, as one line each: the first of them, and how many more."""
+    kinds: dict[str, list[str]] = {}
+    for push in recording.pushes:
+        for warning in push.warnings:
+            alike = re.sub(r"rows? [^:]*:", "", warning)
+            kinds.setdefault(re.sub(r"[-+.\d]+(e[-+]\d+)?", "", alike), []).append(f"{push.name}: {warning}")
+    lines = []
+    for said in kinds.values():
+        pushes = len({line.partition(":")[0] for line in said})
+        where = f"in {pushes} pushes" if pushes > 1 else "in this push"
+        lines.append(said[0] if len(said) == 1 else f"{said[0].rstrip('.')} ({len(said) - 1} more like it, {where}).")
+    hidden = len(lines) - MOST_KINDS + 1
+    return lines if hidden <= 1 else [*lines[: MOST_KINDS - 1], f"and {hidden} more kinds of warnings."]
 
 
 def draw_pushes(recording: Recording) -> Figure:

@@ -18,7 +18,16 @@ from fuzz.case import Case, RefusedError, WrongError
 from fuzz.damage import damaged
 from fuzz.judge import FOREIGN
 from fuzz.trees import mutated, yaml_text
-from physid_drake import cli, run_cell, run_diagnose, run_experiment, run_plan, run_prove, run_prove_real
+from physid_drake import (
+    cli,
+    run_cell,
+    run_diagnose,
+    run_experiment,
+    run_inspect,
+    run_plan,
+    run_prove,
+    run_prove_real,
+)  # fmt: skip
 from physid_drake.errors import ConfigError
 
 NUMBERS = ("0", "1", "-1", "3", "1.5", "nan", "inf", "-inf", "1e308", "1e400", "9" * 30, "9" * 5000, "x", "",
@@ -34,8 +43,8 @@ WORDS = ("eraser", "sealed", "table_tilt", "x", "", "mass", "\u202e", "x" * 3000
          "mit_pushes", "none", "cmu", "[red]", "\x1b[2J", "{}", "{search: {budget: 0}}", "{x: 1}", "[", "point",
          "127.0.0.1")  # fmt: skip
 FLAGS = {
-    "inspect": ("--out",),
-    "convert": ("--limit", "--seed"),
+    "inspect": ("--out", "--no-fit"),
+    "convert": ("--limit", "--seed", "--map", "--guess"),
     "diagnose": ("--out", "--seed", "--alpha", "--effects", "--contact", "--time-step", "--pushes", "--jobs"),
     "plan": ("--goal", "--start", "--policy", "--model", "--plain", "--speed", "--direction", "--travel",
     "--tolerance",
@@ -46,10 +55,21 @@ FLAGS = {
     "experiment": ("--quick", "--data", "--jobs", "--seed", "--out"),
     "run_cell": ("--recording", "--out", "--seed", "--set", "--no-diagnosis", "--no-plan", "--no-view", "--host"),
 }  # fmt: skip
-PLACED = ("--out", "--model", "--data", "--recording", "--real")
+PLACED = ("--out", "--map", "--model", "--data", "--recording", "--real")
 WORDY = ("--policy", "--search", "--effects", "--contact", "--kind", "--only", "--host", "--set")
 COUNTS = {"--goal": 2, "--start": 3}
-BARE = ("--plain", "--quick", "--retry", "--open", "--risk", "--no-diagnosis", "--no-plan", "--no-view")
+BARE = (
+    "--no-fit",
+    "--guess",
+    "--plain",
+    "--quick",
+    "--retry",
+    "--open",
+    "--risk",
+    "--no-diagnosis",
+    "--no-plan",
+    "--no-view",
+)
 STATUSES = (0, 1, 2, 130)
 DONE = "all that can be refused was not"
 
@@ -132,7 +152,8 @@ def _nothing_computed() -> Iterator[None]:
         raise ConfigError(f"{DONE}.")
 
     taken_out = (
-        (run_diagnose, "case_of"), (run_cell, "_identifier"), (run_plan, "plan"), (run_prove, "_make"),
+        (run_diagnose, "case_of"), (run_inspect, "examined"),
+        (run_cell, "_identifier"), (run_plan, "plan"), (run_prove, "_make"),
         (run_prove, "diagnose_worlds"), (run_prove_real, "prepare"), (run_experiment, "run_all"),
     )  # fmt: skip
     with ExitStack() as stack:

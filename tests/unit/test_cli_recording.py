@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from physid_drake import cli
+from physid_drake import cli, run_inspect
 from physid_drake.errors import RecordingError
 from physid_drake.recording import (
     Box,
@@ -47,10 +47,11 @@ def some_recording(count=3):
 
 def test_inspect_shows_every_push_and_warns_on_stderr(tmp_path, capsys):
     write_recording(some_recording(), tmp_path / "r")
-    assert cli.main(["inspect", str(tmp_path / "r"), "--out", str(tmp_path / "top.png")]) == 0
+    assert cli.main(["inspect", "--no-fit", str(tmp_path / "r"), "--out", str(tmp_path / "top.png")]) == 0
     shown = capsys.readouterr()
     assert "some_$pushes" in shown.out and "pushes/p2.csv" in shown.out and "[mm/s]" in shown.out
     assert "warning: pushes/p0.csv: object: rows 21-32: gap" in shown.err
+    assert "(2 more like it, in 3 pushes)" in shown.err and shown.err.count("gap") == 1
     assert (tmp_path / "top.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -59,15 +60,16 @@ def test_inspect_says_what_a_diagnosis_would_refuse(tmp_path, capsys):
     beside = dc.replace(recording, table=Table(size=(1.0, 1.0), centre=(5.0, 0.0)))
     heavy = dc.replace(beside, object=dc.replace(recording.object, mass=50.0))
     write_recording(heavy, tmp_path / "r")
-    assert cli.main(["inspect", str(tmp_path / "r")]) == 0
-    said = capsys.readouterr().err
-    assert "would be refused: push 'pushes/p0.csv': the object starts at" in said
-    assert "would be refused: recording 'some_$pushes': with 50 kg" in said
+    assert cli.main(["inspect", "--no-fit", str(tmp_path / "r")]) == 1
+    shown = capsys.readouterr()
+    assert "some_$pushes" in shown.out  # what is in it is shown all the same
+    assert shown.err.splitlines()[-1].startswith("error: recording 'some_$pushes': with 50 kg")
+    assert "would be refused: push 'pushes/p0.csv': the object starts at" in shown.err
 
 
 def test_a_broken_recording_is_one_line_and_status_one(tmp_path, capsys):
     (tmp_path / "recording.yaml").write_text("format: [\n")
-    assert cli.main(["inspect", str(tmp_path)]) == 1
+    assert cli.main(["inspect", "--no-fit", str(tmp_path)]) == 1
     shown = capsys.readouterr()
     assert shown.out == "" and shown.err.startswith("error: ") and shown.err.count("\n") == 1
 
@@ -75,14 +77,14 @@ def test_a_broken_recording_is_one_line_and_status_one(tmp_path, capsys):
 @pytest.mark.parametrize("out", ["nowhere/top.png", "top.nonsense"])
 def test_a_plot_that_cannot_be_written_is_an_error(tmp_path, capsys, out):
     write_recording(some_recording(), tmp_path / "r")
-    assert cli.main(["inspect", str(tmp_path / "r"), "--out", str(tmp_path / out)]) == 1
+    assert cli.main(["inspect", "--no-fit", str(tmp_path / "r"), "--out", str(tmp_path / out)]) == 1
     assert str(tmp_path / out) in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["top", "top.pgf", "top.html", ".png"])
 def test_what_is_no_picture_is_refused_before_anything_is_drawn(tmp_path, capsys, name):
     write_recording(some_recording(), tmp_path / "r")
-    assert cli.main(["inspect", str(tmp_path / "r"), "--out", str(tmp_path / name)]) == 1
+    assert cli.main(["inspect", "--no-fit", str(tmp_path / "r"), "--out", str(tmp_path / name)]) == 1
     assert "must end in .png, .svg, .pdf" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["r"]
 
@@ -90,7 +92,7 @@ def test_what_is_no_picture_is_refused_before_anything_is_drawn(tmp_path, capsys
 @pytest.mark.parametrize("name", ["top.png", "top.svg", "top.pdf"])
 def test_a_picture_replaces_only_one_that_was_drawn_before(tmp_path, capsys, name):
     write_recording(some_recording(), tmp_path / "r")
-    command = ["inspect", str(tmp_path / "r"), "--out", str(tmp_path / name)]
+    command = ["inspect", "--no-fit", str(tmp_path / "r"), "--out", str(tmp_path / name)]
     assert cli.main(command) == cli.main(command) == 0
     (tmp_path / name).write_bytes(b"my photograph")
     assert cli.main(command) == 1
@@ -104,7 +106,7 @@ def test_convert_writes_a_recording_that_inspect_reads(tmp_path, capsys):
     assert cli.main(["convert", "mit", str(table), str(tmp_path / "r"), "--seed", "-1"]) == 1
     assert cli.main(["convert", "mit", str(table), str(tmp_path / "r"), "--limit", "2"]) == 0
     assert "mit_tri2_abs: 2 pushes written" in capsys.readouterr().out
-    assert cli.main(["inspect", str(tmp_path / "r")]) == 0
+    assert cli.main(["inspect", "--no-fit", str(tmp_path / "r")]) == 0
     assert cli.main(["convert", "mit", str(table), str(tmp_path / "r")]) == 1
     assert "not an empty folder" in capsys.readouterr().err
 
@@ -113,8 +115,8 @@ def test_an_interrupt_is_status_130(monkeypatch, capsys):
     def interrupt(_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "read_recording", interrupt)
-    assert cli.main(["inspect", "anywhere"]) == 130
+    monkeypatch.setattr(run_inspect, "read_recording", interrupt)
+    assert cli.main(["inspect", "--no-fit", "anywhere"]) == 130
     assert capsys.readouterr().err == "interrupted\n"
 
 
@@ -122,8 +124,8 @@ def test_a_message_of_several_lines_is_shown_as_one(monkeypatch, capsys):
     def refuse(_):
         raise RecordingError("first\nsecond")
 
-    monkeypatch.setattr(cli, "read_recording", refuse)
-    assert cli.main(["inspect", "anywhere"]) == 1
+    monkeypatch.setattr(run_inspect, "read_recording", refuse)
+    assert cli.main(["inspect", "--no-fit", "anywhere"]) == 1
     assert capsys.readouterr().err == "error: first second\n"
 
 
@@ -139,7 +141,7 @@ def test_the_command_line_and_recordings_do_without_drake(tmp_path):
     write_recording(some_recording(1), tmp_path / "r")
     code = (
         "import sys; from physid_drake.cli import build_parser; from physid_drake.recording import read_recording; "
-        "read_recording(build_parser().parse_args(sys.argv[1:]).folder); sys.exit('pydrake' in sys.modules)"
+        "read_recording(build_parser().parse_args(sys.argv[1:]).recording); sys.exit('pydrake' in sys.modules)"
     )
     run = subprocess.run(
         [sys.executable, "-c", code, "inspect", str(tmp_path / "r")], capture_output=True, text=True, check=False

@@ -117,7 +117,7 @@ def test_what_would_not_show_at_its_strongest_is_not_among_what_would(column, sh
     ]  # fmt: skip
     fitter = SimpleNamespace(
         priors=lambda scatter: [np.zeros(0)] * 12, predictor=SimpleNamespace(whitening=[np.eye(3)] * 12),
-        case=SimpleNamespace(around=AROUND, features=[SimpleNamespace(middles=np.zeros(1))] * 12),
+        case=SimpleNamespace(around=AROUND, features=[SimpleNamespace(pose_numbers=3)] * 12),
     )  # fmt: skip
     chance = np.random.default_rng(0).exponential(size=300)
     needed = gain_of(-np.log(CONFIRMED), chance) * 12.0 / 11.0

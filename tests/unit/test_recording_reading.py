@@ -312,3 +312,46 @@ def test_a_field_of_many_letters_is_cut(written, old, new):
 
 def test_a_folder_whose_name_cannot_be_is_refused(tmp_path):
     assert "is not a folder" in refusal(tmp_path / ("x" * 70_000))
+
+
+YAW_HEADER = "time_s,object_x_m,object_y_m,object_z_m,object_yaw_rad,hand_x_m,hand_y_m,hand_z_m"
+
+
+def yaw_rows(yaws):
+    return [f"{0.1 * k:.1f},0.1,0,0.015,{yaw},0,0,0.015" for k, yaw in enumerate(yaws)]
+
+
+def test_a_yaw_alone_is_a_rotation_of_which_no_more_is_said(written, tmp_path):
+    recording = read_recording(written(header=YAW_HEADER, rows=yaw_rows([0.0, 3.0, 6.0])))
+    stream = recording.pushes[0].object
+    assert stream.rotation == "yaw" and stream.planar[:, 2] == pytest.approx([0.0, 3.0, 6.0])
+    write_recording(recording, tmp_path / "again")
+    assert (tmp_path / "again/pushes/001.csv").read_text().startswith("time_s,hand_x_m,hand_y_m,hand_z_m,object_x_m")
+    again = read_recording(tmp_path / "again").pushes[0].object
+    assert again.rotation == "yaw" and again.planar[:, 2] == pytest.approx([0.0, 3.0, 6.0])
+
+
+def test_a_rotation_that_was_not_measured_is_none(written, tmp_path):
+    header = YAW_HEADER.replace(",object_yaw_rad", "")
+    recording = read_recording(written(header=header, rows=[row.replace(",y,", ",") for row in yaw_rows("yyy")]))
+    assert recording.pushes[0].object.rotation == "none"
+    write_recording(recording, tmp_path / "again")
+    assert "qw" not in (tmp_path / "again/pushes/001.csv").read_text()
+    assert read_recording(tmp_path / "again") == recording
+
+
+@pytest.mark.parametrize(
+    ("header", "rows", "expected"),
+    [
+        (YAW_HEADER.replace("yaw_rad", "qw"), yaw_rows([1, 1]), "column object_qx: is missing"),
+        (
+            f"{YAW_HEADER},object_qw,object_qx,object_qy,object_qz",
+            [r + ",1,0,0,0" for r in yaw_rows([0, 1])],
+            "beside",
+        ),
+        (YAW_HEADER, yaw_rows([0, 1e4]), "column object_yaw_rad: must be between -1000 and 1000 rad"),
+        (YAW_HEADER, ["0,0.1,0,0.015,,0,0,0", "0.1,0.1,0,0.015,1,0,0,0"], "column object_yaw_rad: is empty"),
+    ],
+)
+def test_a_rotation_is_said_in_one_way(written, header, rows, expected):
+    assert expected in refusal(written(header=header, rows=rows))

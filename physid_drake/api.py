@@ -1,0 +1,143 @@
+"""What a script or a notebook needs: recordings from arrays, and a diagnosis with its page, in a few lines.
+
+``docs/from_python.md`` shows it at work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from physid_drake.convert import convert_bag, convert_table, guess_map
+from physid_drake.diagnose import Diagnosis, Evidence, case_of, cell_config
+from physid_drake.diagnose import diagnose as diagnose_case
+from physid_drake.model import Model
+from physid_drake.model_reading import load_model
+from physid_drake.progress import Progress
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.recording import (
+    Box,
+    Cylinder,
+    ForceStream,
+    Hand,
+    ObjectModel,
+    PoseStream,
+    Prism,
+    Push,
+    Recording,
+    Sensors,
+    Table,
+    planar_poses,
+    read_recording,
+    write_recording,
+)
+from physid_drake.report.diagnosis import diagnosis_json
+from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
+from physid_drake.report.progress import progress_bar
+from physid_drake.report.terminal import terminal
+from physid_drake.run_diagnose import COMMAND, write
+from physid_drake.run_folder import RunFolder, write_whole
+
+__all__ = [
+    "Answer",
+    "Box",
+    "Cylinder",
+    "ForceStream",
+    "Hand",
+    "Model",
+    "ObjectModel",
+    "PoseStream",
+    "Prism",
+    "Push",
+    "Recording",
+    "Sensors",
+    "Table",
+    "convert_bag",
+    "convert_table",
+    "diagnose",
+    "guess_map",
+    "load_model",
+    "planar_poses",
+    "read_recording",
+    "write_recording",
+]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Answer:
+    """What a diagnosis says of a recording.
+
+    Attributes:
+        diagnosis: verdict, effects with intervals, errors before and after, and the rest of ``diagnosis.json``.
+        evidence: the fits and hypotheses that it rests on.
+    """
+
+    diagnosis: Diagnosis
+    evidence: Evidence
+
+    def __str__(self) -> str:
+        """The verdict in a sentence."""
+        return f"{self.diagnosis.verdict}: {self.diagnosis.sentence}"
+
+    def json(self) -> str:
+        """The text of ``diagnosis.json``."""
+        return diagnosis_json(self.diagnosis)
+
+    def save_page(self, file: str | Path) -> None:
+        """Writes the page that shows it; it opens in any browser, without a network.
+
+        Args:
+            file: its name; what has that name is replaced.
+
+        Raises:
+            OutputError: if it cannot be written.
+        """
+        pushes = shown_pushes(self.diagnosis, self.evidence)
+        page = diagnosis_page(self.diagnosis, self.evidence.case.recording, pushes, self.evidence.wrenches)
+        write_whole(Path(file), page.encode())
+
+    def save(self, folder: str | Path) -> None:
+        """Writes what the ``diagnose`` command writes: ``diagnosis.json``, the page, the scene and ``model.yaml``.
+
+        Args:
+            folder: new, empty, or of an earlier diagnosis.
+
+        Raises:
+            ConfigError: if it holds what somebody else wrote.
+            OutputError: if it cannot be written.
+        """
+        RunFolder.check(Path(folder), COMMAND)
+        write(RunFolder.begin(Path(folder), COMMAND), self.diagnosis, self.evidence)
+
+
+def diagnose(
+    recording: Recording,
+    *,
+    seed: int = 0,
+    alpha: float = 0.01,
+    effects: Sequence[str] | None = None,
+    jobs: int = 0,
+    progress: Progress | None = None,
+) -> Answer:
+    """Says what physics a recording has that the simulation leaves out.
+
+    Args:
+        recording: the pushes.
+        seed: of everything random.
+        alpha: false-alarm rate of the detection.
+        effects: names of the catalogue to look at; None for all.
+        jobs: processes; 0 takes the machine's cores.
+        progress: told the stage, steps done and steps in all; None shows a bar, or lines where there is no terminal.
+
+    Raises:
+        RecordingError: if the recording cannot be compared with a simulation; one line that says why.
+        ConfigError: if there is no effect of such a name.
+    """
+    case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=jobs)
+    if progress is not None:
+        diagnosis, evidence = diagnose_case(case, seed=seed, alpha=alpha, effects=effects, tick=progress)
+    else:
+        with progress_bar(terminal()) as tick:
+            diagnosis, evidence = diagnose_case(case, seed=seed, alpha=alpha, effects=effects, tick=tick)
+    return Answer(diagnosis=diagnosis, evidence=evidence)

@@ -1,0 +1,7 @@
+"""Logs of one's own into recordings: tables of numbers and bags, explained by a map."""
+
+from physid_drake.convert.convert import convert_bag, convert_table
+from physid_drake.convert.guess import Guess, guess_map
+from physid_drake.convert.mapping import Map, read_map
+
+__all__ = ["Guess", "Map", "convert_bag", "convert_table", "guess_map", "read_map"]

@@ -1,0 +1,165 @@
+"""Tables of arrays: npz, HDF5 and Parquet, in the layouts in which robots' logs are kept.
+
+An array (n, k) becomes k columns ``name[0]`` to ``name[k-1]``; one of three axes (pushes, n, k) becomes the same with
+its pushes one after the other, counted in ``[push]``. So do groups of an HDF5 file that hold the same, one each.
+"""
+
+from __future__ import annotations
+
+import importlib
+import io
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from physid_drake.convert.columns import Array, Columns
+from physid_drake.errors import RecordingError
+from physid_drake.files import FileError, read_bytes
+from physid_drake.npz import read_arrays
+from physid_drake.wording import named, one_line
+
+PUSH: Final = "[push]"
+MOST_BYTES: Final = 1_000_000_000
+MOST_NUMBERS: Final = 40_000_000
+MOST_COLUMNS: Final = 64
+"""Of one array: an image is no column."""
+
+_BROKEN: Final = (
+    OSError, ValueError, TypeError, RuntimeError, MemoryError, OverflowError, AttributeError, LookupError,
+)  # fmt: skip
+
+
+def read_array_table(path: Path) -> Columns:
+    """The columns of an npz, HDF5 or Parquet file; what is no number and no text is passed over.
+
+    Args:
+        path: of the file; its ending says what it is.
+
+    Raises:
+        RecordingError: if it cannot be read, or what reads it is not installed; one line that names the file.
+    """
+    read = _READERS[path.suffix.lower()]
+    try:
+        arrays = read(path)
+    except FileError as error:
+        raise RecordingError(f"{named(path)}: {error}.") from error
+    except _BROKEN as error:
+        raise RecordingError(
+            f"{named(path)}: cannot be read: damaged, or of another kind ({one_line(error)})."
+        ) from error
+    numbers: dict[str, Array] = {}
+    texts: dict[str, list[str]] = {}
+    for name, array in arrays.items():
+        if array.dtype.kind in "UO" and array.ndim == 1:
+            texts[name] = [str(value) for value in array[:MOST_NUMBERS]]
+        elif array.dtype.kind in "biuf" and 1 <= array.ndim <= 3:
+            numbers |= _columns(name, array)
+    if not numbers:
+        raise RecordingError(f"{named(path)}: holds no columns of numbers; its arrays are {_shapes(arrays)}.")
+    if sum(map(len, numbers.values())) > MOST_NUMBERS:
+        raise RecordingError(f"{named(path)}: has more than {MOST_NUMBERS:,} numbers; cut the pushes out of it.")
+    return Columns(source=named(path.name), numbers=numbers, texts=texts)
+
+
+def _columns(name: str, array: Any) -> dict[str, Array]:
+    if array.ndim == 1:
+        return {name: _floats(array)}
+    if array.shape[-1] > MOST_COLUMNS:
+        return {}
+    if array.ndim == 2:
+        return {f"{name}[{k}]": _floats(array[:, k]) for k in range(array.shape[1])}
+    pushes, rows, count = array.shape
+    columns = {f"{name}[{k}]": _floats(array[:, :, k].ravel()) for k in range(count)}
+    return columns | {PUSH: np.repeat(np.arange(pushes, dtype=np.float64), rows)}
+
+
+def _floats(array: Any) -> Array:
+    values: Array = np.array(array, dtype=np.float64)
+    values[~np.isfinite(values)] = np.nan
+    return values
+
+
+def _shapes(arrays: Mapping[str, Any]) -> str:
+    said = ", ".join(f"{named(name)} {array.shape}" for name, array in list(arrays.items())[:8])
+    return said or "none"
+
+
+def _needs(module: str, path: Path, extra: str) -> Any:
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        package = module.split(".", maxsplit=1)[0]
+        raise RecordingError(
+            f"{named(path)}: reading {path.suffix} needs {package}, which is not installed; run"
+            f" `pip install physid_drake[{extra}]`."
+        ) from error
+
+
+def _read_hdf5(path: Path) -> dict[str, Any]:
+    h5py = _needs("h5py", path, "tables")
+    # From memory: what took the file's place since then could be a pipe, which hangs.
+    with h5py.File(io.BytesIO(read_bytes(path, most=MOST_BYTES)), "r") as opened:
+        found: dict[str, Any] = {}
+        _collect(h5py, opened, "", found, depth=0)
+    return _joined(found)
+
+
+def _collect(h5py: Any, group: Any, prefix: str, found: dict[str, Any], depth: int) -> None:
+    """Plain arrays of this very file: links are not followed, so that nothing is read from elsewhere."""
+    if depth > 8 or len(found) > 10_000:
+        raise RecordingError("it nests deeper, or holds more arrays, than a log does")
+    for name in group:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            continue
+        item = group[name]
+        if isinstance(item, h5py.Group):
+            _collect(h5py, item, f"{prefix}{name}/", found, depth + 1)
+        elif isinstance(item, h5py.Dataset) and _is_plain(item):
+            found[f"{prefix}{name}"] = item[()]
+
+
+def _is_plain(item: Any) -> bool:
+    plain = item.dtype.kind in "biuf" and item.shape is not None and 1 <= len(item.shape) <= 3
+    return plain and item.external is None and not item.is_virtual and item.size <= MOST_NUMBERS
+
+
+def _joined(found: dict[str, Any]) -> dict[str, Any]:
+    """Groups at the top that hold the same arrays, one after the other: robots' logs keep one for each push."""
+    groups: dict[str, dict[str, Any]] = {}
+    for name, array in found.items():
+        head, _, rest = name.partition("/")
+        groups.setdefault(head, {})[rest] = array
+    sets = {frozenset(arrays) for arrays in groups.values()}
+    if len(groups) < 2 or len(sets) != 1 or "" in next(iter(sets)):
+        return found
+    lengths = [{len(array) for array in arrays.values()} for arrays in groups.values()]
+    if any(len(one) != 1 for one in lengths):
+        return found
+    heads = sorted(groups, key=lambda head: (len(head), head))
+    joined = {name: np.concatenate([groups[head][name] for head in heads]) for name in groups[heads[0]]}
+    counts = [len(next(iter(groups[head].values()))) for head in heads]
+    return joined | {PUSH: np.repeat(np.arange(len(heads), dtype=np.float64), counts)}
+
+
+def _read_parquet(path: Path) -> dict[str, Any]:
+    parquet = _needs("pyarrow.parquet", path, "tables")
+    table = parquet.read_table(io.BytesIO(read_bytes(path, most=MOST_BYTES)))
+    found: dict[str, Any] = {}
+    for name in dict.fromkeys(table.column_names):
+        column = table.column(name)
+        kind = str(column.type)
+        if kind.startswith(("list", "fixed_size_list", "large_list")):
+            rows = column.to_pylist()
+            width = len(rows[0]) if rows and rows[0] is not None else 0
+            if 0 < width <= MOST_COLUMNS and all(row is not None and len(row) == width for row in rows):
+                found[name] = np.array(rows)
+        elif kind.startswith(("int", "uint", "float", "double", "half", "bool", "string")):
+            found[name] = column.to_numpy()
+    return found
+
+
+_READERS: Final[Mapping[str, Callable[[Path], dict[str, Any]]]] = {
+    ".npz": read_arrays, ".h5": _read_hdf5, ".hdf5": _read_hdf5, ".parquet": _read_parquet,
+}  # fmt: skip

@@ -1,0 +1,85 @@
+"""What a foreign log holds once its format is out of the way: named columns of numbers, some of them of one clock."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from physid_drake.errors import RecordingError
+from physid_drake.wording import shown
+
+Array = NDArray[np.float64]
+
+MOST_NAMED = 3
+"""Names offered where one is unknown."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Columns:
+    """Columns of one log; those of one length belong together, row by row.
+
+    Attributes:
+        source: the log, for messages: a file's name, or that of a topic in it.
+        numbers: (n,) by name; NaN where a field is empty.
+        texts: columns that hold what is no number, as it stands there.
+        units: of the columns whose header states one.
+        rows: (n,) the line of each row in a text, or its index, for messages.
+    """
+
+    source: str
+    numbers: Mapping[str, Array]
+    texts: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    rows: Sequence[int] = ()
+
+    def names(self) -> list[str]:
+        """Of all columns that hold numbers, in their order."""
+        return list(self.numbers)
+
+    def find(self, name: str) -> str:
+        """The column that a map means: by its whole name, or by the end of it where only one has that end.
+
+        Raises:
+            RecordingError: if there is none, more than one, or it holds text.
+        """
+        if name in self.numbers:
+            return name
+        ends = [one for one in self.numbers if one.endswith(name) and name]
+        if len(ends) == 1:
+            return ends[0]
+        if len(ends) > 1:
+            raise RecordingError(f"column {shown(name)} is the end of {_listed(ends)}; give more of the name.")
+        if name in self.texts:
+            first = next((text for text in self.texts[name] if text), "")
+            raise RecordingError(f"column {shown(name)} holds text, such as {shown(first)}; give one of numbers.")
+        raise RecordingError(f"{self.source} has no column {shown(name)}; {self._offer(name)}")
+
+    def stack(self, names: Sequence[str]) -> Array:
+        """Columns (n, k) side by side.
+
+        Raises:
+            RecordingError: if one is not there, or they are not equally long.
+        """
+        found = [self.find(name) for name in names]
+        lengths = {len(self.numbers[name]) for name in found}
+        if len(lengths) > 1:
+            said = ", ".join(f"{shown(name)} has {len(self.numbers[name])}" for name in found)
+            raise RecordingError(f"columns of one quantity must have equally many rows, but {said}.")
+        return np.column_stack([self.numbers[name] for name in found])
+
+    def _offer(self, name: str) -> str:
+        known = [*self.numbers, *self.texts]
+        alike = [one for one in known if one.lower() == name.lower()]
+        close = alike or difflib.get_close_matches(name, known, n=MOST_NAMED, cutoff=0.5)
+        if close:
+            return f"did you mean {_listed(close)}?"
+        return f"its columns are {_listed(known)}." if known else "it has none."
+
+
+def _listed(names: Sequence[str], most: int = 8) -> str:
+    said = ", ".join(shown(name) for name in names[:most])
+    return said + (f" and {len(names) - most} more" if len(names) > most else "")

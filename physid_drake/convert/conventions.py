@@ -1,0 +1,102 @@
+"""From what a log says in its own conventions to poses and forces in W, in SI units.
+
+A log's world S and the recording's world W differ by an origin, a signed permutation A of the axes, and what rotation
+R is left: p_W = R A (p_S - o). A has determinant -1 where S is left-handed. Rotations go along, R_W = R A R_S A^T:
+the axes of a body are taken the same way as those of the world, and one that stood like S stands like W if R is none.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from physid_drake.convert.mapping import NORM_TOLERANCE, ForceMap, Offset, Turn, World
+from physid_drake.errors import RecordingError
+
+Array = NDArray[np.float64]
+
+
+def rotation_of(turn: Turn, values: Array, scale: float, world: World) -> Rotation:
+    """Rotations R_SM (n) as matrices in the log's own coordinates.
+
+    Args:
+        turn: how they are written.
+        values: (n, k) as written, all finite.
+        scale: of angles, to rad.
+        world: whose vertical a yaw turns about.
+
+    Raises:
+        RecordingError: if a quaternion's norm is not 1.
+    """
+    if turn.kind in ("wxyz", "xyzw"):
+        wxyz = values if turn.kind == "wxyz" else np.roll(values, 1, axis=1)
+        norms = np.linalg.norm(wxyz, axis=1)
+        wrong = np.flatnonzero(np.abs(norms - 1.0) > NORM_TOLERANCE)
+        if len(wrong):
+            raise RecordingError(
+                f"{len(wrong)} of {len(norms)} quaternions have no norm of 1 (the first has {norms[wrong[0]]:.4g});"
+                " are these the four columns of one rotation?"
+            )
+        rotation = Rotation.from_quat(np.roll(wxyz, -1, axis=1))
+    elif turn.kind == "euler":
+        rotation = Rotation.from_euler(turn.order, scale * values)
+    elif turn.kind == "rotation_vector":
+        rotation = Rotation.from_rotvec(scale * values)
+    else:
+        rotation = Rotation.from_rotvec(scale * values * world.axes[2])
+    return rotation.inv() if turn.inverse else rotation
+
+
+def places_in_world(positions: Array, world: World) -> Array:
+    """Positions (n, 3) [m] of S in W."""
+    placed = (positions - np.asarray(world.origin)) @ world.axes.T
+    return np.asarray(rotation_wxyz(world.rotation).apply(placed))
+
+
+def rotations_in_world(rotation: Rotation, world: World) -> Rotation:
+    """Rotations of S in W."""
+    return rotation_wxyz(world.rotation) * Rotation.from_matrix(world.axes @ rotation.as_matrix() @ world.axes.T)
+
+
+def with_offset(positions: Array, rotation: Rotation | None, offset: Offset) -> tuple[Array, Rotation | None]:
+    """Poses of the wanted frame, whose pose in the tracked frame is ``offset``.
+
+    Raises:
+        RecordingError: if there is an offset, but no rotation that would turn it.
+    """
+    place, turn = np.asarray(offset.translation), rotation_wxyz(offset.rotation)
+    if rotation is None:
+        if np.any(place[:2] != 0.0) or offset.rotation != Offset().rotation:
+            raise RecordingError("an offset within the plane turns with the body, but its rotation was not measured.")
+        return positions + place, None
+    return positions + rotation.apply(place), rotation * turn
+
+
+def rotation_wxyz(quaternion: tuple[float, float, float, float]) -> Rotation:
+    """The rotation of one quaternion, w first."""
+    return Rotation.from_quat(np.roll(quaternion, -1))
+
+
+def wxyz_of(rotation: Rotation) -> Array:
+    """Quaternions (n, 4), w first."""
+    return np.roll(np.atleast_2d(rotation.as_quat()), 1, axis=1)
+
+
+def forces_in_world(forces: Array, force: ForceMap, hand: Rotation | None, world: World) -> Array:
+    """Forces of the hand on the object (n, 3) [N] in W.
+
+    Args:
+        forces: (n, 3) [N] as measured, in the sensor's axes or S's.
+        force: what they are.
+        hand: rotations R_WP (n) at the forces' times, where the sensor turns with the hand.
+        world: where W lies.
+    """
+    turned = rotation_wxyz(force.offset.rotation).apply(forces)
+    if not force.in_hand:
+        turned = rotation_wxyz(world.rotation).apply(turned @ world.axes.T)
+    elif hand is not None:
+        turned = hand.apply(turned)
+    on_sensor = turned if force.on_hand else -turned
+    # The sensor carries the tool: what it feels of that points down.
+    return np.asarray(np.array([0.0, 0.0, -force.weight]) - on_sensor)

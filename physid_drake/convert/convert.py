@@ -1,0 +1,285 @@
+"""From a foreign log to a recording: tables and bags, and the map that explains them."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from physid_drake.convert.arrays import read_array_table
+from physid_drake.convert.bag import RECEIVE, STAMP, bag_files, read_bag
+from physid_drake.convert.columns import Columns
+from physid_drake.convert.cutting import Piece, pieces_of, rows_by_value
+from physid_drake.convert.mapping import Clock, ForceMap, Map, PoseMap, Quantity, Turn, read_map
+from physid_drake.convert.streams import Streams, end_streams, streams_of
+from physid_drake.convert.text_table import read_text_table
+from physid_drake.errors import RecordingError
+from physid_drake.files import FileError, read_text, sha256_of
+from physid_drake.recording import (
+    Box,
+    Conversion,
+    Cylinder,
+    ForceStream,
+    ObjectModel,
+    Prism,
+    Push,
+    Recording,
+    read_recording,
+    write_recording,
+)
+from physid_drake.recording.adapters.sources import source_files
+from physid_drake.wording import named, shown
+
+TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".trc")
+ARRAYS: Final = (".npz", ".h5", ".hdf5", ".parquet")
+LARGEST_REACH: Final = 1.0
+"""m: of a mesh, whose file is not read here."""
+
+Parts = list[tuple[str, Map, Mapping[str, Columns]]]
+"""What of a log is cut on its own: a label, the map with the columns' names in it, and the columns of each stream."""
+
+
+def convert_table(source: Path, folder: Path, map_file: Path) -> Recording:
+    """Converts tables of numbers, and writes the recording.
+
+    Args:
+        source: a file of text (CSV, TSV), npz, HDF5 or Parquet; or a folder of them, in the order of names.
+        folder: where the recording goes; must not exist, or be empty.
+        map_file: says what the columns are.
+
+    Returns:
+        The recording as read back from ``folder``. What was left out is a ``UserWarning`` each.
+
+    Raises:
+        RecordingError: if source or map break a rule, or hold no push; nothing is written then.
+        OutputError: if the folder cannot be written.
+    """
+    files = source_files(Path(source), *TEXTS, *ARRAYS)
+    return _convert(
+        source, folder, map_file, files, lambda file, chart: _table_parts(read_columns(file, chart), chart)
+    )
+
+
+def convert_bag(source: Path, folder: Path, map_file: Path) -> Recording:
+    """Converts a ROS bag, and writes the recording.
+
+    Args:
+        source: a ``.bag``, ``.mcap`` or ``.db3`` file, or the folder of a ROS 2 bag.
+        folder: where the recording goes; must not exist, or be empty.
+        map_file: says what the topics are.
+
+    Returns:
+        The recording as read back from ``folder``. What was left out is a ``UserWarning`` each.
+
+    Raises:
+        RecordingError: if source or map break a rule, or hold no push; nothing is written then.
+        OutputError: if the folder cannot be written.
+    """
+    files = bag_files(Path(source))
+    return _convert(source, folder, map_file, files, lambda _, chart: _bag_parts(Path(source), chart), whole=True)
+
+
+def read_columns(file: Path, chart: Map | None = None) -> Columns:
+    """The columns of a table, by the kind of its file.
+
+    Raises:
+        RecordingError: if it cannot be read.
+    """
+    if file.suffix.lower() in ARRAYS:
+        return read_array_table(file)
+    return read_text_table(file, None if chart is None else chart.dialect)
+
+
+def _convert(
+    source: Path,
+    folder: Path,
+    map_file: Path,
+    files: Sequence[Path],
+    parts: Callable[[Path, Map], Parts],
+    *,
+    whole: bool = False,
+) -> Recording:
+    chart = read_map(Path(map_file))
+    pushes: list[Push] = []
+    for file in files[:1] if whole else files:
+        try:
+            pieces = _pieces(file.name, parts(file, chart))
+        except RecordingError as error:
+            said = str(error)
+            raise RecordingError(said if file.name in said else f"{named(file)}: {said}") from error
+        for label, piece in pieces:
+            note = f"{file.name}{label}, from {piece.begin:.10g} s"
+            pushes.append(_push(piece, len(pushes) + 1, note, chart))
+    if not pushes:
+        raise RecordingError(f"{named(source)}: no push was found; see what was left out, and the map's 'pushes:'.")
+    return _written(pushes, chart, _conversion(Path(source), files, chart), folder)
+
+
+def _pieces(name: str, parts: Parts) -> list[tuple[str, Piece]]:
+    """Pushes of one log, each with what tells it from the others of the log."""
+    found: list[tuple[str, Piece]] = []
+    for label, chart, columns in parts:
+        reach = _radius(chart.model) + (chart.hand.radius if chart.hand is not None else 0.0)
+        streams = end_streams(columns["object"], chart) if chart.cut.by == "rows" else streams_of(columns, chart)
+        pieces, left = pieces_of(streams, chart.cut, reach)
+        for line in left:
+            warnings.warn(f"{name}{label}: {line}.", UserWarning, stacklevel=2)
+        found.extend((label, piece) for piece in pieces)
+    return found
+
+
+def _table_parts(columns: Columns, chart: Map) -> Parts:
+    """The table, or its rows by the value of a column."""
+    for key, stream in (("object", chart.object), ("hand", chart.hand_path), ("force", chart.force)):
+        if stream is not None and stream.topic is not None:
+            raise RecordingError(f"{key}: topic is of bags; give columns, or use `convert bag`.")
+    if chart.cut.by == "rows":
+        return [(f", row {row}", chart, _shared(part)) for row, part in _single_rows(columns)]
+    if chart.cut.by != "column" or chart.cut.column is None:
+        return [("", chart, _shared(columns))]
+    name = columns.find(chart.cut.column)
+    values = columns.numbers[name]
+    alike = [one for one in columns.numbers if len(columns.numbers[one]) == len(values)]
+    parts: Parts = []
+    for value, rows in rows_by_value(values):
+        numbers = {one: columns.numbers[one][rows] for one in alike}
+        parts.append((f", {name} {value:g}", chart, _shared(replace(columns, numbers=numbers, texts={}, rows=()))))
+    return parts
+
+
+def _single_rows(columns: Columns) -> Iterator[tuple[int, Columns]]:
+    """Each row of a table on its own, by its line."""
+    for k in range(max(map(len, columns.numbers.values()))):
+        numbers = {name: values[k : k + 1] for name, values in columns.numbers.items()}
+        yield (columns.rows[k] if columns.rows else k), replace(columns, numbers=numbers, texts={}, rows=())
+
+
+def _shared(columns: Columns) -> dict[str, Columns]:
+    return dict.fromkeys(("object", "hand", "force"), columns)
+
+
+def _bag_parts(source: Path, chart: Map) -> Parts:
+    """The topics that a map names, which in a bag have columns of known names."""
+    streams = {"object": chart.object, "hand": chart.hand_path, "force": chart.force}
+    wanted: dict[str, tuple[str, str | None]] = {}
+    for key, stream in streams.items():
+        if stream is not None:
+            if stream.topic is None:
+                raise RecordingError(f"{key}: a bag's stream needs its topic.")
+            wanted[key] = (stream.topic, stream.frame if isinstance(stream, PoseMap) else None)
+    if chart.cut.by == "column":
+        raise RecordingError("pushes: a bag has no columns; cut by rest, gap or times.")
+    found = read_bag(source, list(wanted.values()))
+    columns = {key: found[where] for key, where in wanted.items()}
+    hand, force = chart.hand_path, chart.force
+    named_chart = replace(
+        chart,
+        object=_pose_columns("object", chart.object, columns["object"], chart),
+        hand_path=None if hand is None else _pose_columns("hand", hand, columns["hand"], chart),
+        force=None if force is None else _force_columns(force, columns["force"], chart),
+    )
+    return [("", named_chart, columns)]
+
+
+def _pose_columns(key: str, pose: PoseMap, columns: Columns, chart: Map) -> PoseMap:
+    turn = pose.turn
+    if turn is not None and not turn.columns:
+        if "qx" not in columns.numbers:
+            raise RecordingError(f"{key}: {columns.source} has no rotation; write 'rotation: none'.")
+        turn = Turn(columns=("qx", "qy", "qz", "qw"), kind="xyzw", inverse=turn.inverse)
+    position = pose.position if pose.position.columns else Quantity(columns=("x", "y", "z"), unit=pose.position.unit)
+    return replace(pose, position=position, turn=turn, clock=_clock(pose.clock, columns, chart))
+
+
+def _force_columns(force: ForceMap, columns: Columns, chart: Map) -> ForceMap:
+    quantity = force.force if force.force.columns else Quantity(columns=("x", "y", "z"), unit=force.force.unit)
+    return replace(force, force=quantity, clock=_clock(force.clock, columns, chart))
+
+
+def _clock(clock: Clock, columns: Columns, chart: Map) -> Clock:
+    if clock.column is not None or chart.by_receive:
+        return replace(clock, column=clock.column or RECEIVE)
+    if STAMP not in columns.numbers:
+        warnings.warn(
+            f"{columns.source} has no stamps of its own: its times are those of arrival.", UserWarning, stacklevel=2
+        )
+        return replace(clock, column=RECEIVE)
+    return replace(clock, column=STAMP)
+
+
+def _push(piece: Piece, number: int, note: str, chart: Map) -> Push:
+    streams = _from_zero(piece.streams, piece.begin)
+    force = streams.force
+    if force is not None and chart.force is not None and chart.force.tare > 0.0:
+        force = _tared(force, chart.force.tare, note)
+    return Push(name=f"pushes/{number:03d}.csv", object=streams.object, hand=streams.hand, force=force, note=note)
+
+
+def _from_zero(streams: Streams, begin: float) -> Streams:
+    hand, force = streams.hand, streams.force
+    return Streams(
+        object=replace(streams.object, times=streams.object.times - begin),
+        hand=None if hand is None else replace(hand, times=hand.times - begin),
+        force=None if force is None else replace(force, times=force.times - begin),
+    )
+
+
+def _tared(force: ForceStream, seconds: float, note: str) -> ForceStream:
+    untouched = force.times < force.times[0] + seconds
+    if untouched.all():
+        raise RecordingError(f"{note}: force: tare_s, {seconds:g} s, is longer than the push.")
+    return replace(force, forces=force.forces - force.forces[untouched].mean(axis=0))
+
+
+def _radius(model: ObjectModel) -> float:
+    shape = model.shape
+    if isinstance(shape, Box):
+        return 0.5 * float(np.hypot(*shape.size[:2]))
+    if isinstance(shape, Cylinder):
+        return shape.radius if shape.axis == "z" else float(np.hypot(shape.radius, 0.5 * shape.length))
+    if isinstance(shape, Prism):
+        return float(np.linalg.norm(shape.polygon, axis=1).max())
+    return LARGEST_REACH
+
+
+def _conversion(source: Path, files: Sequence[Path], chart: Map) -> Conversion:
+    try:
+        text = read_text(chart.file)
+        hashes = [sha256_of(file) for file in files]
+    except FileError as error:
+        raise RecordingError(f"{named(source)}: {error}.") from error
+    whole = hashes[0] if len(hashes) == 1 else hashlib.sha256("".join(hashes).encode()).hexdigest()
+    return Conversion(
+        source=source.name, source_sha256=whole, map=text, map_sha256=hashlib.sha256(text.encode()).hexdigest()
+    )
+
+
+def _written(pushes: list[Push], chart: Map, conversion: Conversion, folder: Path) -> Recording:
+    recording = Recording(
+        name=chart.name,
+        description=chart.description,
+        object=chart.model,
+        table=chart.table,
+        hand=chart.hand,
+        sensors=chart.sensors,
+        pushes=tuple(pushes),
+        folder=chart.file.parent,
+        conversion=conversion,
+    )
+    # Read before it is put in place, so that what is refused leaves nothing behind.
+    with tempfile.TemporaryDirectory() as scratch:
+        trial = Path(scratch) / "recording"
+        write_recording(recording, trial)
+        try:
+            read_recording(trial)
+        except RecordingError as error:
+            said = str(error).replace(f"{trial}/", "")
+            raise RecordingError(f"what the map makes of {shown(conversion.source)} is refused: {said}") from error
+    write_recording(recording, folder)
+    return read_recording(folder)

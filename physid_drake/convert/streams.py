@@ -1,0 +1,260 @@
+"""Streams of a log in W: poses of object and hand, forces of the hand on the object, by one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation, Slerp
+
+from physid_drake.convert.columns import Array, Columns
+from physid_drake.convert.conventions import (
+    forces_in_world,
+    places_in_world,
+    rotation_of,
+    rotations_in_world,
+    with_offset,
+    wxyz_of,
+)
+from physid_drake.convert.mapping import Clock, ForceMap, Map, PoseMap, Quantity, Turn
+from physid_drake.convert.units import ANGLES, FORCES, LENGTHS, SPEEDS, TIMES, factor
+from physid_drake.errors import RecordingError
+from physid_drake.recording import ForceStream, PoseStream
+from physid_drake.recording.values import RotationKind
+from physid_drake.wording import shown
+
+BEFORE: Final = 0.3
+AFTER: Final = 1.0
+"""s: a hand of which only the ends are known rests for so long before it goes, and the object comes to rest in."""
+
+STEP: Final = 0.01
+"""s between samples of such a hand."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Streams:
+    """All of one log in W, before it is cut; times in s by the common clock."""
+
+    object: PoseStream
+    hand: PoseStream | None
+    force: ForceStream | None
+
+
+def streams_of(columns: Mapping[str, Columns], chart: Map) -> Streams:
+    """The streams that a map finds in a log's columns.
+
+    Args:
+        columns: of ``object``, ``hand`` and ``force``; in a table they are the same.
+        chart: the map.
+
+    Raises:
+        RecordingError: if what the map names is not there, or is not what it says; one line that names the key.
+    """
+    with _naming("object"):
+        body = _poses(columns["object"], chart.object, chart)
+    hand = force = None
+    if chart.hand_path is not None:
+        with _naming("hand"):
+            hand = _poses(columns["hand"], chart.hand_path, chart)
+    if chart.force is not None:
+        with _naming("force"):
+            force = _forces(columns["force"], chart.force, hand, chart)
+    return Streams(object=body, hand=hand, force=force)
+
+
+def end_streams(columns: Columns, chart: Map) -> Streams:
+    """The streams of a push of which a row tells where object and hand were first and last, and the hand's speed.
+
+    The hand rests for ``BEFORE``, goes straight at its speed, and rests; nobody recorded more of it.
+
+    Args:
+        columns: of one row.
+        chart: the map.
+
+    Raises:
+        RecordingError: if what the map names is not there or empty, or the hand goes nowhere.
+    """
+    with _naming("object"):
+        body = _ends(columns, chart.object, chart, (0.0, BEFORE))
+    if chart.hand_path is None:
+        return Streams(object=body, hand=None, force=None)
+    with _naming("hand"):
+        ends = _ends(columns, chart.hand_path, chart, (0.0, BEFORE))
+        speed = _speed(columns, chart.hand_path)
+        way = float(np.linalg.norm(ends.positions[1, :2] - ends.positions[0, :2]))
+        if not way > 0.0:
+            raise RecordingError("it ends where it starts; the two must be apart.")
+        times = BEFORE + np.arange(0.0, way / speed, STEP)
+        times = np.concatenate([[0.0], times, [BEFORE + way / speed, BEFORE + way / speed + AFTER]])
+        share = np.clip((times - BEFORE) * speed / way, 0.0, 1.0)[:, None]
+        hand = replace(
+            ends,
+            times=times,
+            positions=(1.0 - share) * ends.positions[0] + share * ends.positions[1],
+            quaternions=np.repeat(ends.quaternions[:1], len(times), axis=0),
+        )
+    return Streams(object=replace(body, times=np.array([0.0, times[-1]])), hand=hand, force=None)
+
+
+def _ends(columns: Columns, pose: PoseMap, chart: Map, times: tuple[float, float]) -> PoseStream:
+    """First and last pose of a body."""
+    assert pose.end is not None
+    both = [_placed(columns, one, np.array([time]), chart) for one, time in zip((pose, pose.end), times, strict=True)]
+    return replace(
+        both[0],
+        times=np.array(times),
+        positions=np.vstack([one.positions for one in both]),
+        quaternions=np.vstack([one.quaternions for one in both]),
+    )
+
+
+def _speed(columns: Columns, pose: PoseMap) -> float:
+    speed = pose.speed
+    if isinstance(speed, Quantity):
+        speed = float(_scaled(columns, speed, SPEEDS, "m/s")[0, 0])
+    if speed is None or not speed > 0.0:
+        raise RecordingError("its speed must be positive.")
+    return speed
+
+
+@contextmanager
+def _naming(key: str) -> Iterator[None]:
+    try:
+        yield
+    except RecordingError as error:
+        raise RecordingError(f"{key}: {error}") from error
+
+
+def _poses(columns: Columns, pose: PoseMap, chart: Map) -> PoseStream:
+    if not pose.position.columns:
+        raise RecordingError("position needs columns; a topic is a bag's.")
+    return _placed(columns, pose, _times(columns, pose.clock, chart), chart)
+
+
+def _placed(columns: Columns, pose: PoseMap, times: Array, chart: Map) -> PoseStream:
+    """The rows of a body that are filled, in W."""
+    place = _scaled(columns, pose.position, LENGTHS, "m")
+    turn = None if pose.turn is None else _turns(columns, pose.turn)
+    seen = np.isfinite(place).all(axis=1) & np.isfinite(times)
+    if turn is not None:
+        seen &= np.isfinite(turn).all(axis=1) & (turn != 0.0).any(axis=1) if turn.shape[1] == 4 else (
+            np.isfinite(turn).all(axis=1))  # fmt: skip
+    if not seen.any():
+        raise RecordingError("no row has all of its columns filled.")
+    times, place = times[seen], place[seen]
+    rotation = None if pose.turn is None or turn is None else _rotation(columns, pose.turn, turn[seen], chart)
+    return pose_stream(times, place, rotation, pose, chart)
+
+
+def pose_stream(times: Array, place: Array, rotation: Rotation | None, pose: PoseMap, chart: Map) -> PoseStream:
+    """A body's stream in W.
+
+    Args:
+        times: (n,) [s] by the common clock.
+        place: (n, 3), or (n, 2) where no height was measured [m], in the log's world.
+        rotation: n of them in the log's world; None where none was measured.
+        pose: what the map says of the body.
+        chart: the map.
+
+    Raises:
+        RecordingError: if the clock steps back, or an offset turns with a rotation that was not measured.
+    """
+    kind: RotationKind = "full"
+    if rotation is None:
+        kind = "none"
+    elif pose is chart.object and pose.turn is not None and pose.turn.kind == "yaw":
+        kind = "yaw"
+    if place.shape[1] == 2:
+        place = np.column_stack([place, np.zeros(len(place))])
+    positions = places_in_world(place, chart.world)
+    turned = None if rotation is None else rotations_in_world(rotation, chart.world)
+    positions, turned = with_offset(positions, turned, pose.offset)
+    if pose.height is not None:
+        positions[:, 2] = pose.height
+    quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1)) if turned is None else wxyz_of(turned)
+    order = _order(times)
+    return PoseStream(times=times[order], positions=positions[order], quaternions=quaternions[order], rotation=kind)
+
+
+def _forces(columns: Columns, force: ForceMap, hand: PoseStream | None, chart: Map) -> ForceStream:
+    if not force.force.columns:
+        raise RecordingError("it needs columns; a topic is a bag's.")
+    times = _times(columns, force.clock, chart)
+    values = _scaled(columns, force.force, FORCES, "N")
+    seen = np.isfinite(values).all(axis=1) & np.isfinite(times)
+    if not seen.any():
+        raise RecordingError("no row has all of its columns filled.")
+    times, values = times[seen], values[seen]
+    if values.shape[1] == 2:
+        values = np.column_stack([values, np.zeros(len(values))])
+    order = _order(times)
+    times, values = times[order], values[order]
+    turns = _turns_at(times, hand) if force.in_hand and hand is not None else None
+    return ForceStream(times=times, forces=forces_in_world(values, force, turns, chart.world))
+
+
+def _times(columns: Columns, clock: Clock, chart: Map) -> Array:
+    """Times (n,) [s] by the common clock."""
+    column = clock.column or chart.clock.column
+    if column is None:
+        raise RecordingError("there are no times; name their column in time.column.")
+    name = columns.find(column)
+    own = clock if clock.column is not None else chart.clock
+    unit = own.unit or columns.units.get(name, "s")
+    scale = factor(unit, TIMES, f"times in column {shown(name)}") if own.rate is None else 1.0 / own.rate
+    times: Array = columns.numbers[name] * scale + (clock.offset or chart.clock.offset)
+    return times
+
+
+def _scaled(columns: Columns, quantity: Quantity, kind: Mapping[str, float], default: str) -> Array:
+    values = columns.stack(quantity.columns)
+    names = [columns.find(name) for name in quantity.columns]
+    stated = {columns.units[name] for name in names if name in columns.units}
+    if quantity.unit is None and len(stated) > 1:
+        raise RecordingError(f"its columns are in {' and '.join(sorted(stated))}; give columns of one unit.")
+    unit = quantity.unit or next(iter(stated), default)
+    if stated and unit not in stated:
+        raise RecordingError(f"the map says {unit}, but the table's header says {', '.join(sorted(stated))}.")
+    return values * factor(unit, kind, "these columns")
+
+
+def _turns(columns: Columns, turn: Turn) -> Array:
+    if not turn.columns:
+        raise RecordingError("rotation needs columns, or 'rotation: none' if it was not measured.")
+    return columns.stack(turn.columns)
+
+
+def _rotation(columns: Columns, turn: Turn, values: Array, chart: Map) -> Rotation:
+    stated = next((columns.units[n] for n in map(columns.find, turn.columns) if n in columns.units), None)
+    unit = turn.unit or (stated if stated in ANGLES else None)
+    if unit is None and turn.kind not in ("wxyz", "xyzw"):
+        raise RecordingError("rotation: angles need a unit, rad or deg; add it.")
+    return rotation_of(turn, values, ANGLES[unit or "rad"], chart.world)
+
+
+def _turns_at(times: Array, hand: PoseStream) -> Rotation:
+    """Rotations of the hand at other times, between its samples."""
+    rotations = Rotation.from_quat(np.roll(hand.quaternions, -1, axis=1))
+    if len(hand) < 2:
+        return Rotation.concatenate([rotations] * len(times))
+    return Slerp(hand.times, rotations)(np.clip(times, hand.times[0], hand.times[-1]))
+
+
+def _order(times: Array) -> NDArray[np.intp]:
+    """Indices of increasing times (n,), the first of those that are equal.
+
+    Raises:
+        RecordingError: if a clock steps back.
+    """
+    back = np.flatnonzero(np.diff(times) < 0.0)
+    if len(back):
+        one, other = float(times[back[0]]), float(times[back[0] + 1])
+        raise RecordingError(
+            f"its clock steps back from {one:.6g} to {other:.6g} s; if it begins anew with every push, cut by a"
+            " column that counts them, or give a folder with one file for each."
+        )
+    return np.flatnonzero(np.diff(times, prepend=-np.inf) > 0.0)

@@ -1,0 +1,301 @@
+"""Tables of text, as spreadsheets and motion-capture programs write them: any separator, decimal comma, preamble.
+
+Where the numbers begin is found by looking: the first row of numbers that is followed by more of its width. What
+stands right above it is the header, of one line or several: Motive writes kind, name, quantity and axis below one
+another, Vicon writes names over the first column of each body and units below the axes.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from physid_drake.convert.columns import Array, Columns
+from physid_drake.convert.units import UNITS
+from physid_drake.errors import RecordingError
+from physid_drake.files import FileError, read_bytes
+from physid_drake.wording import named, one_line, shown
+
+MOST_BYTES: Final = 256_000_000
+MOST_CELLS: Final = 40_000_000
+"""Of a table: an hour of thirty columns at 360 Hz."""
+
+SEPARATORS: Final = (",", ";", "\t", "|", " ")
+LOOKED_AT: Final = 400
+"""Lines at the head of a file that tell its separator and header."""
+
+EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dialect:
+    """How a table is written; None is found by looking.
+
+    Attributes:
+        separator: between fields.
+        decimal: "." or ",".
+        header_lines: lines above the first row of numbers that name the columns.
+        encoding: of the text; UTF-8 with or without a byte-order mark, UTF-16 with one, else Latin-1.
+        section: which of several tables in one file, from 1, as Vicon writes objects and markers below one another.
+        skip_lines: at the top of the file.
+    """
+
+    separator: str | None = None
+    decimal: str | None = None
+    header_lines: int | None = None
+    encoding: str | None = None
+    section: int = 1
+    skip_lines: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Rows:
+    """Fields of the lines of a table, and each line's number in the file."""
+
+    fields: list[list[str]]
+    lines: list[int]
+
+
+def read_text_table(path: Path, dialect: Dialect | None = None) -> Columns:
+    """The columns of a file of text.
+
+    Args:
+        path: of the file.
+        dialect: how it is written; what it leaves open is found by looking.
+
+    Raises:
+        RecordingError: if it cannot be read, or holds no table; one line that names the file.
+    """
+    dialect = dialect or Dialect()
+    try:
+        text = _decoded(read_bytes(path, most=MOST_BYTES), dialect.encoding)
+    except FileError as error:
+        raise RecordingError(f"{named(path)}: {error}.") from error
+    where = named(path.name)
+    text = "".join(text.splitlines(keepends=True)[dialect.skip_lines :])
+    separator = dialect.separator or _separator(text)
+    decimal = dialect.decimal or ("," if separator != "," and _has_decimal_commas(text, separator) else ".")
+    try:
+        sections = _sections(_split(text, separator), decimal)
+    except csv.Error as error:
+        raise RecordingError(f"{where}: no readable table: {one_line(error)}.") from error
+    if not sections:
+        raise RecordingError(
+            f"{where}: no table of numbers was found, separated by {shown(separator)}; does it hold two columns and"
+            " two rows of numbers? A map's 'source:' may say how it is written."
+        )
+    if dialect.section > len(sections):
+        raise RecordingError(f"{where}: has {len(sections)} table(s), but section {dialect.section} is asked for.")
+    header, body = sections[dialect.section - 1]
+    if dialect.header_lines is not None:
+        header = header[max(0, len(header) - dialect.header_lines) :]
+    widths = [len(row) for row in body.fields]
+    width = max([max(set(widths), key=widths.count), *map(len, header)])
+    names, units = _names(header, width)
+    return _columns(where, names, units, body, decimal)
+
+
+def _decoded(content: bytes, encoding: str | None) -> str:
+    if encoding is not None:
+        try:
+            return content.decode(encoding)
+        except (UnicodeDecodeError, LookupError) as error:
+            raise FileError(f"cannot be read as {named(encoding)}: {one_line(error)}") from error
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        try:
+            return content.decode("utf-16")
+        except UnicodeDecodeError as error:
+            raise FileError("cannot be read: it begins like UTF-16, but is not") from error
+    if b"\0" in content[:4096]:
+        raise FileError("cannot be read: it is no text; is it a spreadsheet's or a program's own file?")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
+
+
+def _separator(text: str) -> str:
+    """What cuts the lines into the most columns of numbers of equal count."""
+    head = text[:200_000].splitlines()[:LOOKED_AT]
+
+    def score(separator: str) -> tuple[int, int]:
+        widths = [_numeric(_fields(line, separator), ".,") for line in head]
+        usual = max(set(widths), key=lambda w: (widths.count(w) * (w > 1), w), default=0)
+        # A decimal comma cuts numbers into two, so what separates without it goes first.
+        clean = sum(_numeric(_fields(line, separator), ".,") == len(_fields(line, separator)) for line in head)
+        return (widths.count(usual) if usual > 1 else 0, clean)
+
+    if any(score(one)[0] > 1 for one in ("\t", ";", "|")):
+        return max(("\t", ";", "|"), key=score)
+    return max((",", " "), key=score)
+
+
+def _fields(line: str, separator: str) -> list[str]:
+    if separator == " ":
+        return line.split()
+    return [field.strip().strip('"') for field in line.split(separator)]
+
+
+def _numeric(fields: Sequence[str], decimals: str) -> int:
+    return sum(any(math.isfinite(_number(field, decimal)) for decimal in decimals) for field in fields)
+
+
+def _has_decimal_commas(text: str, separator: str) -> bool:
+    head = text[:200_000].splitlines()[:LOOKED_AT]
+    fields = [field for line in head for field in _fields(line, separator)]
+    commas = sum(field.count(",") == 1 and math.isfinite(_number(field, ",")) for field in fields)
+    points = sum(field.count(".") == 1 and math.isfinite(_number(field, ".")) for field in fields)
+    return commas > points
+
+
+def _split(text: str, separator: str) -> _Rows:
+    fields: list[list[str]] = []
+    lines: list[int] = []
+    if separator == " ":
+        for number, line in enumerate(text.splitlines(), 1):
+            fields.append(line.split())
+            lines.append(number)
+    else:
+        reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
+        for row in reader:
+            fields.append([field.strip() for field in row])
+            lines.append(reader.line_num)
+    if sum(map(len, fields)) > MOST_CELLS:
+        raise csv.Error(f"it has more than {MOST_CELLS:,} fields; cut the pushes out of it")
+    return _Rows(fields=fields, lines=lines)
+
+
+def _numbers_in(fields: Sequence[str], decimal: str) -> int:
+    return sum(math.isfinite(_number(field, decimal)) for field in fields)
+
+
+def _begins(rows: _Rows, k: int, decimal: str) -> bool:
+    """Whether a table's numbers may begin with a row: two or more, half of what is there, and more below."""
+    fields = rows.fields[k]
+    numbers, there = _numbers_in(fields, decimal), len(_there(fields))
+    following = rows.fields[k + 1] if k + 1 < len(rows.fields) else []
+    return numbers >= 2 and 2 * numbers >= there and _numbers_in(following, decimal) > 0
+
+
+def _sections(rows: _Rows, decimal: str) -> list[tuple[list[list[str]], _Rows]]:
+    """Header lines and body of every table in the file: a body lasts until a line with one word."""
+    found: list[tuple[list[list[str]], _Rows]] = []
+    k, bottom = 0, 0
+    while k < len(rows.fields):
+        if not _begins(rows, k, decimal):
+            k += 1
+            continue
+        first = k
+        while first > bottom and _is_header(rows.fields[first - 1], len(rows.fields[k])):
+            first -= 1
+        bottom = _end(rows, k, decimal)
+        kept = [j for j in range(k, bottom) if _there(rows.fields[j])]
+        body = _Rows(fields=[rows.fields[j] for j in kept], lines=[rows.lines[j] for j in kept])
+        found.append((rows.fields[first:k], body))
+        k = bottom
+    return found
+
+
+def _is_header(fields: Sequence[str], width: int) -> bool:
+    there = len(_there(fields))
+    return there > 1 or (there == 1 and len(fields) == width)
+
+
+def _end(rows: _Rows, start: int, decimal: str) -> int:
+    """Index behind the last row of a table; a blank line within it is none of its rows."""
+    width, k = len(rows.fields[start]), start
+    while k < len(rows.fields):
+        fields = rows.fields[k]
+        if not _there(fields):
+            after = next((j for j in range(k, len(rows.fields)) if _there(rows.fields[j])), len(rows.fields))
+            if after == len(rows.fields) or len(rows.fields[after]) != width:
+                return k
+            k = after if _numbers_in(rows.fields[after], decimal) else len(rows.fields)
+            continue
+        if len(_there(fields)) == 1 and not _numbers_in(fields, decimal):
+            return k
+        k += 1
+    return k
+
+
+def _there(fields: Sequence[str]) -> list[str]:
+    return [field for field in fields if field]
+
+
+def _names(header: list[list[str]], width: int) -> tuple[list[str], dict[str, str]]:
+    """A name for every column, of all header lines, and the units that one of them states."""
+    lines = [(line + [""] * width)[:width] for line in header]
+    stated = [k for k, line in enumerate(lines) if _there(line) and all(_unit(f) in UNITS for f in _there(line))]
+    unit_line = lines.pop(stated[-1]) if stated and len(lines) > 1 else [""] * width
+    for k, line in enumerate(lines[:-1]):
+        lines[k] = _carried(line)
+    names: list[str] = []
+    for column in range(width):
+        parts = [line[column] for line in lines if line[column]]
+        name = "/".join(parts) or f"column {column + 1}"
+        names.append(name if name not in names else f"{name} (column {column + 1})")
+    return names, {name: _unit(unit) for name, unit in zip(names, unit_line, strict=True) if unit}
+
+
+def _unit(field: str) -> str:
+    return field.strip("()[] ")
+
+
+def _carried(line: list[str]) -> list[str]:
+    """A line of a header whose names stand over the first column of each body only.
+
+    What is named in every column from its first on has nothing to carry.
+    """
+    first = next((k for k, field in enumerate(line) if field), len(line))
+    if all(line[first:]):
+        return line
+    carried, last = list(line), ""
+    for k, field in enumerate(line):
+        last = field or last
+        carried[k] = last
+    return carried
+
+
+def _columns(where: str, names: Sequence[str], units: dict[str, str], body: _Rows, decimal: str) -> Columns:
+    numbers: dict[str, Array] = {}
+    texts: dict[str, list[str]] = {}
+    width = len(names)
+    longer = next((k for k, row in enumerate(body.fields) if any(row[width:])), None)
+    if longer is not None:
+        raise RecordingError(f"{where}: row {body.lines[longer]}: has more fields than the table has columns.")
+    for k, name in enumerate(names):
+        fields = [row[k] if k < len(row) else "" for row in body.fields]
+        values = np.array([_number(field, decimal) for field in fields])
+        wrong = [j for j, field in enumerate(fields) if not math.isfinite(values[j]) and field.lower() not in EMPTY]
+        if 2 * len(wrong) > len(fields):
+            texts[name] = fields
+            continue
+        if wrong:
+            raise RecordingError(
+                f"{where}: row {body.lines[wrong[0]]}: column {shown(name)}: must be a finite number, but got"
+                f" {shown(fields[wrong[0]])}; leave the field empty if there is no sample."
+            )
+        numbers[name] = values
+    return Columns(source=where, numbers=numbers, texts=texts, units=units, rows=body.lines)
+
+
+def _number(field: str, decimal: str) -> float:
+    """A field's number; NaN where it holds none. Python alone reads 1_000 and other scripts' digits."""
+    if decimal == ",":
+        if "." in field and "," in field:
+            field = field.replace(".", "")
+        field = field.replace(",", ".")
+    if not field or "_" in field or not field.isascii():
+        return math.nan
+    try:
+        value = float(field)
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan

@@ -1,0 +1,345 @@
+"""What a recording may have got wrong, each as the recording that it would then be.
+
+A convention is a hypothesis like any other: it is put right, and the pushes are fitted again. What reflects
+everything alike cannot be told, since the physics of pushes is the same in a mirror.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from physid_drake.cell.solid import solid_of
+from physid_drake.cell.touch import Tip
+from physid_drake.recording import (
+    Box,
+    Cylinder,
+    ForceStream,
+    PoseStream,
+    Prism,
+    Push,
+    Recording,
+    Shape,
+    planar_poses,
+)
+from physid_drake.recording.planar import turned
+
+Array = NDArray[np.float64]
+
+LATEST: Final = 1.0
+"""s between the clocks of hand and object, at most, that are looked for; in steps of ``TICK``."""
+TICK: Final = 0.01
+MOVING: Final = 0.02
+"""m/s of the object: faster, and the hand is at it, or has let go."""
+LEAST_LATE: Final = 0.015
+LEAST_SHIFT: Final = 2e-3
+"""s, m: clocks and frames that differ by less are physics (lag, offset), or noise."""
+POUND: Final = 0.45359237
+EARTH: Final = 9.80665
+
+
+@dataclass(frozen=True, kw_only=True)
+class Convention:
+    """One thing that may be wrong.
+
+    Attributes:
+        says: what is so, if it is wrong: the end of a sentence that begins with "if".
+        remedy: what to write, and where.
+        recording: with it put right.
+    """
+
+    says: str
+    remedy: str
+    recording: Recording
+
+
+def conventions_of(recording: Recording) -> Iterator[Convention]:
+    """Everything that may be wrong with a recording, one at a time."""
+    yield from _rotations(recording)
+    if recording.hand is not None:
+        yield from _axes(recording)
+        yield from _sizes_of_tip(recording)
+        yield from _clocks(recording)
+        yield from _shifts(recording)
+    yield from _sizes_of_object(recording)
+    if any(push.force is not None for push in recording.pushes):
+        yield from _forces(recording)
+        yield from _masses(recording)
+
+
+def gap_of(recording: Recording) -> float:
+    """How far the tip is from the outline while something pushes the object [m], the median; 0 where nobody can tell.
+
+    It takes milliseconds, and tells most of what is wrong with frames apart.
+    """
+    if recording.hand is None:
+        return 0.0
+    gaps = _gaps(recording, [_driven(push) for push in recording.pushes])
+    return float(np.median(np.abs(gaps))) if len(gaps) else 0.0
+
+
+def _each(recording: Recording, change: Callable[[Push], Push]) -> Recording:
+    return replace(recording, pushes=tuple(map(change, recording.pushes)))
+
+
+def _rotations(recording: Recording) -> Iterator[Convention]:
+    kinds = {push.object.rotation for push in recording.pushes}
+    if "full" in kinds:
+        for shift, order, said in ((1, "x, y, z, w", "as: xyzw"), (-1, "w, x, y, z", "as: wxyz")):
+            yield Convention(
+                says=f"the object's quaternions are {order}",
+                remedy=f"map: object.rotation: {said}",
+                recording=_each(recording, partial(_reordered, shift=shift)),
+            )  # fmt: skip
+    if kinds & {"full", "yaw"}:
+        yield Convention(
+            says="the object's rotations turn the other way (R_BW, or an axis that is mirrored)",
+            remedy="map: object.rotation: inverse: true, or world.left_handed",
+            recording=_each(recording, _inverted),
+        )
+    if "yaw" in kinds:
+        yield Convention(
+            says="the object's yaw is in degrees",
+            remedy="map: object.rotation: unit: deg; or object_yaw_rad in rad",
+            recording=_each(recording, _yaw_from_degrees),
+        )
+    if kinds & {"full", "yaw"}:
+        for degrees in (90, 180, 270):
+            yield Convention(
+                says=f"the object's frame is turned by {degrees} degrees in it",
+                remedy=f"map: object.offset: yaw_deg: {degrees}",
+                recording=_each(recording, partial(_turned_in_itself, turn=math.radians(degrees))),
+            )
+
+
+def _with_turn(push: Push, quaternions: Array) -> Push:
+    return replace(push, object=replace(push.object, quaternions=quaternions))
+
+
+def _reordered(push: Push, shift: int) -> Push:
+    return _with_turn(push, np.roll(push.object.quaternions, shift, axis=1))
+
+
+def _inverted(push: Push) -> Push:
+    return _with_turn(push, push.object.quaternions * np.array([1.0, -1.0, -1.0, -1.0]))
+
+
+def _turned_in_itself(push: Push, turn: float) -> Push:
+    """The object's frame, turned about its own z [rad]."""
+    c, s = math.cos(0.5 * turn), math.sin(0.5 * turn)
+    w, x, y, z = push.object.quaternions.T
+    return _with_turn(push, np.column_stack([w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s]))
+
+
+def _yaw_from_degrees(push: Push) -> Push:
+    planar = push.object.planar.copy()
+    planar[:, 2] = np.radians(planar[:, 2])
+    height = float(np.median(push.object.positions[:, 2]))
+    return replace(push, object=planar_poses(push.object.times, planar, height, "yaw"))
+
+
+def _axes(recording: Recording) -> Iterator[Convention]:
+    """Axes of the plane that one stream, or both, has another way; rotations are left as they are."""
+    matrices = {
+        "y is mirrored": [[1.0, 0.0], [0.0, -1.0]],
+        "x is mirrored": [[-1.0, 0.0], [0.0, 1.0]],
+        "x and y are swapped": [[0.0, 1.0], [1.0, 0.0]],
+        "its axes are turned by 90 degrees": [[0.0, -1.0], [1.0, 0.0]],
+        "its axes are turned by 180 degrees": [[-1.0, 0.0], [0.0, -1.0]],
+        "its axes are turned by 270 degrees": [[0.0, 1.0], [-1.0, 0.0]],
+    }
+    for said, matrix in matrices.items():
+        yield Convention(
+            says=f"of the hand, {said}",
+            remedy="map: columns of hand.position, or world for the hand's stream",
+            recording=_each(recording, partial(_hand_axes, matrix=np.array(matrix))),
+        )
+    for said in ("y is mirrored", "x and y are swapped"):
+        yield Convention(
+            says=f"of both places, but not of the rotations, {said}",
+            remedy="map: world.axes with left_handed: true, or columns of object.position and hand.position",
+            recording=_each(recording, partial(_both_axes, matrix=np.array(matrices[said]))),
+        )
+
+
+def _hand_axes(push: Push, matrix: Array) -> Push:
+    assert push.hand is not None
+    return replace(push, hand=_turned(push.hand, matrix))
+
+
+def _both_axes(push: Push, matrix: Array) -> Push:
+    return _hand_axes(replace(push, object=_turned(push.object, matrix)), matrix)
+
+
+def _turned(stream: PoseStream, matrix: Array) -> PoseStream:
+    positions = stream.positions.copy()
+    positions[:, :2] = positions[:, :2] @ matrix.T
+    return replace(stream, positions=positions)
+
+
+def _sizes_of_tip(recording: Recording) -> Iterator[Convention]:
+    assert recording.hand is not None
+    for factor, said in ((0.5, "a diameter"), (2.0, "half of it")):
+        radius = factor * recording.hand.radius
+        yield Convention(
+            says=f"the tip's radius is {said}",
+            remedy=f"hand: radius_m: {radius:.4g}",
+            recording=replace(recording, hand=replace(recording.hand, radius=radius)),
+        )
+
+
+def _sizes_of_object(recording: Recording) -> Iterator[Convention]:
+    for said, shape in _other_shapes(recording.object.shape):
+        yield Convention(
+            says=f"the object's {said}",
+            remedy="object: its size in recording.yaml",
+            recording=replace(recording, object=replace(recording.object, shape=shape)),
+        )
+
+
+def _other_shapes(shape: Shape) -> Iterator[tuple[str, Shape]]:
+    if isinstance(shape, Box):
+        x, y, z = shape.size
+        yield "size_m are half sizes", Box(size=(2.0 * x, 2.0 * y, z))
+        yield "size_m are twice its size", Box(size=(0.5 * x, 0.5 * y, z))
+        if x != y:
+            yield "sizes along x and y are swapped", Box(size=(y, x, z))
+    elif isinstance(shape, Cylinder) and shape.axis == "z":
+        yield "radius_m is its diameter", replace(shape, radius=0.5 * shape.radius)
+        yield "radius_m is half of its radius", replace(shape, radius=2.0 * shape.radius)
+    elif isinstance(shape, Prism):
+        for said, factor in (("polygon_m is half as large as it is", 2.0), ("polygon_m is twice as large", 0.5)):
+            yield said, replace(shape, polygon=tuple((factor * px, factor * py) for px, py in shape.polygon))
+
+
+def _clocks(recording: Recording) -> Iterator[Convention]:
+    """The clock of the hand's stream beside the object's, which brings the tip to the object as that moves."""
+    lates = np.arange(-LATEST, LATEST + TICK, TICK)
+    rows = [_driven(push) for push in recording.pushes]
+    if not sum(map(len, rows)):
+        return
+    costs = [float(np.median(np.abs(_gaps(recording, rows, float(late))))) for late in lates]
+    late = float(lates[int(np.nanargmin(costs))])
+    if abs(late) >= LEAST_LATE:
+        yield Convention(
+            says=f"the hand's times are {abs(1e3 * late):.0f} ms too {'early' if late > 0.0 else 'late'}",
+            remedy=f"map: hand.time: offset_s: {late:.3g}, added to what is there",
+            recording=_each(recording, partial(_later, late=late)),
+        )
+
+
+def _later(push: Push, late: float) -> Push:
+    assert push.hand is not None
+    force = push.force
+    return replace(
+        push,
+        hand=replace(push.hand, times=push.hand.times + late),
+        force=None if force is None else replace(force, times=force.times + late),
+    )
+
+
+def _gaps(recording: Recording, rows: Sequence[NDArray[np.intp]], late: float = 0.0) -> Array:
+    """Between tip and outline [m] at some samples of each push, of all pushes."""
+    assert recording.hand is not None
+    tip = Tip(solid_of(recording.object.shape).outline, recording.hand.radius)
+    found = [np.zeros(0)]
+    for push, chosen in zip(recording.pushes, rows, strict=True):
+        if push.hand is not None and len(chosen):
+            times, planar = push.object.times[chosen], push.object.planar[chosen]
+            at = [np.interp(times - late, push.hand.times, column) for column in push.hand.positions[:, :2].T]
+            states = np.column_stack([planar, *at]).tolist()
+            found.append(np.array([tip.gap(*state)[0] for state in states]))
+    return np.concatenate(found)
+
+
+def _driven(push: Push) -> NDArray[np.intp]:
+    """Up to forty samples in which the object moves and does not slow down: something pushes it."""
+    times, planar = push.object.times, push.object.planar
+    if len(times) < 10:
+        return np.zeros(0, dtype=np.intp)
+    stride = max(1, len(times) // 40)
+    t, p = times[::stride], planar[::stride, :2]
+    speed = np.linalg.norm(np.gradient(p, t, axis=0), axis=1)
+    fast = (speed > max(MOVING, 0.3 * float(speed.max()))) & (np.gradient(speed, t) > -0.5 * float(speed.max()))
+    return np.asarray(np.flatnonzero(fast) * stride)
+
+
+def _shifts(recording: Recording) -> Iterator[Convention]:
+    """The hand's frame, shifted in W, or the object's in itself, so that the tip is at the object as that moves."""
+    for change, what, key in (
+        (_hand_shifted, "the hand's frame is off by", "world.origin for the hand's stream, or hand.offset"),
+        (_recentred, "the middle of the object is, in the frame that was tracked, at", "object.offset: translation"),
+    ):
+        shift = _shift(recording, change)
+        if shift is not None and float(np.linalg.norm(shift)) >= LEAST_SHIFT:
+            said = f"({1e3 * shift[0]:.1f}, {1e3 * shift[1]:.1f}) mm"
+            yield Convention(
+                says=f"{what} {said}",
+                remedy=f"map: {key}: [{shift[0]:.4f}, {shift[1]:.4f}, 0], added to what is there",
+                recording=_each(recording, partial(change, shift=shift)),
+            )
+
+
+def _hand_shifted(push: Push, shift: Array) -> Push:
+    assert push.hand is not None
+    positions = push.hand.positions.copy()
+    positions[:, :2] += shift
+    return replace(push, hand=replace(push.hand, positions=positions))
+
+
+def _recentred(push: Push, shift: Array) -> Push:
+    positions = push.object.positions.copy()
+    positions[:, :2] += turned(push.object.planar[:, 2], np.tile(shift, (len(positions), 1)))
+    return replace(push, object=replace(push.object, positions=positions))
+
+
+def _shift(recording: Recording, change: Callable[..., Push]) -> Array | None:
+    """The shift (2,) that brings the tip to the outline; None where no gap is seen."""
+    rows = [_driven(push) for push in recording.pushes]
+    if sum(map(len, rows)) < 3:
+        return None
+
+    def gaps(shift: Array) -> Array:
+        return _gaps(_each(recording, partial(change, shift=shift)), rows)
+
+    found = least_squares(gaps, np.zeros(2), loss="soft_l1", f_scale=2e-3, x_scale=0.01, max_nfev=12)
+    return np.asarray(found.x)
+
+
+def _forces(recording: Recording) -> Iterator[Convention]:
+    factors: Sequence[tuple[float, str]] = (
+        (1e-3, "mN"), (1e3, "kN"), (EARTH, "kgf"), (1e-3 * EARTH, "gf"), (POUND * EARTH, "lbf"),
+    )  # fmt: skip
+    for factor, unit in factors:
+        yield Convention(
+            says=f"forces are in {unit}",
+            remedy=f"map: force: unit: {unit}",
+            recording=_each(recording, partial(_scaled, factor=factor)),
+        )
+
+
+def _scaled(push: Push, factor: float) -> Push:
+    force = push.force
+    scaled = None if force is None else ForceStream(times=force.times, forces=factor * force.forces)
+    return replace(push, force=scaled)
+
+
+def _masses(recording: Recording) -> Iterator[Convention]:
+    mass, std = recording.object.mass, recording.object.mass_std
+    if mass is None or std is None:
+        return
+    for factor, unit in ((POUND, "lb"), (1.0 / EARTH, "N"), (1e-3, "g")):
+        yield Convention(
+            says=f"the mass is in {unit}",
+            remedy=f"object: mass_kg: {factor * mass:.4g}",
+            recording=replace(
+                recording, object=replace(recording.object, mass=factor * mass, mass_std=factor * std)
+            ),
+        )  # fmt: skip

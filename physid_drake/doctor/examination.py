@@ -1,0 +1,118 @@
+"""Fits the pushes as they are, and where they fit nothing, as they would be by other conventions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from physid_drake.doctor.conventions import Convention, conventions_of, gap_of
+from physid_drake.errors import PhysidError
+from physid_drake.identify.baseline import plain
+from physid_drake.inference.fit import Fitter
+from physid_drake.inference.predictions import Predictor
+from physid_drake.progress import Progress
+from physid_drake.pushes.case import case_of, cell_config
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.recording import Recording
+
+PUSHES: Final = 4
+"""That are fitted: what is wrong with a convention is wrong with all."""
+FAR: Final = 5.0
+"""Deviations that a baseline leaves: less is physics that is missing, and what a diagnosis is for."""
+MUCH: Final = 3.0
+"""Times: so much better a convention has to fit, to be offered."""
+ALIKE: Final = 1.3
+"""Times: conventions that fit as well as the best one."""
+NEAR: Final = 3e-3
+"""m between tip and object as it is pushed: a convention by which it is so near is fitted."""
+STARTS: Final = 32
+STEPS: Final = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """What the pushes say of the recording's conventions.
+
+    Attributes:
+        before: deviations that the plain cell leaves (1 if it explains all); None where it is refused.
+        refused: why it is refused; empty if it is not.
+        after: deviations that it leaves by the best other convention; None where none is much better.
+        better: conventions that fit as well as that one.
+    """
+
+    before: float | None
+    refused: str = ""
+    after: float | None = None
+    better: tuple[Convention, ...] = ()
+
+    def lines(self) -> list[str]:
+        """One line for each convention; none where the pushes speak for what is said."""
+        if self.after is None:
+            return []
+        instead = "instead of being refused" if self.before is None else f"instead of {self.before:.3g}"
+        return [
+            f"the pushes fit to {self.after:.2g} sigma {instead} if {one.says} ({one.remedy})" for one in self.better
+        ]
+
+
+def examined(recording: Recording, tick: Progress | None = None) -> Finding:
+    """Whether the pushes speak for other conventions than what is said.
+
+    Args:
+        recording: the pushes.
+        tick: told the stage, steps done and steps in all.
+    """
+    few = _few(recording)
+    before, refused = _left(few)
+    if before is not None and before < FAR:
+        return Finding(before=before)
+    tried = _likely(list(conventions_of(few)))
+    found: list[tuple[float, Convention]] = []
+    for k, convention in enumerate(tried):
+        if tick is not None:
+            tick("other conventions", k, len(tried))
+        left, _ = _left(convention.recording)
+        if left is not None:
+            found.append((left, convention))
+    least = min((left for left, _ in found), default=np.inf)
+    if not least < (FAR if before is None else before / MUCH):
+        return Finding(before=before, refused=refused)
+    best = sorted((pair for pair in found if pair[0] <= ALIKE * least), key=lambda pair: pair[0])
+    return Finding(before=before, refused=refused, after=least, better=tuple(one for _, one in best))
+
+
+def _few(recording: Recording) -> Recording:
+    """Some of the pushes, without those in which nothing moves."""
+    ways = [float(np.hypot(*np.ptp(push.object.planar[:, :2], axis=0))) for push in recording.pushes]
+    moving = [k for k, way in enumerate(ways) if way > 0.2 * float(np.median(ways))]
+    chosen = np.unique(np.linspace(0, len(moving) - 1, min(PUSHES, len(moving))).round().astype(int))
+    return recording.subset([moving[k] for k in chosen])
+
+
+def _likely(conventions: list[Convention]) -> list[Convention]:
+    """Those by which the tip is about as near to what it pushes as by the best of them."""
+    gaps = [gap_of(convention.recording) for convention in conventions]
+    least = min(gaps, default=0.0)
+    return [one for one, gap in zip(conventions, gaps, strict=True) if gap < max(NEAR, MUCH * least)]
+
+
+def _left(recording: Recording) -> tuple[float | None, str]:
+    """Deviations that the plain cell leaves, fitted roughly; None and why, where the recording is refused."""
+    try:
+        case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=1)
+        case = replace(case, noise=replace(case.noise, known=True))
+        fitter = Fitter(case, Predictor(case))
+        hypothesis = plain(case)
+        rng = np.random.default_rng(0)
+        drawn = hypothesis.space.sample(rng, STARTS, from_prior=True)
+        zs = [hypothesis.mean, *(np.clip(hypothesis.space.to_unit(theta), *hypothesis.bounds) for theta in drawn)]
+        points = fitter.points([hypothesis] * len(zs), zs, [fitter.at_rest()] * len(zs))
+        best = sorted((point for point in points if point is not None), key=fitter.roughly)[:2]
+        if not best:
+            return None, "no push can be simulated"
+        fits = fitter.fitted(fitter.started([hypothesis] * len(best), best, [None] * len(best)), STEPS)
+        return float(max(fits, key=lambda fit: fit.log_likelihood).loudness), ""
+    except PhysidError as error:
+        return None, str(error)

@@ -1,0 +1,118 @@
+"""Bags of ROS 1 and 2 become recordings; what is cut off, empty or not there is one line."""
+
+from __future__ import annotations
+
+import shutil
+from functools import partial
+from pathlib import Path
+
+import foreign
+import numpy as np
+import pytest
+
+pytest.importorskip("rosbags")
+
+from physid_drake.convert import convert_bag, guess_map, read_map
+from physid_drake.errors import RecordingError
+from physid_drake.recording import Recording, read_recording
+
+SEALED = Path(__file__).parents[2] / "recordings" / "sealed_01"
+WRITERS = {"mcap": foreign.mcap, "sqlite3": partial(foreign.mcap, storage="sqlite3"), "pushes.bag": foreign.ros1}
+
+
+@pytest.fixture(scope="module")
+def sealed() -> Recording:
+    return read_recording(SEALED).subset([0, 1, 2])
+
+
+@pytest.fixture(scope="module")
+def bags(sealed: Recording, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("bags")
+    for name, writer in WRITERS.items():
+        (folder / f"{name}.yaml").write_text(writer(sealed, folder / name))
+    return folder
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize("name", WRITERS)
+def test_bags_come_back_as_they_were(name: str, sealed: Recording, bags: Path, tmp_path: Path) -> None:
+    found = convert_bag(bags / name, tmp_path / "recording", bags / f"{name}.yaml")
+    assert len(found.pushes) == len(sealed.pushes)
+    for push, other in zip(sealed.pushes, found.pushes, strict=True):
+        for end in (0, -1):
+            assert np.abs(push.object.planar[end, :2] - other.object.planar[end, :2]).max() < 3e-3
+            assert abs(push.object.planar[end, 2] - other.object.planar[end, 2]) < 0.05
+        # Stamps of the measurement, not of its arrival in bursts of 50 ms.
+        assert np.abs(np.diff(other.object.times) - 0.01).max() < 1e-6
+        assert other.force is not None and other.hand is not None
+        assert other.hand.rotation == ("none" if name == "pushes.bag" else "full")
+        force = [0.5, 0.0, 0.0] if name == "pushes.bag" else [0.0, 0.0, 0.0]
+        assert other.force.forces[0] == pytest.approx(force, abs=1e-9)
+
+
+def test_times_of_arrival_where_there_is_no_stamp(bags: Path, tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match=r"topic /ft \(Twist\) has no stamps of its own"):
+        convert_bag(bags / "pushes.bag", tmp_path / "recording", bags / "pushes.bag.yaml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("topic: /tf, frame: mug", "topic: /tf", "holds transforms; add the child frame"),
+        ("frame: mug", "frame: cup", "topic '/tf' has no message of frame 'cup'"),
+        ("topic: /ft/wrench", "topic: /ft", "has no topic '/ft'; it has '/ft/wrench', '/silent', '/tf'"),
+        ("topic: /ft/wrench", "topic: /silent", "topic '/silent' has no message"),
+        ("topic: /tf, frame: mug", "topic: /ft/wrench", "has no rotation; write 'rotation: none'"),
+        ("cut: rest", "cut: column, column: x", "a bag has no columns; cut by rest"),
+        ("{topic: /ft/wrench, axes", "{columns: [a, b], axes", "a bag's stream needs its topic"),
+    ],
+)
+def test_what_a_map_names_in_vain(old: str, new: str, said: str, bags: Path, tmp_path: Path) -> None:
+    chart = (bags / "mcap.yaml").read_text()
+    assert old in chart
+    (tmp_path / "map.yaml").write_text(chart.replace(old, new))
+    with pytest.raises(RecordingError, match=said) as caught:
+        convert_bag(bags / "mcap", tmp_path / "out", tmp_path / "map.yaml")
+    assert "\n" not in str(caught.value) and [p.name for p in tmp_path.iterdir()] == ["map.yaml"]
+
+
+@pytest.mark.parametrize("name", ["mcap/mcap.mcap", "sqlite3/sqlite3.db3", "pushes.bag"])
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.95])
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_a_bag_that_is_cut_off_is_one_line(name: str, share: float, bags: Path, tmp_path: Path) -> None:
+    whole = (bags / name).read_bytes()
+    bag = tmp_path / Path(name).name
+    bag.write_bytes(whole[: int(share * len(whole))])
+    try:
+        convert_bag(bag, tmp_path / "out", bags / f"{name.split('/', maxsplit=1)[0]}.yaml")
+    except RecordingError as error:
+        assert "\n" not in str(error) and bag.name in str(error)
+        assert not (tmp_path / "out").exists()
+
+
+def test_a_path_in_a_bags_metadata_is_not_followed(bags: Path, tmp_path: Path) -> None:
+    shutil.copytree(bags / "mcap", tmp_path / "bag")
+    (tmp_path / "bag/mcap.mcap").rename(tmp_path / "elsewhere.mcap")
+    metadata = tmp_path / "bag/metadata.yaml"
+    metadata.write_text(metadata.read_text().replace("mcap.mcap", "../elsewhere.mcap"))
+    with pytest.raises(RecordingError, match="no bag here"):
+        convert_bag(tmp_path / "bag", tmp_path / "out", bags / "mcap.yaml")
+
+
+def test_a_name_is_no_option(bags: Path, tmp_path: Path) -> None:
+    bag = tmp_path / "x?mode=rwc&.db3"
+    shutil.copy(bags / "sqlite3/sqlite3.db3", bag)
+    assert len(guess_map(bag).rows) == 4
+    assert [p.name for p in tmp_path.iterdir()] == [bag.name]
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_guess_is_a_map(name: str, bags: Path, tmp_path: Path) -> None:
+    guess = guess_map(bags / name)
+    (tmp_path / "map.yaml").write_text(guess.text)
+    chart = read_map(tmp_path / "map.yaml")
+    assert chart.object.topic == ("/mocap/mug" if name == "pushes.bag" else "/tf")
+    assert chart.hand_path is not None and chart.force is not None
+    assert chart.hand_path.frame == (None if name == "pushes.bag" else "finger")
+    rates = {row[0]: row[2] for row in guess.rows}
+    assert rates[{"pushes.bag": "/ft"}.get(name, "/ft/wrench")] == {"pushes.bag": "100"}.get(name, "500")
