@@ -1,4 +1,4 @@
-"""The object seen from above: a convex outline, and how near a round hand tip is to it.
+"""The object seen from above: its outline, and how near a round hand tip is to it.
 
 Everything here is plain floats, since the rollout asks once per tick and numpy's overhead on
 two-vectors would cost more than Drake's own step.
@@ -11,11 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from physid_drake.recording import is_convex
+
 Point = tuple[float, float]
 
 
 class Outline(Protocol):
-    """A convex outline in the object's frame B."""
+    """An outline in the object's frame B."""
 
     def nearest(self, x: float, y: float) -> tuple[float, float, float]:
         """Signed distance from the point (x, y) [m] to the outline, and the outward unit normal there.
@@ -50,7 +52,7 @@ class Disc:
 
 
 class Polygon:
-    """A convex polygon, counter-clockwise."""
+    """A simple polygon, counter-clockwise; it may have notches."""
 
     def __init__(self, vertices: Sequence[Point]) -> None:
         self.vertices: tuple[Point, ...] = tuple((float(x), float(y)) for x, y in vertices)
@@ -60,9 +62,12 @@ class Polygon:
             tx, ty = (bx - ax) / length, (by - ay) / length
             edges.append((ax, ay, tx, ty, ty, -tx, length))
         self._edges = tuple(edges)
+        self.convex = is_convex(self.vertices)
 
     def nearest(self, x: float, y: float) -> tuple[float, float, float]:
         """Signed distance [m] and outward normal; at a corner the normal points from the corner."""
+        if not self.convex:
+            return self._nearest_of_all(x, y)
         best = -math.inf
         for edge in self._edges:
             height = (x - edge[0]) * edge[4] + (y - edge[1]) * edge[5]
@@ -75,8 +80,22 @@ class Polygon:
         # Beyond the end of the most separated face a corner is nearest: no face can be nearer than its height.
         return min(self._corner(x, y, vertex) for vertex in self.vertices)
 
+    def _nearest_of_all(self, x: float, y: float) -> tuple[float, float, float]:
+        """The same of an outline with notches: every edge is asked, and a ray along x says whether it is inside."""
+        best, inside = math.inf, False
+        for ax, ay, tx, ty, nx, ny, length in self._edges:
+            along = min(max((x - ax) * tx + (y - ay) * ty, 0.0), length)
+            dx, dy = x - ax - along * tx, y - ay - along * ty
+            r = math.hypot(dx, dy)
+            if r < best:
+                best, away = r, (dx / r, dy / r) if r > 0.0 else (nx, ny)
+            by = ay + ty * length
+            if (ay > y) != (by > y) and x < ax + tx * (y - ay) / ty:
+                inside = not inside
+        return (-best, -away[0], -away[1]) if inside else (best, *away)
+
     def reach(self, angle: float) -> float:
-        """Distance [m] from Bo, which must lie inside, to the outline in a direction [rad]."""
+        """Distance [m] from Bo, which must lie inside, to a convex outline in a direction [rad]."""
         x, y = math.cos(angle), math.sin(angle)
         ahead = [(edge, x * edge[4] + y * edge[5]) for edge in self._edges]
         return min((edge[0] * edge[4] + edge[1] * edge[5]) / speed for edge, speed in ahead if speed > 1e-12)

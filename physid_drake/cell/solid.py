@@ -19,7 +19,7 @@ from scipy.spatial import ConvexHull, QhullError
 from physid_drake.cell.outline import Disc, Outline, Polygon, rectangle
 from physid_drake.cell.support import second_moments
 from physid_drake.errors import CellError, RecordingError
-from physid_drake.recording import Box, Cylinder, MeshShape, Prism
+from physid_drake.recording import Box, Cylinder, MeshShape, Prism, convex_pieces
 from physid_drake.recording import Shape as RecordedShape
 from physid_drake.recording.obj import ObjMesh, check_solid, read_obj
 from physid_drake.wording import named
@@ -102,9 +102,10 @@ def _prism(shape: Prism) -> Solid:
     polygon = Polygon(shape.polygon)
     iyy, _, ixx = second_moments(np.array(shape.polygon))
     z2 = shape.height**2 / 12.0
-    hull = ((_convex_prism(polygon, shape.height), RigidTransform()),)
+    pieces = [Polygon([(x, y) for x, y in piece.tolist()]) for piece in convex_pieces(shape.polygon)]
+    look = tuple((_convex_prism(piece, shape.height), RigidTransform()) for piece in pieces)
     return Solid(outline=polygon, underside=polygon, height=shape.height, gyration=(ixx + z2, iyy + z2, ixx + iyy),
-                 rolling_radius=None, faces=_polygon_faces(polygon, shape.height), visual=hull)  # fmt: skip
+                 rolling_radius=None, faces=_polygon_faces(polygon, shape.height), visual=look)  # fmt: skip
 
 
 def _polygon_faces(polygon: Polygon, height: float) -> tuple[tuple[Shape, RigidTransform], ...]:
@@ -137,7 +138,11 @@ def _overhang(polygon: Polygon, corner: int) -> float:
 
 
 def _inradius(polygon: Polygon) -> float:
-    return -polygon.nearest(0.0, 0.0)[0]
+    """Of the largest circle about Bo inside; of an outline with notches, in which Bo may be outside, its thinnest."""
+    if polygon.convex:
+        return -polygon.nearest(0.0, 0.0)[0]
+    edges = np.roll(np.array(polygon.vertices), -1, axis=0) - np.array(polygon.vertices)
+    return 0.5 * float(np.linalg.norm(edges, axis=1).min())
 
 
 def _convex_prism(polygon: Polygon, height: float) -> Convex:

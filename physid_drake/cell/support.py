@@ -17,7 +17,7 @@ from scipy.special import roots_jacobi
 
 from physid_drake.cell.outline import Disc, Outline, Polygon
 from physid_drake.errors import TippedError
-from physid_drake.recording import polygon_centroid
+from physid_drake.recording import convex_pieces, polygon_centroid
 
 Array = NDArray[np.float64]
 
@@ -108,7 +108,7 @@ def support_of(
     """Quadrature points over an outline, fine enough that every friction cell holds some.
 
     Args:
-        outline: the underside, convex, in B.
+        outline: the underside, in B.
         grid: the friction cells.
         points: about how many; Gauss points as dense along x as along y.
         pressure: where it is not even; the quadrature is then as fine as its cells need too.
@@ -118,6 +118,8 @@ def support_of(
     match outline:
         case Polygon() if _is_rectangle(outline):
             places, weights = _rectangle_points(outline, cut, points)
+        case Polygon(convex=False):
+            places, weights = _pieced_points(outline, cut, points)
         case _ if cut.size > 1:
             places, weights = _cell_points(outline, cut, math.ceil(math.sqrt(points) / 2))
         case Disc(radius=radius):
@@ -141,6 +143,20 @@ def support_of(
 def _common(first: FrictionGrid, second: FrictionGrid) -> FrictionGrid:
     """The coarsest grid whose cells lie within those of both."""
     return FrictionGrid(nx=math.lcm(first.nx, second.nx), ny=math.lcm(first.ny, second.ny))
+
+
+def _pieced_points(polygon: Polygon, cut: FrictionGrid, points: int) -> tuple[Array, Array]:
+    """A rule for each convex piece of an outline with notches, each with its share of the points."""
+    pieces = [Polygon([(x, y) for x, y in piece.tolist()]) for piece in convex_pieces(polygon.vertices)]
+    areas = [_area(np.array(piece.vertices)) for piece in pieces]
+    made = []
+    for piece, area in zip(pieces, areas, strict=True):
+        share = math.ceil(points * area / sum(areas))
+        if cut.size > 1:
+            made.append(_cell_points(polygon, cut, math.ceil(math.sqrt(points) / 2), np.array(piece.vertices)))
+        else:
+            made.append(_fan_points(piece, share))
+    return np.concatenate([places for places, _ in made]), np.concatenate([weights for _, weights in made])
 
 
 def _is_rectangle(polygon: Polygon) -> bool:
@@ -237,18 +253,19 @@ def _fan_points(polygon: Polygon, points: int) -> tuple[Array, Array]:
     return np.concatenate(places), np.concatenate(weights)
 
 
-def _cell_points(outline: Outline, grid: FrictionGrid, fewest: int) -> tuple[Array, Array]:
+def _cell_points(outline: Outline, grid: FrictionGrid, fewest: int, part: Array | None = None) -> tuple[Array, Array]:
     """Four points in each piece of the outline that a friction cell cuts out: exact to second moments.
 
     Args:
         outline: the underside.
         grid: friction cells.
         fewest: pieces along a side; coarser friction cells are cut again.
+        part: a convex part of the underside, which alone counts.
     """
     x0, y0, x1, y1 = outline.extent()
     nx, ny = (n * math.ceil(fewest / n) for n in (grid.nx, grid.ny))
     xs, ys = np.linspace(x0, x1, nx + 1), np.linspace(y0, y1, ny + 1)
-    whole = _as_polygon(outline)
+    whole = _as_polygon(outline) if part is None else part
     points, weights = [], []
     for i in range(nx):
         for j in range(ny):

@@ -54,7 +54,7 @@ OTHERS: Final = (
     "rect1_v20", "rect2_v10", "rect3_v10", "tri1_v10", "tri2_v10", "tri3_v10", "ellip1_v10", "ellip2_v10",
     "ellip3_v10", "hex_v10",
 )  # fmt: skip
-LEFT_OUT: Final = ("butter: its outline is not convex, which the cell does not simulate.",)
+LEFT_OUT: Final = ("butter: it is not convex, and its outline is not known here.",)
 WHERE: Final = (
     "the published end points lie at GitHub robinzhoucmu/PlanarManipulationToolBox, as one CSV file"
     " abs_<shape>_v<mm/s>.csv for each shape and speed"

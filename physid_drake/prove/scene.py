@@ -12,7 +12,7 @@ from physid_drake.errors import RecordingError
 from physid_drake.prove.feet import friction_that_lifts
 from physid_drake.prove.shapes import Array, Solid, height_of, outline_of
 from physid_drake.prove.world_plan import GRAVITY, HandPath, Plan, Pose
-from physid_drake.recording import Box, Cylinder, Prism, polygon_centroid
+from physid_drake.recording import Box, Cylinder, Prism, is_convex, polygon_centroid
 
 Rng: TypeAlias = np.random.Generator
 
@@ -148,10 +148,12 @@ def _draw_prism(rng: Rng, corners: int) -> Prism:
         radii = rng.uniform(0.05, 0.075, corners) if corners == 3 else rng.uniform(0.045, 0.06) * np.ones(corners)
         polygon = np.round(radii[:, None] * np.column_stack([np.cos(angles), np.sin(angles)]), 4)
         polygon = np.round(polygon - polygon_centroid(polygon), 6)
+        if not is_convex(polygon):
+            continue
         try:
             return Prism(polygon=tuple((x, y) for x, y in polygon.tolist()), height=round(rng.uniform(0.03, 0.05), 3))
         except RecordingError:
-            continue  # not convex
+            continue
 
 
 def _draw_noise(rng: Rng) -> Noise:

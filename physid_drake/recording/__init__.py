@@ -2,7 +2,7 @@
 
 from physid_drake.recording.digest import digest_of
 from physid_drake.recording.naming import recording_folder
-from physid_drake.recording.outlines import outline_distance, polygon_centroid
+from physid_drake.recording.outlines import convex_pieces, is_convex, outline_distance, polygon_centroid
 from physid_drake.recording.planar import planar_poses
 from physid_drake.recording.reading import read_recording
 from physid_drake.recording.statistics import (
@@ -49,8 +49,10 @@ __all__ = [
     "Sensors",
     "Shape",
     "Table",
+    "convex_pieces",
     "digest_of",
     "estimate_noise",
+    "is_convex",
     "motion_span",
     "outline_distance",
     "planar_poses",

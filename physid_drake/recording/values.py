@@ -234,7 +234,7 @@ class Cylinder:
 
 @dataclass(frozen=True, kw_only=True)
 class Prism:
-    """An upright prism: convex counter-clockwise ``polygon`` about its centroid and ``height``, in m."""
+    """An upright prism: counter-clockwise ``polygon`` about its centroid, maybe with notches; ``height``; in m."""
 
     polygon: tuple[tuple[float, float], ...]
     height: float

@@ -61,17 +61,20 @@ def hand_at(t, before, times, places, velocities):
 
 
 @compiled
-def nearest(x, y, edges, radius):
-    """Signed distance [m] from a point to a convex outline in B, negative inside, and the outward normal there.
+def nearest(x, y, edges, radius, notched):
+    """Signed distance [m] from a point to an outline in B, negative inside, and the outward normal there.
 
     Args:
         x, y: the point in B [m].
         edges: (k, 5) of a polygon, counter-clockwise: corner x, y [m], direction x, y, length [m]; none of a disc.
         radius: of a disc about Bo [m].
+        notched: 1 where the polygon is not convex.
     """
     if len(edges) == 0:
         r = length(x, y)
         return (r - radius, x / r, y / r) if r > 0.0 else (-radius, 1.0, 0.0)
+    if notched > 0.0:
+        return _nearest_of_all(x, y, edges)
     height, face = -np.inf, 0
     for i in range(len(edges)):
         above = (x - edges[i, 0]) * edges[i, 3] - (y - edges[i, 1]) * edges[i, 2]
@@ -81,6 +84,24 @@ def nearest(x, y, edges, radius):
     if height <= 0.0 or 0.0 <= along <= edges[face, 4]:
         return height, edges[face, 3], -edges[face, 2]
     return _corner(x, y, edges)
+
+
+@compiled
+def _nearest_of_all(x, y, edges):
+    """The same of an outline with notches: every edge is asked, and a ray along x says whether it is inside."""
+    least, nx, ny, crossings = np.inf, 1.0, 0.0, 0
+    for i in range(len(edges)):
+        ax, ay, tx, ty, long = edges[i, 0], edges[i, 1], edges[i, 2], edges[i, 3], edges[i, 4]
+        along = min(max((x - ax) * tx + (y - ay) * ty, 0.0), long)
+        dx, dy = x - ax - along * tx, y - ay - along * ty
+        r = length(dx, dy)
+        if r < least:
+            least = r
+            nx, ny = (dx / r, dy / r) if r > 0.0 else (ty, -tx)
+        by = ay + ty * long
+        if (ay > y) != (by > y) and x < ax + tx * (y - ay) / ty:
+            crossings += 1
+    return (-least, -nx, -ny) if crossings % 2 == 1 else (least, nx, ny)
 
 
 @compiled
@@ -107,7 +128,9 @@ def gap_between(x, y, yaw, tip_x, tip_y, body, edges):
     """
     c, s = math.cos(yaw), math.sin(yaw)
     dx, dy = tip_x - x, tip_y - y
-    distance, bx, by = nearest(c * dx + s * dy + body.com_x, c * dy - s * dx + body.com_y, edges, body.outline_radius)
+    distance, bx, by = nearest(
+        c * dx + s * dy + body.com_x, c * dy - s * dx + body.com_y, edges, body.outline_radius, body.notched
+    )
     nx, ny = -(c * bx - s * by), -(s * bx + c * by)
     gap = distance - body.tip_radius
     reach = body.tip_radius + gap

@@ -13,6 +13,7 @@ BODY: Final = np.dtype([(name, np.float64) for name in (
     "com_x", "com_y",    # of Bcm in B [m]
     "com_height",        # of Bcm above the table [m]
     "outline_radius",    # of a disc [m]
+    "notched",           # 1 for an outline that is not convex
     "tip_radius",        # of the hand's tip [m]
     "tip_arm",           # of the contact above Bcm [m]
     "hand_friction",     # [-]

@@ -198,6 +198,7 @@ class Twin:
         return (
             body.mass, body.mass * body.inertia_ratio * solid.gyration[2], body.mass * self.gravity,
             com_x, com_y, 0.5 * solid.height, solid.outline.radius if isinstance(solid.outline, Disc) else 0.0,
+            1.0 if isinstance(solid.outline, Polygon) and not solid.outline.convex else 0.0,
             self.hand_radius or 0.0, height - 0.5 * solid.height, body.hand_friction, body.restitution,
             *_tip_of(push.mount), *_swing_of(push.swing), 0.0, push.begin, push.end,
             wander.middle, wander.width, wander.support, wander.hand, *wander.force, wander.torque,

@@ -96,12 +96,12 @@ def published_object(name: str, place: str) -> PublishedObject:
         place: the file, for the message.
 
     Raises:
-        RecordingError: if there is no such object, or it is not convex.
+        RecordingError: if there is no such object, or its outline is not known here.
     """
     if name == "butter":
         raise RecordingError(
-            f"{place}: the shape 'butter' is not convex, and this converter writes convex prisms only; "
-            "convert another shape, or record it by hand with a mesh."
+            f"{place}: the shape 'butter' is not convex, and this converter knows no outline of it;"
+            " convert another shape, or write its recording with a prism of your own."
         )
     if name not in OBJECTS:
         raise RecordingError(f"{place}: unknown shape {shown(name)}; the known ones are {', '.join(OBJECTS)}.")
