@@ -15,6 +15,9 @@ from pathlib import Path
 from typing import Any, Final
 
 MOST_BYTES: Final = 64_000_000
+GROWN: Final = 1_000_000
+"""Bytes that a file may have grown by since it was opened."""
+
 _KINDS: Final = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a named pipe"),
@@ -59,8 +62,10 @@ def read_bytes(path: Path | str, *, most: int = MOST_BYTES) -> bytes:
         # Without O_NONBLOCK, a pipe that took the file's place since then would hang.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
         with os.fdopen(descriptor, "rb") as file:
-            _check(os.fstat(descriptor), most)
-            content = file.read(most + 1)
+            found = os.fstat(descriptor)
+            _check(found, most)
+            # Python takes the memory that it is asked for before it looks how much there is.
+            content = file.read(min(most, found.st_size + GROWN) + 1)
     except FileError:
         raise
     except FileNotFoundError as error:

@@ -47,7 +47,7 @@ def read_array_table(path: Path) -> Columns:
         raise RecordingError(f"{named(path)}: {error}.") from error
     except _BROKEN as error:
         raise RecordingError(
-            f"{named(path)}: cannot be read: damaged, or of another kind ({one_line(error)})."
+            f"{named(path)}: cannot be read: damaged, or of another kind ({_why(error)})."
         ) from error
     numbers: dict[str, Array] = {}
     texts: dict[str, list[str]] = {}
@@ -61,6 +61,10 @@ def read_array_table(path: Path) -> Columns:
     if sum(map(len, numbers.values())) > MOST_NUMBERS:
         raise RecordingError(f"{named(path)}: has more than {MOST_NUMBERS:,} numbers; cut the pushes out of it.")
     return Columns(source=named(path.name), numbers=numbers, texts=texts)
+
+
+def _why(error: Exception) -> str:
+    return "it claims more than it holds" if isinstance(error, MemoryError) else one_line(error)
 
 
 def _columns(name: str, array: Any) -> dict[str, Array]:

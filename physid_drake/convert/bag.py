@@ -27,6 +27,8 @@ STAMP, RECEIVE = "stamp", "receive"
 MOST_MESSAGES: Final = 3_000_000
 """Of the topics that are read: an hour and a half at 500 Hz."""
 
+CUT_OFF: Final = "no bag that can be read, or one that is cut off or damaged"
+
 _NEEDED: Final = "reading bags needs rosbags, which is not installed; run `pip install physid_drake[bags]`."
 _POSE: Final = ("x", "y", "z", "qx", "qy", "qz", "qw")
 _WRENCH: Final = ("x", "y", "z", "tx", "ty", "tz")
@@ -174,10 +176,7 @@ def _opened(file: Path) -> Iterator[Any]:
         except FileError as error:
             raise RecordingError(f"{named(file)}: {error}.") from error
         except Exception as error:  # a bag that is cut off breaks wherever its reader happens to be
-            why = one_line(error).replace(str(folder), "")
-            raise RecordingError(
-                f"{named(file)}: no bag that can be read, or one that is cut off ({why})."
-            ) from error
+            raise RecordingError(f"{named(file)}: {CUT_OFF}.") from error
 
 
 def _messages(reader: Any, topics: Collection[str] | Mapping[str, str]) -> Iterator[tuple[str, float, Any]]:
@@ -185,13 +184,18 @@ def _messages(reader: Any, topics: Collection[str] | Mapping[str, str]) -> Itera
     connections = [c for c in reader.connections if c.topic in topics]
     if not connections:
         return
-    store = _typestore(is_first=type(reader).__module__.startswith("rosbags.rosbag1"))
-    for count, (connection, time, raw) in enumerate(reader.messages(connections=connections)):
-        if count >= MOST_MESSAGES:
-            raise RecordingError(
-                f"its topics have more than {MOST_MESSAGES:,} messages; cut the pushes out of the bag."
-            )
-        yield connection.topic, 1e-9 * time, store(raw, connection.msgtype)
+    read = _typestore(is_first=type(reader).__module__.startswith("rosbags.rosbag1"))
+    messages = iter(reader.messages(connections=connections))
+    for _ in range(MOST_MESSAGES):
+        try:
+            connection, time, raw = next(messages)
+            message = read(raw, connection.msgtype)
+        except StopIteration:
+            return
+        except Exception as error:
+            raise RecordingError(f"it is {CUT_OFF}.") from error
+        yield connection.topic, 1e-9 * time, message
+    raise RecordingError(f"its topics have more than {MOST_MESSAGES:,} messages; cut the pushes out of the bag.")
 
 
 def _typestore(*, is_first: bool) -> Callable[[bytes, str], Any]:

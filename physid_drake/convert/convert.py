@@ -126,7 +126,9 @@ def _pieces(name: str, parts: Parts) -> list[tuple[str, Piece]]:
     found: list[tuple[str, Piece]] = []
     for label, chart, columns in parts:
         reach = _radius(chart.model) + (chart.hand.radius if chart.hand is not None else 0.0)
-        streams = end_streams(columns["object"], chart) if chart.cut.by == "rows" else streams_of(columns, chart)
+        # What is out of all proportion is refused by what it makes.
+        with np.errstate(over="ignore", invalid="ignore"):
+            streams = end_streams(columns["object"], chart) if chart.cut.by == "rows" else streams_of(columns, chart)
         pieces, left = pieces_of(streams, chart.cut, reach)
         for line in left:
             warnings.warn(f"{name}{label}: {line}.", UserWarning, stacklevel=2)

@@ -130,13 +130,13 @@ def _naming(key: str) -> Iterator[None]:
 
 
 def _poses(columns: Columns, pose: PoseMap, chart: Map) -> PoseStream:
-    if not pose.position.columns:
-        raise RecordingError("position needs columns; a topic is a bag's.")
     return _placed(columns, pose, _times(columns, pose.clock, chart), chart)
 
 
 def _placed(columns: Columns, pose: PoseMap, times: Array, chart: Map) -> PoseStream:
     """The rows of a body that are filled, in W."""
+    if not pose.position.columns:
+        raise RecordingError("position needs columns; a topic is a bag's.")
     place = _scaled(columns, pose.position, LENGTHS, "m")
     turn = None if pose.turn is None else _turns(columns, pose.turn)
     seen = np.isfinite(place).all(axis=1) & np.isfinite(times)

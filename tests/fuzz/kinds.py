@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fuzz import commands, configurations, folders, meshes, models, proofs, recordings, sources, tables
+from fuzz import commands, configurations, folders, logs, meshes, models, proofs, recordings, sources, tables
 from fuzz.worker import Maker
 
 KINDS: list[tuple[str, Maker]] = [
@@ -10,5 +10,6 @@ KINDS: list[tuple[str, Maker]] = [
     ("folder", folders.make), ("command", commands.make), ("table", tables.make), ("recording", recordings.make),
     ("source", sources.make), ("configuration", configurations.make), ("proof", proofs.make), ("folder",
     folders.make),
-    ("model", models.make), ("source", sources.make), ("command", commands.make),
+    ("model", models.make), ("source", sources.make), ("command", commands.make), ("log", logs.make),
+    ("log", logs.make), ("log", logs.make),
 ]  # fmt: skip
