@@ -64,6 +64,7 @@ class Guess:
     rows: tuple[tuple[str, ...], ...]
 
 
+@np.errstate(over="ignore", invalid="ignore")  # numbers out of all proportion are looked at as well
 def guess_map(source: Path) -> Guess:
     """Looks at a table, a bag, or a folder of tables.
 
