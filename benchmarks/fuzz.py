@@ -1,10 +1,10 @@
 """How many of many odd inputs are read or refused in one line, and how many are a fault: python benchmarks/fuzz.py.
 
 Recordings, foreign logs and their maps, meshes, configurations, models, folders of results, published sources and
-command lines are made by small grammars (`tests/fuzz`), each from seed and index alone. A fault is an error that is not
-meant for a person, a hang of 10 s, a crash of compiled code, more than 2 GB of memory, a file that is read or written
-outside the input's folder, or an input that is changed. Python's own warnings are counted apart. ``--only INDEX --keep``
-repeats one input and shows where it lies. The exit status is 1 if there is a fault.
+command lines are made by small grammars (`tests/fuzz`), each from seed and index alone. A fault is an error that is
+not meant for a person, a hang of 10 s, a crash of compiled code, more than 2 GB of memory, a file that is read or
+written outside the input's folder, or an input that is changed. Python's own warnings are counted apart. ``--only
+INDEX --keep`` repeats one input and shows where it lies. The exit status is 1 if there is a fault.
 """
 
 import argparse
