@@ -16,7 +16,8 @@ from physid_drake.convert.arrays import read_array_table
 from physid_drake.convert.bag import RECEIVE, STAMP, bag_files, read_bag
 from physid_drake.convert.columns import Columns
 from physid_drake.convert.cutting import Piece, pieces_of, rows_by_value
-from physid_drake.convert.mapping import Clock, ForceMap, Map, PoseMap, Quantity, Turn, read_map
+from physid_drake.convert.mapping import Clock, ForceMap, Map, Offset, PoseMap, Quantity, Turn, read_map
+from physid_drake.convert.mesh import prism_of
 from physid_drake.convert.streams import Streams, end_streams, streams_of
 from physid_drake.convert.text_table import read_text_table
 from physid_drake.errors import RecordingError
@@ -105,7 +106,7 @@ def _convert(
     *,
     whole: bool = False,
 ) -> Recording:
-    chart = read_map(Path(map_file))
+    chart = _with_mesh(read_map(Path(map_file)))
     pushes: list[Push] = []
     for file in files[:1] if whole else files:
         try:
@@ -121,11 +122,25 @@ def _convert(
     return _written(pushes, chart, _conversion(Path(source), files, chart), folder)
 
 
+def _with_mesh(chart: Map) -> Map:
+    """The map with its mesh as the prism that it is, and the object's pose from the tracked frame to its middle."""
+    model = chart.model
+    if isinstance(model, ObjectModel):
+        return chart
+    if chart.object.offset != Offset():
+        raise RecordingError("object: offset stands beside recording.object.frame of a mesh; give one of them.")
+    made = prism_of(model.file, model.scale, model.frame)
+    warnings.warn(f"{made.says}.", UserWarning, stacklevel=2)
+    end = chart.object.end
+    body = replace(chart.object, offset=made.offset, end=None if end is None else replace(end, offset=made.offset))
+    return replace(chart, object=body, model=ObjectModel(shape=made.shape, mass=model.mass, mass_std=model.mass_std))
+
+
 def _pieces(name: str, parts: Parts) -> list[tuple[str, Piece]]:
     """Pushes of one log, each with what tells it from the others of the log."""
     found: list[tuple[str, Piece]] = []
     for label, chart, columns in parts:
-        reach = _radius(chart.model) + (chart.hand.radius if chart.hand is not None else 0.0)
+        reach = _radius(_solid(chart)) + (chart.hand.radius if chart.hand is not None else 0.0)
         # What is out of all proportion is refused by what it makes.
         with np.errstate(over="ignore", invalid="ignore"):
             streams = end_streams(columns["object"], chart) if chart.cut.by == "rows" else streams_of(columns, chart)
@@ -239,6 +254,11 @@ def _tared(force: ForceStream, seconds: float, note: str) -> ForceStream:
     return replace(force, forces=force.forces - force.forces[untouched].mean(axis=0))
 
 
+def _solid(chart: Map) -> ObjectModel:
+    assert isinstance(chart.model, ObjectModel)
+    return chart.model
+
+
 def _radius(model: ObjectModel) -> float:
     shape = model.shape
     if isinstance(shape, Box):
@@ -266,7 +286,7 @@ def _written(pushes: list[Push], chart: Map, conversion: Conversion, folder: Pat
     recording = Recording(
         name=chart.name,
         description=chart.description,
-        object=chart.model,
+        object=_solid(chart),
         table=chart.table,
         hand=chart.hand,
         sensors=chart.sensors,

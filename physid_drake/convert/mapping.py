@@ -20,6 +20,7 @@ from physid_drake.recording import Hand, ObjectModel, Sensors, Table
 from physid_drake.recording.description import (
     Section,
     hand_from,
+    inside,
     load_section,
     object_from,
     sensors_from,
@@ -95,6 +96,32 @@ class Offset:
 
     translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rotation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshFrame:
+    """How an object's mesh lies.
+
+    Attributes:
+        axes: (3, 3) turns the mesh's coordinates into some whose z is up.
+        translation: of the tracked frame's origin, in the mesh's coordinates, in its unit.
+        rotation: of the tracked frame beside the mesh's axes, z up, w first.
+    """
+
+    axes: Array = field(default_factory=lambda: np.eye(3))
+    translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rotation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeshMap:
+    """An object that is given by a mesh: its file, the size of its unit [m], how it lies, and what it weighs."""
+
+    file: Path
+    scale: float
+    frame: MeshFrame
+    mass: float | None
+    mass_std: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -193,7 +220,8 @@ class Map:
 
     Attributes:
         file: of the map.
-        name, description, model, table, hand, sensors: of the recording, as in ``recording.yaml``.
+        name, description, model, table, hand, sensors: of the recording, as in ``recording.yaml``; the object may
+            be a mesh.
         dialect: how a table is written.
         by_receive: of a bag: whether times are those of arrival, instead of those in the messages' headers.
         world: where W lies.
@@ -205,7 +233,7 @@ class Map:
     file: Path
     name: str
     description: str
-    model: ObjectModel
+    model: ObjectModel | MeshMap
     table: Table
     hand: Hand | None
     sensors: Sensors
@@ -246,7 +274,7 @@ def read_map(file: Path) -> Map:
         file=file,
         name=described.text("name"),
         description=described.text("description", ""),
-        model=object_from(described, file.parent),
+        model=_model(described, file.parent),
         table=table_from(described),
         hand=hand,
         sensors=sensors_from(described),
@@ -258,6 +286,34 @@ def read_map(file: Path) -> Map:
         hand_path=path,
         force=force,
         cut=cut,
+    )
+
+
+def _model(described: Section, folder: Path) -> ObjectModel | MeshMap:
+    """The object; a mesh is looked at when the log is converted."""
+    section = cast(Section, described.section("object"))
+    if section.values.get("shape") != "mesh":
+        return object_from(described, folder)
+    section.check_keys("shape", "file", "unit", "up", "frame", "mass_kg", "mass_std_kg")
+    name = section.text("file")
+    file = inside(folder, name)
+    if file is None:
+        raise section.refuse("file", f"must lie in the map's folder, but got {shown(name)}; move it.")
+    frame = section.section("frame", required=False)
+    if frame is not None:
+        frame.check_keys("translation", "rotation_wxyz", "yaw_deg")
+    place = frame.numbers("translation", 3) if frame is not None and frame.has("translation") else (0.0, 0.0, 0.0)
+    up = section.choice("up", "x", "y", "z") if section.has("up") else "z"
+    return MeshMap(
+        file=file,
+        scale=_factor(section, LENGTHS, "m"),
+        frame=MeshFrame(
+            axes=np.roll(np.eye(3), "zxy".index(up), axis=1),
+            translation=(place[0], place[1], place[2]),
+            rotation=(1.0, 0.0, 0.0, 0.0) if frame is None else _rotation(frame),
+        ),
+        mass=section.maybe_number("mass_kg"),
+        mass_std=section.maybe_number("mass_std_kg"),
     )
 
 
