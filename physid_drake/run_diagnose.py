@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.text import Text
 
 from physid_drake.diagnose import Diagnosis, Evidence, diagnose, model_of
+from physid_drake.doctor.examination import FAR
 from physid_drake.effects import effect_named
 from physid_drake.errors import ConfigError
 from physid_drake.pushes.case import Case, case_of, cell_config
@@ -111,6 +112,8 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
     if diagnosis.location is not None:
         console.print(f"Where: {diagnosis.location.statement}.")
     console.print(f"Left over: {diagnosis.left}.")
+    if diagnosis.verdict == "unexplained" and diagnosis.reduced_chi2_before > FAR**2:
+        console.print("The plain cell misses by far: `physid_drake inspect` tries whether a convention is wrong.")
     for warning in diagnosis.warnings[:MOST_NOTES]:
         console.print(f"Note: {warning}.")
     if len(diagnosis.warnings) > MOST_NOTES:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 
@@ -12,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from rich.table import Table
 
+from physid_drake.recording.rounding import rounding_std
 from physid_drake.recording.statistics import NoiseEstimate, PushSummary, estimate_noise, summarise
 from physid_drake.recording.values import Array, Box, Cylinder, Prism, Recording, Shape
 
@@ -23,9 +25,10 @@ _MANY_PUSHES = 12
 
 def inspection_table(recording: Recording) -> Table:
     """One row for each push, speeds at their largest, and the noise of all in the caption."""
+    steps = _rounding(recording)
     table = Table(
         title=recording.name,
-        caption=_noise_line(estimate_noise(recording)),
+        caption=_noise_line(estimate_noise(recording), steps),
         caption_justify="left",
     )
     table.add_column("push", no_wrap=True)
@@ -43,7 +46,7 @@ def inspection_table(recording: Recording) -> Table:
     ):
         table.add_column(heading, justify="right")
     for push in recording.pushes:
-        table.add_row(push.name, *_cells(summarise(push)))
+        table.add_row(push.name, *_cells(summarise(push), steps, push.object.rotation != "none"))
     return table
 
 
@@ -149,17 +152,28 @@ def _outline(shape: Shape) -> Array | None:
     return np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
 
 
-def _cells(summary: PushSummary) -> list[str]:
+def _rounding(recording: Recording) -> tuple[float, float]:
+    """Standard deviation of the rounding of the object's places [m] and yaw [rad]; 0 where none is seen."""
+    planar = [push.object.planar for push in recording.pushes]
+    return rounding_std([one[:, :2] for one in planar]), rounding_std([one[:, 2:] for one in planar])
+
+
+def _at_least(noise: float | None, step: float) -> float | None:
+    """A stream that stands still on its grid is no better than that."""
+    return max(noise or 0.0, step) if step > 0.0 else noise
+
+
+def _cells(summary: PushSummary, steps: tuple[float, float], turns: bool) -> list[str]:
     return [
         str(summary.samples),
         f"{summary.duration:.2f}",
         _scaled(summary.hand_speed, 1e3, ".1f"),
         _scaled(summary.object_speed, 1e3, ".1f"),
         f"{summary.displacement * 1e3:.1f}",
-        f"{np.rad2deg(summary.turn):.1f}",
+        f"{np.rad2deg(summary.turn):.1f}" if turns else "-",
         str(summary.gaps),
-        _scaled(summary.position_noise, 1e3, ".3f"),
-        _scaled(summary.rotation_noise, 180.0 / np.pi, ".3f"),
+        _scaled(_at_least(summary.position_noise, steps[0]), 1e3, ".3f"),
+        _scaled(_at_least(summary.rotation_noise, steps[1]) if turns else None, 180.0 / np.pi, ".3f"),
         str(summary.warnings),
     ]
 
@@ -168,7 +182,17 @@ def _scaled(value: float | None, factor: float, form: str) -> str:
     return "-" if value is None else format(value * factor, form)
 
 
-def _noise_line(noise: NoiseEstimate) -> str:
+def _noise_line(noise: NoiseEstimate, steps: tuple[float, float]) -> str:
+    grid = ", ".join(
+        f"{said} to {scale * math.sqrt(12.0) * step:.3g} {unit}"
+        for said, step, scale, unit in (("places", steps[0], 1e3, "mm"), ("yaw", steps[1], 180.0 / np.pi, "deg"))
+        if step > 0.0
+    )
+    rounded = f"; rounded: {grid}, which is a noise of its step / sqrt(12)" if grid else ""
+    return _seen_line(noise) + rounded
+
+
+def _seen_line(noise: NoiseEstimate) -> str:
     if noise.object_position_std is None or noise.object_rotation_std is None:
         return "noise: unknown, the object is nowhere recorded at rest"
     parts = [

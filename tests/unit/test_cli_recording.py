@@ -16,6 +16,7 @@ from physid_drake.recording import (
     Recording,
     Sensors,
     Table,
+    planar_poses,
     write_recording,
 )
 from physid_drake.report.inspection import draw_pushes
@@ -153,3 +154,25 @@ def test_axes_are_equal_and_in_metres():
     axes = draw_pushes(some_recording(20)).axes[0]
     assert axes.get_aspect() == 1.0
     assert axes.get_xlabel() == "x [m]" and axes.get_ylabel() == "y [m]"
+
+
+def rounded(recording, step, turn):
+    """The same with places and yaw on a grid [m, rad], and rests before and after."""
+
+    def on_grid(push):
+        times = np.arange(200) * 0.01
+        x = 0.2 * np.clip(times - 0.5, 0.0, 1.0)
+        planar = np.column_stack([x, 0.3 * x, 2.0 * x])
+        planar = np.round(planar / [step, step, turn]) * [step, step, turn]
+        hand = dc.replace(push.hand, times=np.linspace(0.0, 2.0, len(push.hand)))
+        return dc.replace(push, object=planar_poses(times, planar, 0.02), hand=hand)
+
+    return dc.replace(recording, pushes=tuple(map(on_grid, recording.pushes)))
+
+
+def test_a_stream_on_a_grid_has_the_grids_noise(tmp_path, capsys):
+    write_recording(rounded(some_recording(1), 0.01, np.radians(1.0)), tmp_path / "r")
+    cli.main(["inspect", "--no-fit", str(tmp_path / "r")])
+    shown = capsys.readouterr().out
+    assert "2.887" in shown and "0.289" in shown and "0.000" not in shown.split("noise at rest")[0]
+    assert "rounded: places to 10 mm, yaw to 1 deg" in " ".join(shown.split())
