@@ -174,7 +174,7 @@ def _register_prove(subparsers: Subparsers) -> None:
         help="where all goes (default: proofs/worlds or proofs/real)",
     )
     parser.add_argument(
-        "--kind", choices=["none", "effect", "other", "pair"], help="only such worlds (default: a mix)"
+        "--kind", choices=["none", "effect", "other", "pair", "notched"], help="only such worlds (default: a mix)"
     )
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N",
                         help="diagnoses at a time (default: the machine's cores)")  # fmt: skip

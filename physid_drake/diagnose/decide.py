@@ -98,7 +98,8 @@ def decided(found: Found, *, most: float) -> Decision:
 
 def is_own_error(left_out: Accuracy) -> bool:
     """Whether pushes are predicted as well as simulators agree: what is left has structure, and is no physics."""
-    return left_out.position < OWN_ERROR[0] and left_out.rotation < OWN_ERROR[1]
+    # A yaw that was not measured is left out of it.
+    return left_out.position < OWN_ERROR[0] and not left_out.rotation >= OWN_ERROR[1]
 
 
 def confirmed(found: Found, one: Weighed, beside: Weighed | None = None) -> bool:

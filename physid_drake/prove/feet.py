@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
+from typing import Final
 
 import numpy as np
 
 from physid_drake.prove.shapes import Array, Solid, gyration_squared, height_of, outline_of
 from physid_drake.prove.world_plan import Plan
-from physid_drake.recording import Box, Cylinder, Prism
+from physid_drake.recording import Box, Cylinder, Prism, is_convex, outline_distance
+
+_FOOT_APART: Final = 0.011
+"""m between feet under an outline with notches, about."""
 
 
 def weighted_feet(plan: Plan) -> tuple[Array, Array]:
@@ -83,6 +88,8 @@ def _ring_feet(radius: float, rings: int = 4) -> tuple[Array, Array]:
 
 def _triangle_feet(shape: Prism) -> tuple[Array, Array]:
     corners = outline_of(shape)
+    if not is_convex(corners):
+        return _pieced_feet(shape)
     parts = math.ceil(math.sqrt(72 / len(corners)))
     places, shares = [], []
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
@@ -96,3 +103,28 @@ def _triangle_feet(shape: Prism) -> tuple[Array, Array]:
     feet, weights = np.array(places), np.array(shares) / np.sum(shares)
     lacking = gyration_squared(shape) / float(weights @ (feet**2).sum(axis=1))
     return feet * math.sqrt(lacking), weights
+
+
+def _pieced_feet(shape: Prism) -> tuple[Array, Array]:
+    """A grid in each rectangle that the lines through the corners cut out of an outline with right angles."""
+    corners = outline_of(shape)
+    xs, ys = np.unique(corners[:, 0]), np.unique(corners[:, 1])
+    places, shares = [], []
+    for x0, x1 in pairwise(xs.tolist()):
+        for y0, y1 in pairwise(ys.tolist()):
+            middle = np.array([[0.5 * (x0 + x1), 0.5 * (y0 + y1)]])
+            if outline_distance(corners, middle)[0] < 0.0:
+                feet = middle + _spread_grid(x1 - x0, y1 - y0, _FOOT_APART)
+                places.append(feet)
+                shares.append(np.full(len(feet), (x1 - x0) * (y1 - y0) / len(feet)))
+    weights = np.concatenate(shares)
+    return np.concatenate(places), weights / weights.sum()
+
+
+def _spread_grid(length_x: float, length_y: float, apart: float) -> Array:
+    """Middles of cells of a rectangle, spread so that their second moments are its own."""
+    axes = []
+    for side in (length_x, length_y):
+        n = max(2, round(side / apart))
+        axes.append(((np.arange(n) + 0.5) / n - 0.5) * side / math.sqrt(1.0 - 1.0 / n**2))
+    return np.column_stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")])

@@ -46,7 +46,7 @@ from physid_drake.run_folder import RunFolder, write_whole
 COMMAND: Final = "prove"
 """Whose the folder is, also one that is made by hand."""
 RECORDINGS: Final = "recordings"
-Kind: TypeAlias = Literal["none", "effect", "other", "pair"]
+Kind: TypeAlias = Literal["none", "effect", "other", "pair", "notched"]
 KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
 BLOCK: Final[tuple[Kind, ...]] = ("none",) * 5 + ("effect",) * 10 + ("other",) * 3 + ("pair",) * 2
 """Each twenty worlds are these, shuffled."""
@@ -67,11 +67,12 @@ _ATTEMPTS: Final = 4
 
 @dataclass(frozen=True, kw_only=True)
 class Assignment:
-    """What world ``index`` shall be: its kind, and the names of its effects."""
+    """What world ``index`` shall be: its kind, the names of its effects, and whether its object has notches."""
 
     index: int
     kind: Kind
     effects: tuple[str, ...]
+    notched: bool = False
 
 
 def assign(index: int, seed: int, kind: Kind | None = None, effect: str | None = None) -> Assignment:
@@ -80,9 +81,13 @@ def assign(index: int, seed: int, kind: Kind | None = None, effect: str | None =
     Args:
         index: of the world.
         seed: of the whole set.
-        kind: instead of the mix.
+        kind: instead of the mix; of ``notched``, objects are a T, an L or a plus, and worlds have one effect or none.
         effect: instead of taking effects in turn; for a pair, its first.
     """
+    if kind == "notched":
+        # Every fourth without an effect: what the outline alone does must be no mismatch.
+        plain = index % 4 == 3
+        return replace(assign(index, seed, "none" if plain else "effect", None if plain else effect), notched=True)
     block, within = divmod(index, len(BLOCK))
     kinds = [BLOCK[k] for k in np.random.default_rng([seed, block, 1]).permutation(len(BLOCK)).tolist()]
     if effect is not None and kind is None:
@@ -114,14 +119,14 @@ def make_world(
     Args:
         index: of the world.
         seed: of the whole set.
-        kind: none, effect, other or pair; None: by the mix.
+        kind: none, effect, other, pair or notched; None: by the mix.
         effect: name of the effect; None: in turn.
         name: of the world, on which nothing else depends; None: by its seed.
     """
     chosen = assign(index, seed, kind, effect)
     for attempt in range(_ATTEMPTS):
         rng = np.random.default_rng([seed, index, 4, attempt])
-        scene = draw_scene(rng)
+        scene = draw_scene(rng, notched=chosen.notched)
         effects, sizes = _draw_effects(rng, scene, chosen.effects)
         if all(size >= SMALLEST_SIZE for size in sizes) and _loaded(scene, effects) and stands(scene, effects):
             break

@@ -18,8 +18,9 @@ from physid_drake.prove.contact import IMPEDANCE, SCALE, SINKAGE, TIP_RATES, tip
 from physid_drake.prove.effects.effect import Effect, Moment
 from physid_drake.prove.feet import weighted_feet
 from physid_drake.prove.mujoco_xml import world_xml
-from physid_drake.prove.shapes import Array, distance_outside, gyration_squared, half_planes, height_of
+from physid_drake.prove.shapes import Array, distance_outside, gyration_squared, half_planes, height_of, nearest_face
 from physid_drake.prove.world_plan import GRAVITY, HandPath, Motion, Plan, Pose
+from physid_drake.recording import Prism, is_convex
 
 TIME_STEP: Final = 2e-4
 """s; the explicit dampers of feet and tip are chosen for it."""
@@ -82,6 +83,8 @@ class PushWorld:
         self._tip_geom = model.geom("tip").id
         self._tip_law = tip_law(plan)
         self._faces, self._reach = half_planes(plan.shape)
+        prism = plan.shape if isinstance(plan.shape, Prism) else None
+        self._notched = prism if prism is not None and not is_convex(prism.polygon) else None
         solid = 1.0 - (plan.slosh.fraction if plan.slosh is not None else 0.0)  # what a touch moves
         self._mobility = 1.0 / solid, 1.0 / (gyration_squared(plan.shape) * plan.inertia_ratio)
         gx, gy = self._to_simulation(*(GRAVITY * s for s in plan.tilt))
@@ -285,6 +288,8 @@ class PushWorld:
         if not self._faces:
             distance = max(math.hypot(dx, dy), 1e-9)
             outside, nx, ny = distance - reach, local[0] / distance, local[1] / distance
+        elif self._notched is not None:
+            outside, nx, ny = nearest_face(self._notched, *local)
         else:
             outside, nx, ny = max((nx * local[0] + ny * local[1] - offset, nx, ny) for nx, ny, offset in self._faces)
         if outside - self.plan.tip_radius >= 3.0 * self._dt * fast + 1e-5:

@@ -12,7 +12,7 @@ from physid_drake.errors import RecordingError
 from physid_drake.prove.feet import friction_that_lifts
 from physid_drake.prove.shapes import Array, Solid, height_of, outline_of
 from physid_drake.prove.world_plan import GRAVITY, HandPath, Plan, Pose
-from physid_drake.recording import Box, Cylinder, Prism, is_convex, polygon_centroid
+from physid_drake.recording import Box, Cylinder, Prism, is_convex, outline_distance, polygon_centroid
 
 Rng: TypeAlias = np.random.Generator
 
@@ -92,9 +92,9 @@ class Scene:
     stated_mass: float | None
 
 
-def draw_scene(rng: Rng) -> Scene:
-    """A world without effects."""
-    shape, mass = _draw_object(rng)
+def draw_scene(rng: Rng, *, notched: bool = False) -> Scene:
+    """A world without effects; its object may be one with notches."""
+    shape, mass = _draw_notched(rng) if notched else _draw_object(rng)
     most = min(0.5, 0.9 * friction_that_lifts(shape))
     plan = Plan(
         shape=shape,
@@ -138,6 +138,28 @@ def _draw_object(rng: Rng) -> tuple[Solid, float]:
             shape = Cylinder(radius=radius, length=round(radius * float(rng.uniform(0.8, 1.5)), 4), axis="z")
         else:
             shape = _draw_prism(rng, 3 if kind == "triangle" else 5)
+        if friction_that_lifts(shape) > 0.22:
+            return shape, mass
+
+
+def _draw_notched(rng: Rng) -> tuple[Solid, float]:
+    """A T, an L or a plus and its mass [kg]."""
+    while True:
+        mass = float(np.exp(rng.uniform(math.log(0.05), math.log(1.0))))
+        wide, thick, long = (float(rng.uniform(*of)) for of in ((0.09, 0.15), (0.025, 0.04), (0.05, 0.09)))
+        half, arm = 0.5 * wide, 0.5 * thick
+        outlines = {
+            "tee": [(-half, thick), (-half, 0), (-arm, 0), (-arm, -long), (arm, -long), (arm, 0), (half, 0),
+                    (half, thick)],
+            "ell": [(0, 0), (wide, 0), (wide, thick), (thick, thick), (thick, thick + long), (0, thick + long)],
+            "plus": [(arm, -half), (arm, -arm), (half, -arm), (half, arm), (arm, arm), (arm, half), (-arm, half),
+                     (-arm, arm), (-half, arm), (-half, -arm), (-arm, -arm), (-arm, -half)],
+        }  # fmt: skip
+        polygon = np.round(np.array(outlines[str(rng.choice(list(outlines)))]), 4)
+        polygon = np.round(polygon - polygon_centroid(polygon), 6)
+        shape = Prism(
+            polygon=tuple((x, y) for x, y in polygon.tolist()), height=round(float(rng.uniform(0.02, 0.04)), 3)
+        )
         if friction_that_lifts(shape) > 0.22:
             return shape, mass
 
@@ -213,7 +235,19 @@ def _draw_contact(rng: Rng, plan: Plan) -> tuple[Array, Array]:
     corners = outline_of(plan.shape)
     edges = np.roll(corners, -1, axis=0) - corners
     lengths = np.hypot(*edges.T)
-    k = int(rng.choice(len(corners), p=lengths / lengths.sum()))
-    inward = np.array([-edges[k, 1], edges[k, 0]]) / lengths[k]
-    aim = corners[k] + (0.5 + 0.3 * float(rng.uniform(-1.0, 1.0))) * edges[k]
-    return aim - plan.tip_radius * inward, inward
+    while True:
+        k = int(rng.choice(len(corners), p=lengths / lengths.sum()))
+        inward = np.array([-edges[k, 1], edges[k, 0]]) / lengths[k]
+        aim = corners[k] + (0.5 + 0.3 * float(rng.uniform(-1.0, 1.0))) * edges[k]
+        touch = aim - plan.tip_radius * inward
+        if is_convex(corners) or _is_free(corners, touch, inward, plan.tip_radius):
+            return touch, inward
+
+
+def _is_free(corners: Array, touch: Array, inward: Array, radius: float) -> bool:
+    """Whether a tip comes to its touch without meeting another face, by whatever heading and run-up."""
+    base = math.atan2(inward[1], inward[0])
+    ways = base + np.radians([-25.0, -12.0, 0.0, 12.0, 25.0])
+    back = np.linspace(0.004, 0.030, 14)
+    places = touch - back[:, None, None] * np.stack([np.cos(ways), np.sin(ways)], axis=1)
+    return bool((outline_distance(corners, places.reshape(-1, 2)) > radius + 5e-4).all())

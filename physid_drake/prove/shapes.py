@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TypeAlias
 
 import numpy as np
@@ -75,6 +76,20 @@ def distance_outside(shape: Solid, points: Array) -> Array:
         distances: Array = np.hypot(*points.T) - shape.radius
         return distances
     return outline_distance(outline_of(shape), points)
+
+
+def nearest_face(shape: Prism, x: float, y: float) -> tuple[float, float, float]:
+    """Distance of a point in B from the outline of a prism with notches [m], and the outward normal of that face."""
+    best, normal = math.inf, (1.0, 0.0)
+    corners = shape.polygon
+    for (ax, ay), (bx, by) in zip(corners, (*corners[1:], corners[0]), strict=True):
+        length = math.hypot(bx - ax, by - ay)
+        tx, ty = (bx - ax) / length, (by - ay) / length
+        along = min(max((x - ax) * tx + (y - ay) * ty, 0.0), length)
+        distance = math.hypot(x - ax - along * tx, y - ay - along * ty)
+        if distance < best:
+            best, normal = distance, (ty, -tx)
+    return best, *normal
 
 
 def half_planes(shape: Solid) -> tuple[list[tuple[float, float, float]], float]:

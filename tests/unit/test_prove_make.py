@@ -58,6 +58,7 @@ def test_the_mix_is_a_quarter_nothing_and_every_effect_has_its_turn():
         "effect": 100,
         "other": 30,
         "pair": 20,
+        "notched": 0,
     }
     assert {d.effects[0] for d in drawn if d.kind == "effect"} == set(fx.CATALOGUED)
     assert {d.effects[0] for d in drawn if d.kind == "other"} == set(fx.OTHERS)
@@ -68,7 +69,7 @@ def test_the_mix_is_a_quarter_nothing_and_every_effect_has_its_turn():
 @pytest.fixture
 def short_scenes(monkeypatch):
     """Two pushes a world: enough for what is written."""
-    monkeypatch.setattr(make, "draw_scene", lambda rng: _cut(draw_scene(rng)))
+    monkeypatch.setattr(make, "draw_scene", lambda rng, **kinds: _cut(draw_scene(rng, **kinds)))
 
 
 def _cut(scene):
@@ -203,3 +204,10 @@ def test_two_effects_that_set_an_object_going_before_the_hand_comes_make_no_worl
     push = SimpleNamespace(pose=(0.0, 0.0, 0.0), friction_factor=1.0)
     effects = [fx.CATALOGUED["table_tilt"](x=tilt, y=0.0), fx.CATALOGUED["friction_patch"](ratio=ratio, radius=1.0)]
     assert make.stands(SimpleNamespace(plan=PLAN, pushes=[push]), effects) is rests
+
+
+def test_worlds_with_notches_have_one_effect_or_none():
+    kinds = [make.assign(index, 5, "notched") for index in range(8)]
+    assert [one.kind for one in kinds] == ["effect", "effect", "effect", "none"] * 2
+    assert all(one.notched and len(one.effects) == (one.kind == "effect") for one in kinds)
+    assert not make.assign(0, 5, "effect").notched
