@@ -7,6 +7,7 @@ when it was opened. Without one, ``prove`` makes and diagnoses as many worlds as
 
 import argparse
 import json
+import statistics
 import subprocess
 import sys
 import tarfile
@@ -23,6 +24,7 @@ from physid_drake.prove.seal import SEALED, check_seal, read_seal
 from physid_drake.report.proof import MAIN, POWER, outcomes_in, said_of, truth_of
 
 FAULTS = ("world", "truth", "sigma", "said")
+LEVELS = (0.001, 0.01, 0.05, 0.1, 0.5)
 
 
 def main():
@@ -48,6 +50,15 @@ def main():
     console.print(shown(f"{len(outcomes)} worlds of {len(folders)} proofs", MAIN, table(figures)))
     console.print(shown("single effects by size", POWER, power_table(figures)))
     console.print(shown("answers that are not right", FAULTS, rows))
+    told = {name: answer for folder in folders for name, answer in answers(folder).items()}
+    chances = [told[o.id][0] for o in outcomes if o.kind == "none" and o.id in told]
+    below = ", ".join(f"below {a:g}: {sum(p < a for p in chances)}" for a in LEVELS)
+    console.print(f"p-values of {len(chances)} worlds without an effect: {below}")
+    for verdict in sorted({answer[1] for answer in told.values()}):
+        seconds = sorted(answer[2] for answer in told.values() if answer[1] == verdict)
+        console.print(
+            f"{verdict}: {statistics.median(seconds):.0f} s (median of {len(seconds)}), at most {seconds[-1]:.0f} s"
+        )
 
 
 def made(worlds, seed):
@@ -75,6 +86,22 @@ def archived(file):
             return outcomes_in(json.load(archive.extractfile("proof.json")))
     except (tarfile.TarError, KeyError, ValueError) as error:
         raise PhysidError(f"{file} is no archive with a proof.json ({error}).") from error
+
+
+def answers(folder):
+    """p-value, verdict and seconds of every world that has been diagnosed, by name."""
+    if folder.is_file():
+        with tarfile.open(folder) as archive:
+            files = {m.name: archive.extractfile(m).read() for m in archive if m.name.startswith("diagnoses/")}
+    else:
+        files = {str(f.relative_to(folder)): f.read_bytes() for f in (folder / "diagnoses").glob("*/*.json")}
+    found = {}
+    for name in {Path(file).parent for file in files}:
+        texts = [files.get(str(name / file)) for file in ("diagnosis.json", "attempt.json")]
+        if None not in texts:
+            said, attempt = map(json.loads, texts)
+            found[name.name] = said["p_value"], said["verdict"], attempt["seconds"]
+    return found
 
 
 def shown(title, headings, rows):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import warnings
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
@@ -102,11 +103,18 @@ def _run_convert(arguments: argparse.Namespace) -> int:
     else:
         recording = _published(arguments)
     print(f"{recording.name}: {len(recording.pushes)} pushes written to {arguments.folder}")
+    if arguments.layout in ("table", "bag"):
+        # Drake takes a second to import, which published layouts, whose frames are known, need not wait for.
+        from physid_drake.run_inspect import look  # noqa: PLC0415
+
+        for why in look(recording)[:1]:
+            warnings.warn(f"would be refused: {why}", UserWarning, stacklevel=1)
+        print(f"next: physid_drake inspect {arguments.folder}")
     return 0
 
 
 def _guess(arguments: argparse.Namespace) -> int:
-    from physid_drake.convert import guess_map  # noqa: PLC0415
+    from physid_drake.convert.guess import guess_map, is_bag  # noqa: PLC0415
     from physid_drake.report.inspection import log_table  # noqa: PLC0415
     from physid_drake.report.terminal import terminal  # noqa: PLC0415
 
@@ -114,6 +122,9 @@ def _guess(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"--guess is of table and bag: the layout of {arguments.layout} is known; leave it out.")
     if arguments.folder is not None:
         raise ConfigError("FOLDER is of a conversion: --guess writes no recording; leave it out.")
+    if is_bag(arguments.source) != (arguments.layout == "bag"):
+        other = "bag" if arguments.layout == "table" else "table"
+        raise ConfigError(f"'{arguments.source}': is no {arguments.layout}; use `convert {other}`.")
     if arguments.map is not None and arguments.map.exists():
         raise ConfigError(f"--map '{arguments.map}': is there; choose another name for the map that is guessed.")
     guess = guess_map(arguments.source)

@@ -10,8 +10,8 @@ from physid_drake.doctor import examined
 from physid_drake.errors import RecordingError
 from physid_drake.pushes.doubts import doubts
 from physid_drake.pushes.refusals import refusals
-from physid_drake.recording import read_recording, recording_folder
-from physid_drake.report.inspection import draw_pushes, inspection_table, warnings_by_kind
+from physid_drake.recording import Recording, read_recording, recording_folder
+from physid_drake.report.inspection import alike_as_one, draw_pushes, inspection_table, warnings_by_kind
 from physid_drake.report.picture import check_picture, write_picture
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.terminal import terminal
@@ -32,17 +32,28 @@ def run(arguments: argparse.Namespace) -> int:
     if picture is not None:
         write_picture(draw_pushes(recording), picture)
         print(f"drawn: {picture}")
-    refused = refusals(recording)
-    said = [*warnings_by_kind(recording), *doubts(recording), *(f"would be refused: {why}" for why in refused[1:])]
-    for line in said:
-        warnings.warn(line, UserWarning, stacklevel=1)
+    refused = look(recording)
     if not arguments.no_fit:
         with progress_bar(console) as tick:
             finding = examined(recording, tick)
         for line in finding.lines():
             warnings.warn(line, UserWarning, stacklevel=1)
-        if finding.before is not None and not finding.lines():
-            console.print(f"the plain cell, fitted roughly to some of the pushes, leaves {finding.before:.2g} sigma")
+        console.print(f"{finding.sentence()}.")
     if refused:
         raise RecordingError(refused[0])
     return 0
+
+
+def look(recording: Recording) -> tuple[str, ...]:
+    """Warns of what is odd about a recording, and of all but the first reason for which a diagnosis would refuse it.
+
+    Returns:
+        The reasons, those that are alike as one.
+    """
+    pushes = [push.name for push in recording.pushes]
+    refused = alike_as_one(refusals(recording), pushes)
+    for line in (*warnings_by_kind(recording), *doubts(recording)):
+        warnings.warn(line, UserWarning, stacklevel=2)
+    for line in refused[1:]:
+        warnings.warn(f"would be refused: {line}", UserWarning, stacklevel=2)
+    return tuple(refused)

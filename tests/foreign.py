@@ -340,7 +340,7 @@ def mcap(recording: Recording, folder: Path, storage: str = "mcap") -> str:
         DESCRIPTION.format(name="mug")
         + HAND
         + f"""\
-world: {{rotation_wxyz: {CAMERA.tolist()}, origin: {(-camera.inv().apply(CAMERA_PLACE)).tolist()}}}
+world: {{pose: {{translation: {CAMERA_PLACE.tolist()}, rotation_wxyz: {CAMERA.tolist()}}}}}
 object: {{topic: /tf, frame: mug}}
 hand: {{topic: /tf, frame: finger}}
 force: {{topic: /ft/wrench, axes: hand, acts_on: hand, weight_n: 2.0}}
@@ -349,8 +349,8 @@ pushes: {{cut: rest}}
     )
 
 
-CAMERA = np.array([0.0, np.sqrt(0.5), np.sqrt(0.5), 0.0])
-"""R_WC of a camera whose z points down and whose x is W's y."""
+CAMERA = np.round(np.roll(Rotation.from_euler("ZYX", [1.2, 0.1, np.pi - 0.2]).as_quat(), 1), 9)
+"""R_WC of a camera that looks down, somewhat aside."""
 CAMERA_PLACE = np.array([0.1, -0.2, 1.1])
 EPOCH = 1.75e9
 WEIGHT = np.array([0.0, 0.0, -2.0])

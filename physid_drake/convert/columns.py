@@ -27,6 +27,7 @@ class Columns:
         numbers: (n,) by name; NaN where a field is empty.
         texts: columns that hold what is no number, as it stands there.
         units: of the columns whose header states one.
+        length: the unit of all lengths, where the file's preamble states one.
         rows: (n,) the line of each row in a text, or its index, for messages.
     """
 
@@ -34,6 +35,7 @@ class Columns:
     numbers: Mapping[str, Array]
     texts: Mapping[str, Sequence[str]] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+    length: str | None = None
     rows: Sequence[int] = ()
 
     def names(self) -> list[str]:

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from physid_drake.convert.arrays import read_array_table
-from physid_drake.convert.bag import RECEIVE, STAMP, bag_files, read_bag
+from physid_drake.convert.bag import ENDINGS, RECEIVE, STAMP, bag_files, read_bag
 from physid_drake.convert.columns import Columns
 from physid_drake.convert.cutting import Piece, pieces_of, rows_by_value
 from physid_drake.convert.mapping import Clock, ForceMap, Map, Offset, PoseMap, Quantity, Turn, read_map
@@ -61,7 +61,12 @@ def convert_table(source: Path, folder: Path, map_file: Path) -> Recording:
         RecordingError: if source or map break a rule, or hold no push; nothing is written then.
         OutputError: if the folder cannot be written.
     """
-    files = source_files(Path(source), *TEXTS, *ARRAYS)
+    source = Path(source)
+    if not source.exists():
+        raise RecordingError(f"{named(source)}: there is no such file or folder.")
+    if source.is_dir() and any(file.suffix in ENDINGS for file in source.iterdir()):
+        raise RecordingError(f"{named(source)}: holds a bag; use `convert bag`.")
+    files = source_files(source, *TEXTS, *ARRAYS)
     return _convert(
         source, folder, map_file, files, lambda file, chart: _table_parts(read_columns(file, chart), chart)
     )

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from physid_drake.convert.bag import ENDINGS, RECEIVE, STAMP, TopicInfo, holds_numbers, read_bag, topics_of
 from physid_drake.convert.columns import Array, Columns
@@ -26,6 +27,15 @@ HAND_WORDS: Final = (
     "hand", "action", "tip", "finger", "tool", "tcp", "eef", "ee", "gripper", "pusher", "robot", "probe", "stylus",
 )  # fmt: skip
 PUSH_WORDS: Final = ("push", "episode", "trial", "run", "rep", "versuch", "segment")
+MOST_TURNS: Final = 2000
+"""Rotations that are looked at."""
+
+CLEARLY: Final = 0.3
+"""Of the turns about the vertical: by so much more, one order of a quaternion is the right one."""
+
+FAR_AWAY: Final = 0.3
+"""m from the table's top, along the vertical: the source's frame is that of a camera."""
+
 METRES, CENTIMETRES = 5.0, 60.0
 """Places on a table that are nowhere larger are in m, or in cm."""
 
@@ -47,6 +57,7 @@ class _Body:
     position: list[str] = field(default_factory=list)
     rotation: list[str] = field(default_factory=list)
     kind: str = "wxyz"
+    sure: bool = True
     force: list[str] = field(default_factory=list)
     unit: str | None = None
 
@@ -72,8 +83,12 @@ def guess_map(source: Path) -> Guess:
         RecordingError: if it cannot be read.
     """
     source = Path(source)
-    is_bag = source.suffix in ENDINGS or (source.is_dir() and any(f.suffix in ENDINGS for f in source.iterdir()))
-    return _guess_bag(source) if is_bag else _guess_table(source)
+    return _guess_bag(source) if is_bag(source) else _guess_table(source)
+
+
+def is_bag(source: Path) -> bool:
+    """Whether a file or a folder looks like a bag, by its endings."""
+    return source.suffix in ENDINGS or (source.is_dir() and any(f.suffix in ENDINGS for f in source.iterdir()))
 
 
 def _guess_table(source: Path) -> Guess:
@@ -174,9 +189,12 @@ def _bodies(columns: Columns) -> list[_Body]:
         body.position = body.position or place
         body.force = body.force or force
         if turn and not body.rotation:
-            body.rotation, body.kind = turn, _rotation_kind(turn, columns)
+            body.rotation = turn
         unit = next((units[name] for name in place if name in units), None)
         body.unit = body.unit or unit
+    for body in bodies.values():
+        if body.rotation:
+            body.kind, body.sure = _rotation_kind(body.rotation, body.position, columns)
     return [body for body in bodies.values() if body.position or body.force]
 
 
@@ -213,17 +231,43 @@ def _is_unit(names: Sequence[str], columns: Columns) -> bool:
     return len(values) > 0 and bool(np.median(np.abs(np.linalg.norm(values, axis=1) - 1.0)) < 0.02)
 
 
-def _rotation_kind(names: Sequence[str], columns: Columns) -> str:
+def _rotation_kind(names: Sequence[str], place: Sequence[str], columns: Columns) -> tuple[str, bool]:
+    """How a rotation is written, and whether that is sure."""
     if len(names) == 1:
-        return "yaw"
+        return "yaw", True
     if len(names) == 3:
-        return "euler" if re.search("roll|pitch|yaw", names[0], re.IGNORECASE) else "rotation_vector"
+        return ("euler" if re.search("roll|pitch|yaw", names[0], re.IGNORECASE) else "rotation_vector"), True
     if names[0].lower().rstrip("]").endswith("x"):
-        return "xyzw"
+        return "xyzw", True
     values = np.column_stack([columns.numbers[name] for name in names])
-    sizes = np.nanmedian(np.abs(values), axis=0)
-    # An upright body that turns about the vertical has two components near zero, and neither of them is w.
-    return "wxyz" if sizes[0] >= sizes[3] and sizes[1] < 0.3 else "xyzw"
+    values = values[np.isfinite(values).all(axis=1) & (values != 0.0).any(axis=1)][
+        :: max(1, len(values) // MOST_TURNS)
+    ]
+    up = _up_of(place, columns)
+    if len(values) < 2 or up is None:
+        return "wxyz", False
+    # What stands on a table turns about its normal alone: by the wrong order, it turns about other axes, too.
+    shares = {"wxyz": _share_about(up, np.roll(values, -1, axis=1)), "xyzw": _share_about(up, values)}
+    best = max(shares, key=lambda kind: shares[kind])
+    return best, abs(shares["wxyz"] - shares["xyzw"]) > CLEARLY
+
+
+def _share_about(up: int, quaternions: Array) -> float:
+    """Of all turns since the first, how much is about one axis; quaternions x, y, z, w."""
+    turns = (Rotation.from_quat(quaternions) * Rotation.from_quat(quaternions[0]).inv()).as_rotvec()
+    squares = (turns**2).sum(axis=0)
+    return float(squares[up] / max(float(squares.sum()), 1e-12))
+
+
+def _up_of(place: Sequence[str], columns: Columns) -> int | None:
+    """The axis along which a body hardly moves; None where no height was measured."""
+    if len(place) < 3:
+        return None
+    values = np.column_stack([columns.numbers[name] for name in place])
+    values = values[np.isfinite(values).all(axis=1)]
+    if not len(values):
+        return None
+    return int(np.argmin(np.quantile(values, 0.95, axis=0) - np.quantile(values, 0.05, axis=0)))
 
 
 def _roles(bodies: Sequence[_Body]) -> tuple[_Body | None, _Body | None, _Body | None]:
@@ -267,15 +311,19 @@ def _world_lines(body: _Body, columns: Columns) -> list[str]:
     """Which axis is up: the one along which the object hardly moves; where the table's top is nobody knows."""
     values = np.column_stack([columns.numbers[name] for name in body.position])
     values = LENGTHS[body.unit or "m"] * values[np.isfinite(values).all(axis=1)]
-    if values.shape[1] == 2 or not len(values):
+    up = _up_of(body.position, columns)
+    if up is None:
         return []
-    spans = np.quantile(values, 0.95, axis=0) - np.quantile(values, 0.05, axis=0)
-    up = int(np.argmin(spans))
     axes = {0: "[y, z, x]", 1: "[z, x, y]", 2: "[x, y, z]"}[up]
     height = float(np.median(values[:, up]))
     return [
         f"# {'xyz'[up]} of the object changes least, and is taken for up. It is {height:.4g} m: unless that is",
         "# how high the object's middle is above the table, give origin, too.",
+        *(
+            ["# So far away, the frame may be a camera's: then give its pose in W instead (world: {pose: ...})."]
+            if abs(height) > FAR_AWAY
+            else []
+        ),
         f"world: {{axes: {axes}}}",
     ]
 
@@ -305,7 +353,7 @@ def _pose_lines(key: str, body: _Body | None, columns: Columns, doubt: str) -> l
     if not body.rotation:
         lines.append("  rotation: none" + ("   # is it nowhere in the log?" if key == "object" else ""))
     elif body.kind in ("wxyz", "xyzw"):
-        other = "" if body.kind == "xyzw" else "   # or xyzw?"
+        other = "" if body.sure else "   # or " + {"wxyz": "xyzw", "xyzw": "wxyz"}[body.kind] + "?"
         lines.append(f"  rotation: {{columns: {_list(body.rotation)}, as: {body.kind}}}{other}")
     else:
         values = np.concatenate([columns.numbers[name] for name in body.rotation])

@@ -183,7 +183,7 @@ class World:
     Attributes:
         axes: (3, 3) A, turns the source's coordinates into some like W's; of determinant -1 where it is left-handed.
         origin: o, of W in the source's coordinates [m].
-        rotation: R as a quaternion, w first: what is left between these axes and W's, as of a tilted camera.
+        rotation: R as a quaternion, w first: turns the source's axes, once they are relabelled, into W's.
     """
 
     axes: Array = field(default_factory=lambda: np.eye(3))
@@ -364,7 +364,9 @@ def _whole(section: Section, key: str, least: int) -> int:
 
 
 def _world(section: Section) -> World:
-    section.check_keys("axes", "left_handed", "origin", "unit", "rotation_wxyz", "yaw_deg")
+    section.check_keys("axes", "left_handed", "origin", "unit", "rotation_wxyz", "yaw_deg", "pose")
+    if section.has("pose"):
+        return _world_by_pose(section)
     axes = _axes(section) if section.has("axes") else np.eye(3)
     left = _truth(section, "left_handed")
     if (np.linalg.det(axes) < 0.0) != left:
@@ -378,6 +380,18 @@ def _world(section: Section) -> World:
     return World(
         axes=axes, origin=(scale * origin[0], scale * origin[1], scale * origin[2]), rotation=_rotation(section)
     )
+
+
+def _world_by_pose(section: Section) -> World:
+    """The source's frame, as a camera's, by its pose in W: p_W = R p_S + t."""
+    for key in section.values:
+        if key != "pose":
+            raise section.refuse(str(key), "stands beside pose, which says all; remove one of them.")
+    pose = cast(Section, section.section("pose"))
+    pose.check_keys("translation", "unit", "rotation_wxyz", "yaw_deg")
+    place, turn = np.multiply(_factor(pose, LENGTHS, "m"), pose.numbers("translation", 3)), _rotation(pose)
+    origin = -Rotation.from_quat(np.roll(turn, -1)).inv().apply(place)
+    return World(origin=(float(origin[0]), float(origin[1]), float(origin[2])), rotation=turn)
 
 
 def _axes(section: Section) -> Array:
@@ -456,7 +470,7 @@ def _turn(section: Section) -> Turn | None:
     inner.check_keys("columns", "as", "unit", "order", "inverse")
     kind = inner.choice("as", *ROTATIONS) if inner.has("as") else "wxyz"
     columns = _names(inner, COUNTS[kind]) if inner.has("columns") else ()
-    order = inner.text("order", "XYZ")
+    order = inner.text("order") if kind == "euler" else "XYZ"
     if kind == "euler" and (sorted(order.lower()) != sorted(set(order.lower())) or _bad_order(order)):
         raise inner.refuse("order", f"must be such as XYZ (about the body's axes) or xyz, but got {shown(order)}.")
     return Turn(

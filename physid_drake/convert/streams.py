@@ -31,6 +31,9 @@ BEFORE: Final = 0.3
 AFTER: Final = 1.0
 """s: a hand of which only the ends are known rests for so long before it goes, and the object comes to rest in."""
 
+MOST_ANGLE: Final = 6.5
+"""rad: no Euler angle or rotation vector is larger than a whole turn."""
+
 STEP: Final = 0.01
 """s between samples of such a hand."""
 
@@ -214,6 +217,8 @@ def _scaled(columns: Columns, quantity: Quantity, kind: Mapping[str, float], def
     values = columns.stack(quantity.columns)
     names = [columns.find(name) for name in quantity.columns]
     stated = {columns.units[name] for name in names if name in columns.units}
+    if kind is LENGTHS and not stated and columns.length is not None:
+        stated = {columns.length}
     if quantity.unit is None and len(stated) > 1:
         raise RecordingError(f"its columns are in {' and '.join(sorted(stated))}; give columns of one unit.")
     unit = quantity.unit or next(iter(stated), default)
@@ -233,6 +238,9 @@ def _rotation(columns: Columns, turn: Turn, values: Array, chart: Map) -> Rotati
     unit = turn.unit or (stated if stated in ANGLES else None)
     if unit is None and turn.kind not in ("wxyz", "xyzw"):
         raise RecordingError("rotation: angles need a unit, rad or deg; add it.")
+    largest = float(np.abs(values).max(initial=0.0))
+    if unit == "rad" and turn.kind in ("euler", "rotation_vector") and largest > MOST_ANGLE:
+        raise RecordingError(f"rotation: angles are said to be in rad, but one is {largest:.4g}; are they in deg?")
     return rotation_of(turn, values, ANGLES[unit or "rad"], chart.world)
 
 

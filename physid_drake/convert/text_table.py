@@ -10,8 +10,9 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -28,6 +29,9 @@ MOST_CELLS: Final = 40_000_000
 """Of a table: an hour of thirty columns at 360 Hz."""
 
 SEPARATORS: Final = (",", ";", "\t", "|", " ")
+HEAD: Final = 20_000
+"""Characters at the head of a file, in which its preamble is."""
+
 LOOKED_AT: Final = 400
 """Lines at the head of a file that tell its separator and header."""
 
@@ -99,7 +103,13 @@ def read_text_table(path: Path, dialect: Dialect | None = None) -> Columns:
     widths = [len(row) for row in body.fields]
     width = max([max(set(widths), key=widths.count), *map(len, header)])
     names, units = _names(header, width)
-    return _columns(where, names, units, body, decimal)
+    return replace(_columns(where, names, units, body, decimal), length=_length_unit(text))
+
+
+def _length_unit(text: str) -> str | None:
+    """What a preamble says of lengths, as Motive does: ``Length Units,Millimeters``."""
+    said = re.search(r"length\s+units?\W+(milli|centi)?met(?:er|re)s?\b", text[:HEAD], re.IGNORECASE)
+    return None if said is None else {"milli": "mm", "centi": "cm"}.get((said[1] or "").lower(), "m")
 
 
 def _decoded(content: bytes, encoding: str | None) -> str:
@@ -114,7 +124,7 @@ def _decoded(content: bytes, encoding: str | None) -> str:
         except UnicodeDecodeError as error:
             raise FileError("cannot be read: it begins like UTF-16, but is not") from error
     if b"\0" in content[:4096]:
-        raise FileError("cannot be read: it is no text; is it a spreadsheet's or a program's own file?")
+        raise FileError("cannot be read: it is no text; it is a spreadsheet's or a program's own file")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -106,8 +106,14 @@ def confirmed(found: Found, one: Weighed, beside: Weighed | None = None) -> bool
     """Whether pushes that were left out confirm what a hypothesis has beside another, or beside the baseline.
 
     Its gain is compared with what such an effect gains by chance; that of what has no name with the effect that
-    gains most.
+    gains most. Two effects gain more by chance than one, so that of two one alone has to be confirmed, too.
     """
+    if beside is None and len(kinds_of(one)) > 1:
+        alone = [
+            single for single in found.named if len(kinds_of(single)) == 1 and kinds_of(single)[0] in kinds_of(one)
+        ]
+        if not any(confirmed(found, single) for single in alone):
+            return False
     gained = without_best(one.gains if beside is None else one.gains - beside.gains)[None]
     present = () if beside is None else kinds_of(beside)
     names = [kind.name for kind in kinds_of(one) if kind not in present and kind.name in found.by_chance]

@@ -61,7 +61,7 @@ class Convention:
 
 
 def conventions_of(recording: Recording) -> Iterator[Convention]:
-    """Everything that may be wrong with a recording, one at a time."""
+    """Everything that may be wrong with places, turns, sizes and clocks, one at a time."""
     yield from _rotations(recording)
     if recording.hand is not None:
         yield from _axes(recording)
@@ -69,9 +69,19 @@ def conventions_of(recording: Recording) -> Iterator[Convention]:
         yield from _clocks(recording)
         yield from _shifts(recording)
     yield from _sizes_of_object(recording)
-    if any(push.force is not None for push in recording.pushes):
-        yield from _forces(recording)
-        yield from _masses(recording)
+
+
+def conventions_of_forces(recording: Recording) -> Iterator[Convention]:
+    """What may be wrong with forces, and with the mass, which forces alone tell."""
+    yield from _forces(recording)
+    yield from _masses(recording)
+
+
+def without_forces(recording: Recording) -> Recording:
+    """The recording without its forces; itself where there are none."""
+    if all(push.force is None for push in recording.pushes):
+        return recording
+    return _each(recording, lambda push: replace(push, force=None))
 
 
 def gap_of(recording: Recording) -> float:
@@ -314,6 +324,11 @@ def _shift(recording: Recording, change: Callable[..., Push]) -> Array | None:
 
 
 def _forces(recording: Recording) -> Iterator[Convention]:
+    yield Convention(
+        says="the force is that of the object on the hand",
+        remedy="map: force: acts_on: hand",
+        recording=_each(recording, partial(_scaled, factor=-1.0)),
+    )
     factors: Sequence[tuple[float, str]] = (
         (1e-3, "mN"), (1e3, "kN"), (EARTH, "kgf"), (1e-3 * EARTH, "gf"), (POUND * EARTH, "lbf"),
     )  # fmt: skip

@@ -7,7 +7,13 @@ from typing import Final
 
 import numpy as np
 
-from physid_drake.doctor.conventions import Convention, conventions_of, gap_of
+from physid_drake.doctor.conventions import (
+    Convention,
+    conventions_of,
+    conventions_of_forces,
+    gap_of,
+    without_forces,
+)
 from physid_drake.errors import PhysidError
 from physid_drake.identify.baseline import plain
 from physid_drake.inference.fit import Fitter
@@ -27,6 +33,8 @@ ALIKE: Final = 1.3
 """Times: conventions that fit as well as the best one."""
 NEAR: Final = 3e-3
 """m between tip and object as it is pushed: a convention by which it is so near is fitted."""
+HAND_NOISE: Final = 3e-4
+"""m: the hand's path is followed no better than that. A finer one has many more knots, and tells no frames."""
 STARTS: Final = 32
 STEPS: Final = 6
 
@@ -52,9 +60,24 @@ class Finding:
         if self.after is None:
             return []
         instead = "instead of being refused" if self.before is None else f"instead of {self.before:.3g}"
-        return [
+        lines = [
             f"the pushes fit to {self.after:.2g} sigma {instead} if {one.says} ({one.remedy})" for one in self.better
         ]
+        if len(lines) > 1:
+            lines.append(
+                "these fit alike, and pushes do not tell them apart: look at which way the object really turned"
+            )
+        return lines
+
+    def sentence(self) -> str:
+        """What came of it."""
+        if self.before is None:
+            left = "some of the pushes cannot be fitted as they are"
+        else:
+            left = f"the plain cell, fitted roughly to some of the pushes, leaves {self.before:.3g} sigma"
+        if self.better or (self.before is not None and self.before < FAR):
+            return left
+        return f"{left}; no other convention that was tried makes them fit"
 
 
 def examined(recording: Recording, tick: Progress | None = None) -> Finding:
@@ -68,7 +91,13 @@ def examined(recording: Recording, tick: Progress | None = None) -> Finding:
     before, refused = _left(few)
     if before is not None and before < FAR:
         return Finding(before=before)
-    tried = _likely(list(conventions_of(few)))
+    # What is said of forces may be wrong beside what is said of places: these are asked first, and alone.
+    unforced = without_forces(few)
+    placed, _ = (before, refused) if unforced is few else _left(unforced)
+    if unforced is not few and placed is not None and placed < FAR:
+        tried = list(conventions_of_forces(few))
+    else:
+        before, tried = placed, _likely(list(conventions_of(unforced)))
     found: list[tuple[float, Convention]] = []
     for k, convention in enumerate(tried):
         if tick is not None:
@@ -88,7 +117,9 @@ def _few(recording: Recording) -> Recording:
     ways = [float(np.hypot(*np.ptp(push.object.planar[:, :2], axis=0))) for push in recording.pushes]
     moving = [k for k, way in enumerate(ways) if way > 0.2 * float(np.median(ways))]
     chosen = np.unique(np.linspace(0, len(moving) - 1, min(PUSHES, len(moving))).round().astype(int))
-    return recording.subset([moving[k] for k in chosen])
+    sensors = recording.sensors
+    stated = max(sensors.hand_position_std or 0.0, HAND_NOISE)
+    return replace(recording.subset([moving[k] for k in chosen]), sensors=replace(sensors, hand_position_std=stated))
 
 
 def _likely(conventions: list[Convention]) -> list[Convention]:

@@ -82,6 +82,17 @@ def warnings_by_kind(recording: Recording) -> list[str]:
     return lines if hidden <= 1 else [*lines[: MOST_KINDS - 1], f"and {hidden} more kinds of warnings."]
 
 
+def alike_as_one(lines: Sequence[str], pushes: Sequence[str]) -> list[str]:
+    """Lines that are alike but for a push's name and numbers, as the first of them and how many more there are."""
+    kinds: dict[str, list[str]] = {}
+    for line in lines:
+        general = line
+        for push in pushes:
+            general = general.replace(push, "")
+        kinds.setdefault(re.sub(r"[-+.\d]+(e[-+]\d+)?", "", general), []).append(line)
+    return [said[0] if len(said) == 1 else f"{said[0]} (and {len(said) - 1} more pushes)" for said in kinds.values()]
+
+
 def draw_pushes(recording: Recording) -> Figure:
     """All pushes from above, in m: outline at start (faint) and end, path of object and hand.
 

@@ -19,7 +19,7 @@ from physid_drake.recording import (
     planar_poses,
     write_recording,
 )
-from physid_drake.report.inspection import draw_pushes
+from physid_drake.report.inspection import alike_as_one, draw_pushes
 
 COLUMNS = (
     "start_object_x_m,start_object_y_m,start_object_yaw_rad,end_object_x_m,end_object_y_m,end_object_yaw_rad,"
@@ -154,6 +154,12 @@ def test_axes_are_equal_and_in_metres():
     axes = draw_pushes(some_recording(20)).axes[0]
     assert axes.get_aspect() == 1.0
     assert axes.get_xlabel() == "x [m]" and axes.get_ylabel() == "y [m]"
+
+
+def test_what_is_refused_of_many_pushes_is_said_once():
+    names = [f"pushes/{k:03d}.csv" for k in range(1, 22)]
+    lines = [f"push '{name}': the hand is {k}.5 mm above" for k, name in enumerate(names)]
+    assert alike_as_one([*lines, "another"], names) == [f"{lines[0]} (and 20 more pushes)", "another"]
 
 
 def rounded(recording, step, turn):

@@ -8,6 +8,7 @@ from pathlib import Path
 import foreign
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from physid_drake.convert import convert_table, guess_map
 from physid_drake.convert.conventions import forces_in_world, places_in_world, rotation_of, rotations_in_world
@@ -211,6 +212,18 @@ class TestConventions:
     def test_forces(self, force: ForceMap, felt: list[float], on_object: list[float]) -> None:
         assert forces_in_world(np.array([felt]), force, None, World())[0] == pytest.approx(on_object, abs=1e-12)
 
+    def test_a_cameras_pose(self, tmp_path: Path) -> None:
+        """p_W = R p_S + t, R_W = R R_S."""
+        turn = Rotation.from_euler("ZYX", [0.3, -0.2, 2.9])
+        w, x, y, z = np.roll(turn.as_quat(), 1).tolist()
+        pose = f"world: {{pose: {{translation: [10, 20, 110], unit: cm, rotation_wxyz: [{w}, {x}, {y}, {z}]}}}}"
+        (tmp_path / "map.yaml").write_text(f"{MAP}{pose}\n")
+        world = read_map(tmp_path / "map.yaml").world
+        point = np.array([[0.3, -0.1, 0.9]])
+        assert places_in_world(point, world) == pytest.approx(turn.apply(point) + np.array([0.1, 0.2, 1.1]))
+        body = Rotation.from_euler("z", 0.5)
+        assert (rotations_in_world(body, world) * (turn * body).inv()).magnitude() < 1e-9
+
     def test_an_inverse_rotation_is_turned_back(self) -> None:
         values = np.array([[np.cos(0.3), 0.0, 0.0, np.sin(0.3)]])
         there = rotation_of(Turn(), values, 1.0, World())
@@ -246,6 +259,8 @@ class TestRefusals:
             ("time: {column: t}", "pushes: {cut: times, times_s: [[5, 6]]}\ntime: {column: t}", "no push was found"),
             ("time: {column: t}", "force: {columns: [hx, hy], tare_s: 9}\ntime: {column: t}", "is longer than the"),
             ("hand: {position", "hand: {offset: {translation: [1, 0, 0]}, position", "its rotation was not measured"),
+            ("yaw, as: yaw, unit: rad", "[x, y, yaw], as: euler, unit: rad", "order: is required"),
+            ("time: {column: t}", "world: {pose: {translation: [0, 0, 1]}, axes: [x, y, z]}", "stands beside pose"),
             ("  hand: {tip", "  Hand: {tip", "unknown key; the keys here are name"),
             ("time: {column: t}", "pushes: {cut: rows}\ntime: {column: t}", "object: needs start and end"),
             ("time: {column: t}", "", "there are no times; name their column"),
@@ -276,6 +291,31 @@ class TestRefusals:
             self.convert(tmp_path, MAP.replace("columns: [x, y]", "columns: [x, y], unit: m"), table)
         found = self.convert(tmp_path, MAP, table)
         assert found.pushes[0].object.positions[-1, 0] == pytest.approx(8e-6)
+
+    def test_motives_preamble_states_the_unit(self, tmp_path: Path) -> None:
+        table = "Format Version,1.23,Length Units,Millimeters\n\n" + TABLE
+        with pytest.raises(RecordingError, match="the map says m, but the table's header says mm"):
+            self.convert(tmp_path, MAP.replace("columns: [x, y]", "columns: [x, y], unit: m"), table)
+        found = self.convert(tmp_path, MAP, table)
+        assert found.pushes[0].object.positions[-1, 0] == pytest.approx(8e-6)
+
+    def test_degrees_that_are_called_rad(self, tmp_path: Path) -> None:
+        chart = MAP.replace(
+            "columns: yaw, as: yaw, unit: rad", "columns: [yaw, y, x], as: euler, order: ZYX, unit: rad"
+        )
+        table = TABLE.replace(",0,0,", ",0,-170,")
+        with pytest.raises(RecordingError, match=r"said to be in rad, but one is 170; are they in deg\?"):
+            self.convert(tmp_path, chart, table)
+
+    @pytest.mark.parametrize(
+        ("name", "said"), [("nothing.csv", "there is no such file or folder"), ("bag", "convert bag")]
+    )
+    def test_a_source_that_is_no_table(self, name: str, said: str, tmp_path: Path) -> None:
+        (tmp_path / "bag").mkdir()
+        (tmp_path / "bag/x.mcap").write_bytes(b"")
+        (tmp_path / "map.yaml").write_text(MAP)
+        with pytest.raises(RecordingError, match=said):
+            convert_table(tmp_path / name, tmp_path / "out", tmp_path / "map.yaml")
 
     def test_a_hdf5_link_is_not_followed(self, tmp_path: Path) -> None:
         h5py = pytest.importorskip("h5py")

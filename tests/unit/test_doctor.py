@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from physid_drake.doctor import examined
-from physid_drake.doctor.conventions import conventions_of, gap_of
+from physid_drake.doctor.conventions import conventions_of, conventions_of_forces, gap_of
 from physid_drake.recording import Box, Cylinder, ForceStream, Push, Recording, read_recording
 
 RECORDINGS = Path(__file__).parents[2] / "recordings"
@@ -107,7 +107,8 @@ def test_physics_that_is_missing_is_no_wrong_convention() -> None:
 
 def test_every_convention_is_another_recording(eraser: Recording) -> None:
     forced = each(eraser, with_forces)
-    found = list(conventions_of(replace(forced, object=replace(forced.object, mass=0.05, mass_std=0.001))))
+    weighed = replace(forced, object=replace(forced.object, mass=0.05, mass_std=0.001))
+    found = [*conventions_of(weighed), *conventions_of_forces(weighed)]
     assert len({one.says for one in found}) == len(found) > 25
     assert all(one.recording != forced and one.remedy for one in found)
     assert {one.says for one in found} >= {
@@ -115,6 +116,31 @@ def test_every_convention_is_another_recording(eraser: Recording) -> None:
         "the mass is in lb",
         "the object's size_m are half sizes",
     }
+
+
+@pytest.mark.slow
+def test_a_force_of_the_other_sign_is_told_from_a_mirror(eraser: Recording) -> None:
+    """A mirrored world would turn the force's work as well: places are asked without forces."""
+    forces = each(eraser, with_friction)
+    assert examined(forces).lines() == []
+    (one,) = examined(each(forces, pulled)).better
+    assert one.says == "the force is that of the object on the hand"
+    said = [one.says for one in examined(each(forces, lambda push: pulled(inverted(push)))).better]
+    assert any(one.startswith("the object's rotations turn the other way") for one in said)
+
+
+def with_friction(push: Push) -> Push:
+    """What it takes to push it steadily: friction along its way."""
+    times = push.object.times
+    velocity = np.gradient(push.object.positions, times, axis=0)
+    speed = np.linalg.norm(velocity, axis=1, keepdims=True)
+    forces = 0.27 * 0.054 * 9.81 * velocity / np.maximum(speed, 0.02)
+    return replace(push, force=ForceStream(times=times, forces=forces))
+
+
+def pulled(push: Push) -> Push:
+    assert push.force is not None
+    return replace(push, force=replace(push.force, forces=-push.force.forces))
 
 
 def with_forces(push: Push) -> Push:
