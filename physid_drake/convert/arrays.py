@@ -43,6 +43,8 @@ def read_array_table(path: Path) -> Columns:
     read = _READERS[path.suffix.lower()]
     try:
         arrays = read(path)
+    except RecordingError:
+        raise
     except FileError as error:
         raise RecordingError(f"{named(path)}: {error}.") from error
     except _BROKEN as error:

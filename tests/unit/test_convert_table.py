@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -316,6 +317,19 @@ class TestRefusals:
         (tmp_path / "map.yaml").write_text(MAP)
         with pytest.raises(RecordingError, match=said):
             convert_table(tmp_path / name, tmp_path / "out", tmp_path / "map.yaml")
+
+    @pytest.mark.parametrize(("name", "package"), [("x.parquet", "pyarrow"), ("x.h5", "h5py")])
+    def test_what_reads_it_is_not_installed(
+        self, name: str, package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setitem(sys.modules, package, None)
+        monkeypatch.setitem(sys.modules, f"{package}.parquet", None)
+        (tmp_path / name).write_bytes(b"x")
+        (tmp_path / "map.yaml").write_text(MAP)
+        with pytest.raises(RecordingError) as caught:
+            convert_table(tmp_path / name, tmp_path / "out", tmp_path / "map.yaml")
+        assert f"needs {package}, which is not installed" in str(caught.value)
+        assert "damaged" not in str(caught.value)
 
     def test_a_hdf5_link_is_not_followed(self, tmp_path: Path) -> None:
         h5py = pytest.importorskip("h5py")
