@@ -100,14 +100,9 @@ def _crossing(vertices: Array) -> tuple[int, int] | None:
     n = len(vertices)
     for i in range(n):
         for j in range(i + 2, n - (i == 0)):
-            ends = vertices[[i, (i + 1) % n, j, (j + 1) % n]]
-            sides = [
-                _side(*ends[[0, 1, 2]]),
-                _side(*ends[[0, 1, 3]]),
-                _side(*ends[[2, 3, 0]]),
-                _side(*ends[[2, 3, 1]]),
-            ]
-            if sides[0] * sides[1] <= 0.0 and sides[2] * sides[3] <= 0.0 and any(sides):
+            a, b, c, d = vertices[[i, (i + 1) % n, j, (j + 1) % n]]
+            across = _side(a, b, c) * _side(a, b, d), _side(c, d, a) * _side(c, d, b)
+            if max(across) <= 0.0 and _overlap(a, b, c, d):
                 return i, j
     return None
 

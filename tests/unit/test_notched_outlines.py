@@ -113,6 +113,7 @@ def test_the_solid_of_a_tee() -> None:
         (TEE[::-1], "must be counter-clockwise, but it is clockwise"),
         ([*TEE[:1], *TEE], "no repeated or collinear vertices"),
         (np.vstack([TEE[:2], [0.5 * (TEE[1] + TEE[2])], TEE[2:]]), "no repeated or collinear vertices"),
+        ([[0, 0], [3, 0], [3, 1], [2, 1], [2, 0], [1, 0], [1, 1], [0, 1]], "must not cross or touch itself"),
         (TEE + 0.01, "must have its centroid at the origin"),
         (centred([[0, 0], [4, 0], [4, 4], [2, 0.0], [0, 4]]) * 0.02, "must not cross or touch itself"),
     ],
