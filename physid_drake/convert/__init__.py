@@ -2,6 +2,7 @@
 
 from physid_drake.convert.convert import convert_bag, convert_table
 from physid_drake.convert.guess import Guess, guess_map
-from physid_drake.convert.mapping import Map, read_map
+from physid_drake.convert.map_reading import read_map
+from physid_drake.convert.mapping import Map
 
 __all__ = ["Guess", "Map", "convert_bag", "convert_table", "guess_map", "read_map"]

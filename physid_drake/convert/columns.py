@@ -38,10 +38,6 @@ class Columns:
     length: str | None = None
     rows: Sequence[int] = ()
 
-    def names(self) -> list[str]:
-        """Of all columns that hold numbers, in their order."""
-        return list(self.numbers)
-
     def find(self, name: str) -> str:
         """The column that a map means: by its whole name, or by the end of it where only one has that end.
 

@@ -16,7 +16,8 @@ from physid_drake.convert.arrays import read_array_table
 from physid_drake.convert.bag import ENDINGS, RECEIVE, STAMP, bag_files, read_bag
 from physid_drake.convert.columns import Columns
 from physid_drake.convert.cutting import Piece, pieces_of, rows_by_value
-from physid_drake.convert.mapping import Clock, ForceMap, Map, Offset, PoseMap, Quantity, Turn, read_map
+from physid_drake.convert.map_reading import read_map
+from physid_drake.convert.mapping import Clock, ForceMap, Map, Offset, PoseMap, Quantity, Turn
 from physid_drake.convert.mesh import prism_of
 from physid_drake.convert.streams import Streams, end_streams, streams_of
 from physid_drake.convert.text_table import read_text_table

@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from physid_drake.convert import convert_table, guess_map
 from physid_drake.convert.conventions import forces_in_world, places_in_world, rotation_of, rotations_in_world
-from physid_drake.convert.mapping import ForceMap, Offset, Turn, World, read_map
+from physid_drake.convert.map_reading import read_map
+from physid_drake.convert.mapping import ForceMap, Offset, Turn, World
 from physid_drake.convert.text_table import read_text_table
 from physid_drake.errors import RecordingError
 from physid_drake.recording import Recording, read_recording

@@ -1,0 +1,403 @@
+"""Reads a map: every key is checked, and what breaks a rule is refused by file, line and key."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Final, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from physid_drake.convert.mapping import (
+    COUNTS,
+    CUTS,
+    FORMAT,
+    NORM_TOLERANCE,
+    ROTATIONS,
+    Clock,
+    Cut,
+    ForceMap,
+    Map,
+    MeshFrame,
+    MeshMap,
+    Offset,
+    PoseMap,
+    Quantity,
+    Turn,
+    World,
+)
+from physid_drake.convert.text_table import Dialect
+from physid_drake.convert.units import ANGLES, FORCES, LENGTHS, SPEEDS, TIMES, factor
+from physid_drake.recording import ObjectModel
+from physid_drake.recording.description import (
+    Section,
+    hand_from,
+    inside,
+    load_section,
+    object_from,
+    sensors_from,
+    table_from,
+)
+from physid_drake.wording import shown
+
+Array = NDArray[np.float64]
+_T = TypeVar("_T")
+
+_TOP_KEYS: Final = ("format", "recording", "source", "world", "time", "object", "hand", "force", "pushes")
+
+
+def read_map(file: Path) -> Map:
+    """Reads a map.
+
+    Args:
+        file: of YAML, in the format ``physid-map/1``.
+
+    Raises:
+        RecordingError: if it cannot be read or breaks a rule; one line that names file, line and key.
+    """
+    file = Path(file)
+    top = load_section(file, FORMAT, _TOP_KEYS)
+    described = cast(Section, top.section("recording"))
+    described.check_keys("name", "description", "object", "table", "hand", "sensors")
+    hand = hand_from(described)
+    path = _maybe(top, "hand", _pose)
+    force = _maybe(top, "force", _force)
+    body, cut = _pose(cast(Section, top.section("object"))), _maybe(top, "pushes", _cut) or Cut()
+    _check_rows(top, body, path, force, cut)
+    if (hand is None) != (path is None):
+        missing, there = ("recording.hand", "hand") if hand is None else ("hand", "recording.hand")
+        raise top.refuse(missing, f"is missing, but there is {there}; give both or neither.")
+    if force is not None and path is None:
+        raise top.refuse("force", "needs a hand; add hand and recording.hand.")
+    return Map(
+        file=file,
+        name=described.text("name"),
+        description=described.text("description", ""),
+        model=_model(described, file.parent),
+        table=table_from(described),
+        hand=hand,
+        sensors=sensors_from(described),
+        dialect=_maybe(top, "source", _dialect) or Dialect(),
+        by_receive=_by_receive(top),
+        world=_maybe(top, "world", _world) or World(),
+        clock=_maybe(top, "time", _clock) or Clock(),
+        object=body,
+        hand_path=path,
+        force=force,
+        cut=cut,
+    )
+
+
+def _model(described: Section, folder: Path) -> ObjectModel | MeshMap:
+    """The object; a mesh is looked at when the log is converted."""
+    section = cast(Section, described.section("object"))
+    if section.values.get("shape") != "mesh":
+        return object_from(described, folder)
+    section.check_keys("shape", "file", "unit", "up", "frame", "mass_kg", "mass_std_kg")
+    name = section.text("file")
+    file = inside(folder, name)
+    if file is None:
+        raise section.refuse("file", f"must lie in the map's folder, but got {shown(name)}; move it.")
+    frame = section.section("frame", required=False)
+    if frame is not None:
+        frame.check_keys("translation", "rotation_wxyz", "yaw_deg")
+    place = frame.numbers("translation", 3) if frame is not None and frame.has("translation") else (0.0, 0.0, 0.0)
+    up = section.choice("up", "x", "y", "z") if section.has("up") else "z"
+    return MeshMap(
+        file=file,
+        scale=_factor(section, LENGTHS, "m"),
+        frame=MeshFrame(
+            axes=np.roll(np.eye(3), "zxy".index(up), axis=1),
+            translation=(place[0], place[1], place[2]),
+            rotation=(1.0, 0.0, 0.0, 0.0) if frame is None else _rotation(frame),
+        ),
+        mass=section.maybe_number("mass_kg"),
+        mass_std=section.maybe_number("mass_std_kg"),
+    )
+
+
+def _check_rows(top: Section, body: PoseMap, path: PoseMap | None, force: ForceMap | None, cut: Cut) -> None:
+    """Where a row is a push, its first and last poses are given, and how fast the hand was; nowhere else."""
+    for key, pose in (("object", body), ("hand", path)):
+        if pose is not None and (pose.end is not None) != (cut.by == "rows"):
+            rule = "needs start and end" if cut.by == "rows" else "has start and end, which are of cut: rows"
+            raise top.refuse(key, f"{rule}; correct one of them.")
+    if cut.by == "rows" and path is not None and path.speed is None:
+        raise top.refuse("hand", "needs speed [m/s], or its column: nobody could tell how fast the push was.")
+    if cut.by == "rows" and force is not None:
+        raise top.refuse("force", "is of logs with times; leave it out with cut: rows.")
+
+
+def _maybe(top: Section, key: str, read: Callable[[Section], _T]) -> _T | None:
+    section = top.section(key, required=False)
+    return None if section is None else read(section)
+
+
+def _dialect(section: Section) -> Dialect:
+    section.check_keys("separator", "decimal", "header_lines", "skip_lines", "encoding", "section", "stamp")
+    separator = section.text("separator") if section.has("separator") else None
+    if separator is not None and len(separator) != 1:
+        raise section.refuse("separator", f'must be one character, but got {shown(separator)}; write a tab as "\\t".')
+    return Dialect(
+        separator=separator,
+        decimal=section.choice("decimal", ".", ",") if section.has("decimal") else None,
+        header_lines=_whole(section, "header_lines", 0) if section.has("header_lines") else None,
+        skip_lines=_whole(section, "skip_lines", 0) if section.has("skip_lines") else 0,
+        encoding=section.text("encoding") if section.has("encoding") else None,
+        section=_whole(section, "section", 1) if section.has("section") else 1,
+    )
+
+
+def _by_receive(top: Section) -> bool:
+    section = top.section("source", required=False)
+    if section is None or not section.has("stamp"):
+        return False
+    return section.choice("stamp", "header", "receive") == "receive"
+
+
+def _whole(section: Section, key: str, least: int) -> int:
+    value = section.number(key)
+    if value != int(value) or value < least:
+        raise section.refuse(key, f"must be a whole number of at least {least}, but got {value:g}.")
+    return int(value)
+
+
+def _world(section: Section) -> World:
+    section.check_keys("axes", "left_handed", "origin", "unit", "rotation_wxyz", "yaw_deg", "pose")
+    if section.has("pose"):
+        return _world_by_pose(section)
+    axes = _axes(section) if section.has("axes") else np.eye(3)
+    left = _truth(section, "left_handed")
+    if (np.linalg.det(axes) < 0.0) != left:
+        kind = "a mirror image" if not left else "none"
+        raise section.refuse(
+            "axes", f"these make {kind} of the source; set left_handed: {str(not left).lower()} only if its axes are"
+            " left-handed (thumb x, forefinger y, middle finger z of the left hand), else correct the axes."
+        )  # fmt: skip
+    scale = _factor(section, LENGTHS, "m")
+    origin = section.numbers("origin", 3) if section.has("origin") else (0.0, 0.0, 0.0)
+    return World(
+        axes=axes, origin=(scale * origin[0], scale * origin[1], scale * origin[2]), rotation=_rotation(section)
+    )
+
+
+def _world_by_pose(section: Section) -> World:
+    """The source's frame, as a camera's, by its pose in W: p_W = R p_S + t."""
+    for key in section.values:
+        if key != "pose":
+            raise section.refuse(str(key), "stands beside pose, which says all; remove one of them.")
+    pose = cast(Section, section.section("pose"))
+    pose.check_keys("translation", "unit", "rotation_wxyz", "yaw_deg")
+    place, turn = np.multiply(_factor(pose, LENGTHS, "m"), pose.numbers("translation", 3)), _rotation(pose)
+    origin = -Rotation.from_quat(np.roll(turn, -1)).inv().apply(place)
+    return World(origin=(float(origin[0]), float(origin[1]), float(origin[2])), rotation=turn)
+
+
+def _axes(section: Section) -> Array:
+    said = section.get("axes", "three of x, y, z, -x, -y, -z", _as_axes)
+    rows = np.zeros((3, 3))
+    for k, axis in enumerate(said):
+        rows[k, "xyz".index(axis[-1])] = -1.0 if axis[0] == "-" else 1.0
+    return rows
+
+
+def _as_axes(value: object) -> list[str] | None:
+    if not isinstance(value, list) or len(value) != 3:
+        return None
+    words = [str(one) for one in value]
+    good = all(word.lstrip("-") in ("x", "y", "z") and len(word) <= 2 for word in words)
+    return words if good and len({word[-1] for word in words}) == 3 else None
+
+
+def _truth(section: Section, key: str) -> bool:
+    if not section.has(key):
+        return False
+    return section.get(key, "true or false", lambda value: (value,) if isinstance(value, bool) else None)[0]
+
+
+def _clock(section: Section) -> Clock:
+    section.check_keys("column", "unit", "rate_hz", "offset_s")
+    if section.has("unit") and section.has("rate_hz"):
+        raise section.refuse("rate_hz", "is of frames that are numbered, which have no unit; remove one of them.")
+    unit = section.text("unit") if section.has("unit") else None
+    if unit is not None:
+        with section.naming("unit"):
+            factor(unit, TIMES, "times")
+    column = section.text("column") if section.has("column") else None
+    rate = _positive(section, "rate_hz", 1.0) if section.has("rate_hz") else None
+    return Clock(column=column, unit=unit, rate=rate, offset=section.maybe_number("offset_s") or 0.0)
+
+
+def _pose(section: Section) -> PoseMap:
+    """One body; where a row is a push, what it is at first, with what it is at last."""
+    if not section.has("start"):
+        return _one_pose(section)
+    section.check_keys("start", "end", "speed")
+    first, last = (_one_pose(cast(Section, section.section(key))) for key in ("start", "end"))
+    speed: Quantity | float | None = None
+    if isinstance(section.values.get("speed"), dict):
+        speed = _quantity(cast(Section, section.section("speed")), SPEEDS, (1,))
+    elif section.has("speed"):
+        speed = _positive(section, "speed", 1.0)
+    return replace(first, end=last, speed=speed)
+
+
+def _one_pose(section: Section) -> PoseMap:
+    section.check_keys("topic", "frame", "time", "position", "rotation", "offset", "height_m")
+    position = _maybe(section, "position", lambda inner: _quantity(inner, LENGTHS, (2, 3)))
+    topic = section.text("topic") if section.has("topic") else None
+    if position is None and topic is None:
+        raise section.refuse("position", "is required, but missing; give its columns, or the topic of a bag.")
+    return PoseMap(
+        topic=topic,
+        frame=section.text("frame") if section.has("frame") else None,
+        clock=_maybe(section, "time", _clock) or Clock(),
+        position=position or Quantity(),
+        turn=_turn(section),
+        offset=_maybe(section, "offset", _offset) or Offset(),
+        height=section.maybe_number("height_m"),
+    )
+
+
+def _turn(section: Section) -> Turn | None:
+    """The rotation; None where the map says that there is none, and as the messages have it where it says nothing."""
+    if section.values.get("rotation") == "none":
+        return None
+    inner = section.section("rotation", required=section.values.get("topic") is None)
+    if inner is None:
+        return Turn()
+    inner.check_keys("columns", "as", "unit", "order", "inverse")
+    kind = inner.choice("as", *ROTATIONS) if inner.has("as") else "wxyz"
+    columns = _names(inner, COUNTS[kind]) if inner.has("columns") else ()
+    order = inner.text("order") if kind == "euler" else "XYZ"
+    if kind == "euler" and (sorted(order.lower()) != sorted(set(order.lower())) or _bad_order(order)):
+        raise inner.refuse("order", f"must be such as XYZ (about the body's axes) or xyz, but got {shown(order)}.")
+    return Turn(
+        columns=columns, kind=kind, unit=_unit(inner, ANGLES, "angles"), order=order, inverse=_truth(inner, "inverse")
+    )  # fmt: skip
+
+
+def _bad_order(order: str) -> bool:
+    try:
+        Rotation.from_euler(order, np.zeros(3))
+    except ValueError:
+        return True
+    return False
+
+
+def _force(section: Section) -> ForceMap:
+    section.check_keys("topic", "time", "columns", "unit", "axes", "offset", "acts_on", "weight_n", "tare_s")
+    topic = section.text("topic") if section.has("topic") else None
+    columns = _names(section, (2, 3)) if topic is None or section.has("columns") else ()
+    return ForceMap(
+        topic=topic,
+        clock=_maybe(section, "time", _clock) or Clock(),
+        force=Quantity(columns=columns, unit=_unit(section, FORCES, "forces")),
+        in_hand=section.has("axes") and section.choice("axes", "world", "hand") == "hand",
+        offset=_maybe(section, "offset", _offset) or Offset(),
+        on_hand=section.has("acts_on") and section.choice("acts_on", "object", "hand") == "hand",
+        weight=_not_negative(section, "weight_n", 0.0),
+        tare=_not_negative(section, "tare_s", 0.0),
+    )
+
+
+def _quantity(section: Section, kind: Mapping[str, float], counts: tuple[int, ...]) -> Quantity:
+    section.check_keys("columns", "unit")
+    columns = _names(section, counts) if section.has("columns") else ()
+    return Quantity(columns=columns, unit=_unit(section, kind, "it"))
+
+
+def _names(section: Section, counts: tuple[int, ...]) -> tuple[str, ...]:
+    wanted = " or ".join(map(str, counts))
+
+    def accept(value: object) -> tuple[str, ...] | None:
+        names = [value] if isinstance(value, str) else value
+        good = isinstance(names, list) and len(names) in counts and all(isinstance(one, str) for one in names)
+        return tuple(cast("list[str]", names)) if good else None
+
+    return section.get("columns", f"the names of {wanted} column(s)", accept)
+
+
+def _unit(section: Section, kind: Mapping[str, float], what: str) -> str | None:
+    if not section.has("unit"):
+        return None
+    unit = section.text("unit")
+    with section.naming("unit"):
+        factor(unit, kind, what)
+    return unit
+
+
+def _factor(section: Section, kind: Mapping[str, float], default: str) -> float:
+    return kind[_unit(section, kind, "it") or default]
+
+
+def _offset(section: Section) -> Offset:
+    section.check_keys("translation", "unit", "rotation_wxyz", "yaw_deg")
+    scale = _factor(section, LENGTHS, "m")
+    place = section.numbers("translation", 3) if section.has("translation") else (0.0, 0.0, 0.0)
+    return Offset(translation=(scale * place[0], scale * place[1], scale * place[2]), rotation=_rotation(section))
+
+
+def _rotation(section: Section) -> tuple[float, float, float, float]:
+    """A rotation that stays, as a quaternion or as an angle about the vertical."""
+    if section.has("rotation_wxyz") and section.has("yaw_deg"):
+        raise section.refuse("yaw_deg", "stands beside rotation_wxyz; give one of them.")
+    if section.has("yaw_deg"):
+        half = 0.5 * np.deg2rad(section.number("yaw_deg"))
+        return float(np.cos(half)), 0.0, 0.0, float(np.sin(half))
+    if not section.has("rotation_wxyz"):
+        return 1.0, 0.0, 0.0, 0.0
+    w, x, y, z = section.numbers("rotation_wxyz", 4)
+    norm = float(np.linalg.norm([w, x, y, z]))
+    if abs(norm - 1.0) > NORM_TOLERANCE:
+        raise section.refuse("rotation_wxyz", f"must have norm 1 within {NORM_TOLERANCE:g}, but got {norm:.4g}.")
+    return w / norm, x / norm, y / norm, z / norm
+
+
+def _cut(section: Section) -> Cut:
+    section.check_keys("cut", "column", "gap_s", "still_s", "lead_s", "tail_s", "times_s")
+    by = section.choice("cut", *CUTS)
+    for key, of in (("column", "column"), ("gap_s", "gap"), ("times_s", "times")):
+        if section.has(key) and by != of:
+            raise section.refuse(key, f"is of cut: {of}, but cut is {by}; remove it.")
+    plain = Cut()
+    column = section.text("column") if by == "column" else None
+    times = section.get("times_s", "a list of [begin, end] in s", _as_times) if by == "times" else ()
+    return Cut(
+        by=by,
+        column=column,
+        gap=_positive(section, "gap_s", plain.gap),
+        still=_positive(section, "still_s", plain.still),
+        lead=_positive(section, "lead_s", plain.lead),
+        tail=_positive(section, "tail_s", plain.tail),
+        times=times,
+    )
+
+
+def _as_times(value: object) -> tuple[tuple[float, float], ...] | None:
+    if not isinstance(value, list) or not value:
+        return None
+    pairs = []
+    for one in value:
+        good = isinstance(one, list) and len(one) == 2 and all(isinstance(t, int | float) for t in one)
+        if not good or not one[0] < one[1]:
+            return None
+        pairs.append((float(one[0]), float(one[1])))
+    return tuple(pairs)
+
+
+def _positive(section: Section, key: str, default: float) -> float:
+    value = section.maybe_number(key)
+    if value is not None and value <= 0.0:
+        raise section.refuse(key, f"must be positive, but got {value:g}.")
+    return default if value is None else value
+
+
+def _not_negative(section: Section, key: str, default: float) -> float:
+    value = section.maybe_number(key)
+    if value is not None and value < 0.0:
+        raise section.refuse(key, f"must not be negative, but got {value:g}.")
+    return default if value is None else value
