@@ -113,7 +113,7 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
         console.print(f"Where: {diagnosis.location.statement}.")
     console.print(f"Left over: {diagnosis.left}.")
     if diagnosis.verdict == "unexplained" and diagnosis.reduced_chi2_before > FAR**2:
-        console.print("The plain cell misses by far: `physid_drake inspect` tries whether a convention is wrong.")
+        console.print("The baseline model misses by far: `physid_drake inspect` tries whether a convention is wrong.")
     for warning in diagnosis.warnings[:MOST_NOTES]:
         console.print(f"Note: {warning}.")
     if len(diagnosis.warnings) > MOST_NOTES:

@@ -44,7 +44,7 @@ class Finding:
     """What the pushes say of the recording's conventions.
 
     Attributes:
-        before: deviations that the plain cell leaves (1 if it explains all); None where it is refused.
+        before: what the baseline model leaves, in units of noise (1 if it explains all); None where it is refused.
         refused: why it is refused; empty if it is not.
         after: deviations that it leaves by the best other convention; None where none is much better.
         better: conventions that fit as well as that one.
@@ -74,7 +74,10 @@ class Finding:
         if self.before is None:
             left = "some of the pushes cannot be fitted as they are"
         else:
-            left = f"the plain cell, fitted roughly to some of the pushes, leaves {self.before:.3g} sigma"
+            left = (
+                f"the baseline model (no effects), fitted roughly to some pushes, leaves {self.before:.3g} sigma"
+                " (1 is tracker noise)"
+            )
         if self.better or (self.before is not None and self.before < FAR):
             return left
         return f"{left}; no other convention that was tried makes them fit"
@@ -130,7 +133,7 @@ def _likely(conventions: list[Convention]) -> list[Convention]:
 
 
 def _left(recording: Recording) -> tuple[float | None, str]:
-    """Deviations that the plain cell leaves, fitted roughly; None and why, where the recording is refused."""
+    """What the baseline model leaves, in units of noise, fitted roughly; None and why, where it is refused."""
     try:
         case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=1)
         case = replace(case, noise=replace(case.noise, known=True))
