@@ -106,6 +106,7 @@ def read_bag(source: Path, wanted: Collection[tuple[str, str | None]]) -> dict[t
     rows: dict[tuple[str, str | None], list[tuple[float, float, tuple[float, ...]]]] = {key: [] for key in wanted}
     kinds: dict[str, str] = {}
     seen: set[str] = set()
+    children: dict[str, set[str]] = {topic: set() for topic, _ in wanted}
     for reader in _readers(source):
         seen.update(c.topic for c in reader.connections)
         chosen = {c.topic: c.msgtype for c in reader.connections if any(c.topic == topic for topic, _ in wanted)}
@@ -115,15 +116,18 @@ def read_bag(source: Path, wanted: Collection[tuple[str, str | None]]) -> dict[t
         kinds |= chosen
         for topic, receive, message in _messages(reader, chosen):
             for frame, stamp, values in _TAKEN[kinds[topic].rpartition("/")[2]](message):
-                key = (topic, frame if frame is not None else None)
-                if key in rows:
-                    rows[key].append((stamp, receive, values))
+                if frame is not None:
+                    children[topic].add(frame)
+                for key in {(topic, frame), (topic, None)}:
+                    if key in rows:
+                        rows[key].append((stamp, receive, values))
     for topic, frame in wanted:
         if topic not in seen:
             raise RecordingError(f"{named(source.name)} has no topic {shown(topic)}; it has {_some(sorted(seen))}.")
-        if frame is None and kinds[topic].endswith("/TFMessage"):
+        if frame is None and (kinds[topic].endswith("/TFMessage") or len(children[topic]) > 1):
             raise RecordingError(
-                f"topic {shown(topic)} holds transforms; add the child frame that is followed: frame."
+                f"topic {shown(topic)} holds transforms of {_some(sorted(children[topic]))}; add the child frame that"
+                " is followed: frame."
             )
         if not rows[topic, frame]:
             of = "" if frame is None else f" of frame {shown(frame)}"
@@ -231,13 +235,13 @@ def _of_pose(message: Any) -> _Taken:
 
 def _of_transform(message: Any) -> _Taken:
     transform = getattr(message, "transform", message)
-    yield None, _stamp(message), _place(transform.translation) + _turn(transform.rotation)
+    child = getattr(message, "child_frame_id", None)
+    yield child, _stamp(message), _place(transform.translation) + _turn(transform.rotation)
 
 
 def _of_transforms(message: Any) -> _Taken:
     for one in message.transforms:
-        for _, stamp, values in _of_transform(one):
-            yield one.child_frame_id, stamp, values
+        yield from _of_transform(one)
 
 
 def _of_point(message: Any) -> _Taken:

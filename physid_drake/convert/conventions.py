@@ -27,7 +27,7 @@ def rotation_of(turn: Turn, values: Array, scale: float, world: World) -> Rotati
         world: whose vertical a yaw turns about.
 
     Raises:
-        RecordingError: if a quaternion's norm is not 1.
+        RecordingError: if a quaternion's norm is not 1, or a matrix turns nothing.
     """
     if turn.kind in ("wxyz", "xyzw"):
         wxyz = values if turn.kind == "wxyz" else np.roll(values, 1, axis=1)
@@ -41,11 +41,27 @@ def rotation_of(turn: Turn, values: Array, scale: float, world: World) -> Rotati
         rotation = Rotation.from_quat(np.roll(wxyz, -1, axis=1))
     elif turn.kind == "euler":
         rotation = Rotation.from_euler(turn.order, scale * values)
+    elif turn.kind == "matrix":
+        rotation = _of_matrices(values.reshape(-1, 3, 3))
     elif turn.kind == "rotation_vector":
         rotation = Rotation.from_rotvec(scale * values)
     else:
         rotation = Rotation.from_rotvec(scale * values * world.axes[2])
     return rotation.inv() if turn.inverse else rotation
+
+
+def _of_matrices(matrices: Array) -> Rotation:
+    """Rotations of matrices (n, 3, 3), which are rounded."""
+    off = np.abs(matrices @ matrices.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+    wrong = np.flatnonzero(off > NORM_TOLERANCE)
+    if len(wrong):
+        raise RecordingError(
+            f"{len(wrong)} of {len(matrices)} matrices are no rotations (rows of the first are off by"
+            f" {off[wrong[0]]:.4g}); are these nine columns of one rotation, row by row?"
+        )
+    if (np.linalg.det(matrices) < 0.0).any():
+        raise RecordingError("its matrices mirror (determinant -1); are the axes of the source left-handed?")
+    return Rotation.from_matrix(matrices)
 
 
 def places_in_world(positions: Array, world: World) -> Array:

@@ -39,7 +39,7 @@ from physid_drake.recording.adapters.sources import source_files
 from physid_drake.wording import named, shown
 
 TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".trc")
-ARRAYS: Final = (".npz", ".h5", ".hdf5", ".parquet")
+ARRAYS: Final = (".npz", ".h5", ".hdf5", ".mat", ".parquet")
 LARGEST_REACH: Final = 1.0
 """m: of a mesh, whose file is not read here."""
 

@@ -22,12 +22,13 @@ FORMAT: Final = "physid-map/1"
 NORM_TOLERANCE: Final = 0.02
 """A written quaternion is rounded; one whose norm is further from 1 is none."""
 
-ROTATIONS: Final = ("wxyz", "xyzw", "euler", "rotation_vector", "yaw")
-"""How a rotation is written; the quaternions by the order of their columns."""
+ROTATIONS: Final = ("wxyz", "xyzw", "euler", "rotation_vector", "matrix", "yaw")
+"""How a rotation is written; the quaternions by the order of their columns, a matrix row by row."""
 
 CUTS: Final = ("rest", "gap", "column", "times", "whole", "rows")
 COUNTS: Final[Mapping[str, tuple[int, ...]]] = {
-    "wxyz": (4,), "xyzw": (4,), "euler": (3,), "rotation_vector": (3,), "yaw": (1,),
+    "wxyz": (4,), "xyzw": (4,), "euler": (3,), "rotation_vector": (3,), "matrix": (9,),
+    "yaw": (1,),
 }  # fmt: skip
 
 
@@ -61,7 +62,7 @@ class Turn:
     """How a rotation is written.
 
     Attributes:
-        columns: four, three or one.
+        columns: nine, four, three or one.
         kind: one of ``ROTATIONS``.
         unit: of angles.
         order: of Euler angles: capital letters about the body's own axes, small ones about the world's.

@@ -236,7 +236,7 @@ def _turns(columns: Columns, turn: Turn) -> Array:
 def _rotation(columns: Columns, turn: Turn, values: Array, chart: Map) -> Rotation:
     stated = next((columns.units[n] for n in map(columns.find, turn.columns) if n in columns.units), None)
     unit = turn.unit or (stated if stated in ANGLES else None)
-    if unit is None and turn.kind not in ("wxyz", "xyzw"):
+    if unit is None and turn.kind not in ("wxyz", "xyzw", "matrix"):
         raise RecordingError("rotation: angles need a unit, rad or deg; add it.")
     largest = float(np.abs(values).max(initial=0.0))
     if unit == "rad" and turn.kind in ("euler", "rotation_vector") and largest > MOST_ANGLE:

@@ -202,15 +202,26 @@ def _sections(rows: _Rows, decimal: str) -> list[tuple[list[list[str]], _Rows]]:
         if not _begins(rows, k, decimal):
             k += 1
             continue
-        first = k
+        below = first = _below_header(rows, k, bottom)
         while first > bottom and _is_header(rows.fields[first - 1], len(rows.fields[k])):
             first -= 1
         bottom = _end(rows, k, decimal)
         kept = [j for j in range(k, bottom) if _there(rows.fields[j])]
         body = _Rows(fields=[rows.fields[j] for j in kept], lines=[rows.lines[j] for j in kept])
-        found.append((rows.fields[first:k], body))
+        found.append((rows.fields[first:below], body))
         k = bottom
     return found
+
+
+def _below_header(rows: _Rows, k: int, bottom: int) -> int:
+    """Index behind the header of the numbers from row ``k`` on: TRC files leave a line between."""
+    blank = k - 1 > bottom and not _there(rows.fields[k - 1])
+    return k - 1 if blank and len(_there(rows.fields[k - 2])) > 1 and _as_wide(rows, k - 2, k) else k
+
+
+def _as_wide(rows: _Rows, j: int, k: int) -> bool:
+    """Whether two rows have equally many fields, but for a separator at the end."""
+    return abs(len(rows.fields[j]) - len(rows.fields[k])) <= 1
 
 
 def _is_header(fields: Sequence[str], width: int) -> bool:

@@ -20,16 +20,6 @@ from physid_drake.errors import RecordingError
 from physid_drake.recording import Recording, read_recording
 
 SEALED = Path(__file__).parents[2] / "recordings" / "sealed_01"
-WRITERS = {
-    "take.csv": foreign.motive,
-    "vicon.csv": foreign.vicon,
-    "versuche.csv": foreign.german,
-    "unity": foreign.unity,
-    "padded.npz": foreign.padded_npz,
-    "data.parquet": foreign.lerobot,
-    "demos.h5": foreign.demonstrations,
-}
-EXACT = ("versuche.csv", "unity", "padded.npz", "data.parquet", "demos.h5")
 HEAD = foreign.DESCRIPTION.format(name="mug")
 TABLE = "t,x,y,yaw,hx,hy\n" + "".join(
     f"{0.01 * k:.2f},{0.001 * k:.3f},0,0,{0.001 * k - 0.05:.3f},0\n" for k in range(9)
@@ -57,27 +47,26 @@ def converted(recording: Recording, writer: Callable[[Recording, Path], str], na
 
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
-@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize("name", foreign.TABLES)
 def test_foreign_layouts_come_back_as_they_were(name: str, sealed: Recording, tmp_path: Path) -> None:
-    pytest.importorskip({"data.parquet": "pyarrow", "demos.h5": "h5py"}.get(name, "numpy"))
-    found = converted(sealed, WRITERS[name], name, tmp_path)
+    log = foreign.TABLES[name]
+    pytest.importorskip(log.needs)
+    found = converted(sealed, log.write, name, tmp_path)
     assert len(found.pushes) == len(sealed.pushes)
     for push, other in zip(sealed.pushes, found.pushes, strict=True):
         assert push.hand is not None and other.hand is not None
-        if name in EXACT:
+        if log.exact:
             assert np.abs(push.object.planar - other.object.planar).max() < 2e-5
             hand = [
                 np.interp(other.hand.times, push.hand.times - push.object.times[0], c) for c in push.hand.positions.T
             ]
             assert np.abs(np.column_stack(hand) - other.hand.positions)[3:-3].max() < 5e-4
         else:  # resampled, with noise, and cut out of one take by the object's rests
-            for end in (0, -1):
-                assert np.abs(push.object.planar[end, :2] - other.object.planar[end, :2]).max() < 3e-3
-                assert abs(push.object.planar[end, 2] - other.object.planar[end, 2]) < 0.05
+            foreign.assert_rests_agree(push.object, other.object)
             assert np.abs(np.median(other.object.positions[:, 2]) - 0.02295) < 3e-3
     assert found.conversion is not None and found.conversion.source == name
     assert found.conversion.map == (tmp_path / "map.yaml").read_text(encoding="utf-8")
-    assert found.pushes[0].object.rotation == ("yaw" if name == "data.parquet" else "full")
+    assert found.pushes[0].object.rotation == log.rotation
 
 
 def test_the_hand_of_padded_arrays_is_seen_where_it_is_filled(sealed: Recording, tmp_path: Path) -> None:
@@ -251,7 +240,7 @@ class TestRefusals:
             ("column: t", "column: T0", "has no column 'T0'"),
             ("as: yaw, unit: rad", "as: yaw", "angles need a unit, rad or deg"),
             ("as: yaw, unit: rad", "as: yaw, unit: grad", "must be in one of rad, deg, mrad, but is in 'grad'"),
-            ("as: yaw, unit: rad", "as: quat", "must be one of wxyz, xyzw, euler, rotation_vector, yaw"),
+            ("as: yaw, unit: rad", "as: quat", "must be one of wxyz, xyzw, euler, rotation_vector, matrix, yaw"),
             ("format: physid-map/1", "format: physid-map/9", "unknown format 'physid-map/9'"),
             ("time: {column: t}", "tiem: {column: t}", "unknown key; the keys here are format, recording"),
             ("time: {column: t}", "world: {axes: [x, z, y]}\ntime: {column: t}", "these make a mirror image"),
@@ -358,7 +347,7 @@ class TestGuess:
     @pytest.mark.filterwarnings("ignore::UserWarning")
     @pytest.mark.parametrize("name", ["take.csv", "vicon.csv", "versuche.csv", "padded.npz", "demos.h5"])
     def test_with_its_object_measured_it_is_the_map(self, name: str, sealed: Recording, tmp_path: Path) -> None:
-        found = converted(sealed, WRITERS[name], name, tmp_path)
+        found = converted(sealed, foreign.TABLES[name].write, name, tmp_path)
         guess = guess_map(tmp_path / name)
         text = guess.text.replace(OBJECT_LINE, OURS).replace("radius_m: 0.01,", "radius_m: 0.0112,")
         (tmp_path / "guessed.yaml").write_text(text.replace("size_m: [1.2, 0.8]", "size_m: [1.6, 1.4]"))

@@ -1,0 +1,83 @@
+"""Arrays as they are kept: matrices, MATLAB's files, and what is refused in one line."""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+from scipy.spatial.transform import Rotation
+
+from physid_drake.convert import arrays
+from physid_drake.convert.arrays import PUSH, read_array_table
+from physid_drake.convert.conventions import rotation_of
+from physid_drake.convert.mapping import Turn, World
+from physid_drake.errors import RecordingError
+
+TURN = Rotation.from_euler("ZYX", [0.4, -0.3, 1.1])
+
+
+class TestMatrices:
+    def test_entries_by_row_and_column(self, tmp_path: Path) -> None:
+        pose = np.tile(np.eye(4), (5, 1, 1))
+        pose[:, :3, :3], pose[:, :3, 3] = TURN.as_matrix(), [1.0, 2.0, 3.0]
+        np.savez(tmp_path / "log.npz", T=pose, t=np.arange(5.0))
+        numbers = read_array_table(tmp_path / "log.npz").numbers
+        rows = np.column_stack([numbers[f"T[{i},{j}]"] for i in range(3) for j in range(3)])
+        assert (rotation_of(Turn(kind="matrix"), rows, 1.0, World()) * TURN.inv()).magnitude().max() < 1e-12
+        assert [numbers[f"T[{i},3]"][0] for i in range(3)] == [1.0, 2.0, 3.0] and PUSH not in numbers
+
+    def test_pushes_of_matrices(self, tmp_path: Path) -> None:
+        np.savez(tmp_path / "log.npz", R=np.tile(np.eye(3), (2, 5, 1, 1)))
+        numbers = read_array_table(tmp_path / "log.npz").numbers
+        assert numbers[PUSH].tolist() == [0.0] * 5 + [1.0] * 5 and numbers["R[2,2]"].tolist() == [1.0] * 10
+
+    @pytest.mark.parametrize(
+        ("matrix", "said"),
+        [
+            (np.eye(3) * 1.1, "1 of 1 matrices are no rotations .* are these nine columns of one rotation"),
+            (np.diag([1.0, -1.0, 1.0]), r"mirror \(determinant -1\)"),
+            (np.ones((3, 3)), "no rotations"),
+        ],
+    )
+    def test_what_is_no_rotation(self, matrix: np.ndarray, said: str) -> None:
+        with pytest.raises(RecordingError, match=said):
+            rotation_of(Turn(kind="matrix"), matrix.reshape(1, 9), 1.0, World())
+
+
+class TestMatlab:
+    def test_variables_and_structures(self, tmp_path: Path) -> None:
+        scipy.io.savemat(
+            tmp_path / "log.mat", {"t": np.arange(4.0)[:, None], "s": {"x": np.ones((4, 2))}, "rate": 3.0}
+        )
+        numbers = read_array_table(tmp_path / "log.mat").numbers
+        assert sorted(numbers) == ["s/x[0]", "s/x[1]", "t"] and numbers["t"].tolist() == [0.0, 1.0, 2.0, 3.0]
+
+    def test_version_7_3_is_the_other_way_round(self, tmp_path: Path) -> None:
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(tmp_path / "log.mat", "w", userblock_size=512) as opened:
+            opened["t"], opened["x"] = np.arange(4.0)[None, :], np.arange(8.0).reshape(2, 4)
+        with (tmp_path / "log.mat").open("r+b") as file:
+            file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+        numbers = read_array_table(tmp_path / "log.mat").numbers
+        assert numbers["t"].tolist() == [0.0, 1.0, 2.0, 3.0] and numbers["x[1]"].tolist() == [4.0, 5.0, 6.0, 7.0]
+
+    def test_what_unpacks_to_more_than_a_log_is(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(arrays, "MOST_BYTES", 10_000_000)
+        packed = zlib.compress(bytes(11_000_000))
+        head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+        element = (15).to_bytes(4, "little") + len(packed).to_bytes(4, "little") + packed
+        (tmp_path / "log.mat").write_bytes(head + element)
+        with pytest.raises(RecordingError, match="unpacks to more than 10 MB"):
+            read_array_table(tmp_path / "log.mat")
+
+    @pytest.mark.parametrize(
+        "content", [b"", b"x" * 300, b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + b"y" * 99]
+    )
+    def test_what_is_none(self, content: bytes, tmp_path: Path) -> None:
+        (tmp_path / "log.mat").write_bytes(content)
+        with pytest.raises(RecordingError, match=r"log\.mat: ") as caught:
+            read_array_table(tmp_path / "log.mat")
+        assert "\n" not in str(caught.value)
