@@ -7,18 +7,18 @@ is called force or wrench is one. Numbers tell the rest: which axis is up, m or 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from physid_drake.convert.bag import ENDINGS, RECEIVE, STAMP, TopicInfo, holds_numbers, read_bag, topics_of
+from physid_drake.convert.bodies import Body, bodies_of, up_of
 from physid_drake.convert.columns import Array, Columns
 from physid_drake.convert.convert import ARRAYS, TEXTS, read_columns
-from physid_drake.convert.units import ANGLES, FORCES, LENGTHS, TIMES
+from physid_drake.convert.units import FORCES, LENGTHS, TIMES
 from physid_drake.recording.adapters.sources import source_files
 from physid_drake.recording.clocks import LIKELY
 
@@ -27,39 +27,17 @@ HAND_WORDS: Final = (
     "hand", "action", "tip", "finger", "tool", "tcp", "eef", "ee", "gripper", "pusher", "robot", "probe", "stylus",
 )  # fmt: skip
 PUSH_WORDS: Final = ("push", "episode", "trial", "run", "rep", "versuch", "segment")
-MOST_TURNS: Final = 2000
-"""Rotations that are looked at."""
-
-CLEARLY: Final = 0.3
-"""Of the turns about the vertical: by so much more, one order of a quaternion is the right one."""
-
 FAR_AWAY: Final = 0.3
 """m from the table's top, along the vertical: the source's frame is that of a camera."""
+
+FIXED: Final = 0.05
+"""Of the object's way: what keeps its distance to it as well as this is fixed to it."""
 
 METRES, CENTIMETRES = 5.0, 60.0
 """Places on a table that are nowhere larger are in m, or in cm."""
 
-_AXES: Final = re.compile(
-    r"^(?P<stem>.*?)[\s_./\-:]*(?P<axis>q[wxyz]|[rtf][xyz]|[xyzw]|roll|pitch|yaw|theta|heading|\[\d+\])"
-    r"(?:[\s_]*[\[(]?(?P<unit>"
-    + "|".join(sorted([*LENGTHS, *ANGLES, *FORCES], key=len, reverse=True))
-    + r")[\])]?)?$",
-    re.IGNORECASE,
-)
+_OTHERS: Final = {"wxyz": "xyzw", "xyzw": "wxyz", "matrix": "inverse: true, if it is written column by column"}
 _TIME: Final = re.compile(r"time|stamp|(^|[\s_/])t([\s_\[(]|$)|seconds|zeit", re.IGNORECASE)
-
-
-@dataclass(kw_only=True)
-class _Body:
-    """What was found of one body or sensor: columns by kind."""
-
-    name: str
-    position: list[str] = field(default_factory=list)
-    rotation: list[str] = field(default_factory=list)
-    kind: str = "wxyz"
-    sure: bool = True
-    force: list[str] = field(default_factory=list)
-    unit: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,8 +76,8 @@ def _guess_table(source: Path) -> Guess:
     clock = None if time is None else columns.numbers[time] * TIMES.get(unit, np.nan)
     rows = [_row(name, values, clock) for name, values in columns.numbers.items()]
     rows += [(name, str(len(texts)), "", "text", "") for name, texts in columns.texts.items()]
-    bodies = _bodies(columns)
-    body, hand, force = _roles(bodies)
+    bodies = bodies_of(columns)
+    body, hand, force = _roles(bodies, columns)
     doubt = _set_units([one for one in (body, hand) if one is not None], columns)
     lines = [*_head(source, body, columns, hand is not None)]
     if time is None:
@@ -108,9 +86,9 @@ def _guess_table(source: Path) -> Guess:
         lines.append(f"time: {{column: {_quoted(time)}, rate_hz: 100}}   # CHANGE: it counts frames; at which rate?")
     else:
         lines.append(f"time: {{column: {_quoted(time)}, unit: {unit}}}")
-    lines += _pose_lines("object", body, columns, doubt)
-    if hand is not None:
-        lines += _pose_lines("hand", hand, columns, doubt)
+    for key, one in (("object", body), ("hand", hand)):
+        if one is not None or key == "object":
+            lines += _pose_lines(key, one, columns, doubt, time)
     if force is not None:
         lines += _force_lines(force, columns)
     lines.append(_cut_line(columns, time, many=len(files) > 1))
@@ -167,115 +145,12 @@ def _time_unit(name: str, columns: Columns) -> str:
     return next((unit for unit, size in TIMES.items() if usual * size <= LIKELY), "s")
 
 
-def _bodies(columns: Columns) -> list[_Body]:
-    """Columns by what their names begin with."""
-    found: dict[str, dict[str, str]] = {}
-    units: dict[str, str] = {}
-    for name in columns.numbers:
-        match = _AXES.match(name)
-        if match:
-            axes = found.setdefault(match["stem"], {})
-            axes.setdefault(match["axis"].lower(), name)
-            if match["unit"] or name in columns.units:
-                units[name] = columns.units.get(name) or match["unit"]
-    bodies: dict[str, _Body] = {}
-    for stem, axes in found.items():
-        place, turn, force = _split_axes(stem, axes, columns)
-        owner = re.sub(
-            r"[\s_./\-:]*(position|pos|translation|rotation|rot|orientation|quat\w*|pose|force|wrench)$", "", stem,
-            flags=re.IGNORECASE,
-        )  # fmt: skip
-        body = bodies.setdefault(owner, _Body(name=owner or "?"))
-        body.position = body.position or place
-        body.force = body.force or force
-        if turn and not body.rotation:
-            body.rotation = turn
-        unit = next((units[name] for name in place if name in units), None)
-        body.unit = body.unit or unit
-    for body in bodies.values():
-        if body.rotation:
-            body.kind, body.sure = _rotation_kind(body.rotation, body.position, columns)
-    return [body for body in bodies.values() if body.position or body.force]
-
-
-def _split_axes(stem: str, axes: Mapping[str, str], columns: Columns) -> tuple[list[str], list[str], list[str]]:
-    """Columns of places, rotations and forces under one stem."""
-    numbered = [axes[f"[{k}]"] for k in range(len(axes)) if f"[{k}]" in axes]
-    if len(numbered) == 7 and _is_unit(numbered[3:], columns):
-        return numbered[:3], numbered[3:], []
-    if numbered and len(numbered) in (2, 3) and not re.search("force|wrench|ft", stem, re.IGNORECASE):
-        return numbered, [], []
-    if len(numbered) == 3 or len(numbered) == 6:
-        return [], [], numbered[:3]
-    some = [axes[a] for a in ("x", "y", "z") if a in axes]
-    four = [axes[a] for a in ("x", "y", "z", "w") if a in axes]
-    if len(four) == 4 and _is_unit(four, columns):
-        return [], four, []
-    forced = [axes[a] for a in ("fx", "fy", "fz") if a in axes]
-    if re.search("force|wrench|ft", stem, re.IGNORECASE) and len(some) >= 2:
-        return [], [], some
-    place = some if len(some) >= 2 else [axes[a] for a in ("tx", "ty", "tz") if a in axes]
-    quaternion = [axes[a] for a in ("qx", "qy", "qz", "qw") if a in axes]
-    euler = [axes[a] for a in ("yaw", "pitch", "roll") if a in axes]
-    vector = [axes[a] for a in ("rx", "ry", "rz") if a in axes]
-    heading = [axes[a] for a in ("yaw", "theta", "heading") if a in axes][:1]
-    turn = next(
-        (found for found, n in ((quaternion, 4), (euler, 3), (vector, 3), (heading, 1)) if len(found) == n), []
-    )
-    return place if len(place) >= 2 else [], turn, forced if len(forced) >= 2 else []
-
-
-def _is_unit(names: Sequence[str], columns: Columns) -> bool:
-    values = np.column_stack([columns.numbers[name] for name in names])
-    values = values[np.isfinite(values).all(axis=1)]
-    return len(values) > 0 and bool(np.median(np.abs(np.linalg.norm(values, axis=1) - 1.0)) < 0.02)
-
-
-def _rotation_kind(names: Sequence[str], place: Sequence[str], columns: Columns) -> tuple[str, bool]:
-    """How a rotation is written, and whether that is sure."""
-    if len(names) == 1:
-        return "yaw", True
-    if len(names) == 3:
-        return ("euler" if re.search("roll|pitch|yaw", names[0], re.IGNORECASE) else "rotation_vector"), True
-    if names[0].lower().rstrip("]").endswith("x"):
-        return "xyzw", True
-    values = np.column_stack([columns.numbers[name] for name in names])
-    values = values[np.isfinite(values).all(axis=1) & (values != 0.0).any(axis=1)][
-        :: max(1, len(values) // MOST_TURNS)
-    ]
-    up = _up_of(place, columns)
-    if len(values) < 2 or up is None:
-        return "wxyz", False
-    # What stands on a table turns about its normal alone: by the wrong order, it turns about other axes, too.
-    shares = {"wxyz": _share_about(up, np.roll(values, -1, axis=1)), "xyzw": _share_about(up, values)}
-    best = max(shares, key=lambda kind: shares[kind])
-    return best, abs(shares["wxyz"] - shares["xyzw"]) > CLEARLY
-
-
-def _share_about(up: int, quaternions: Array) -> float:
-    """Of all turns since the first, how much is about one axis; quaternions x, y, z, w."""
-    turns = (Rotation.from_quat(quaternions) * Rotation.from_quat(quaternions[0]).inv()).as_rotvec()
-    squares = (turns**2).sum(axis=0)
-    return float(squares[up] / max(float(squares.sum()), 1e-12))
-
-
-def _up_of(place: Sequence[str], columns: Columns) -> int | None:
-    """The axis along which a body hardly moves; None where no height was measured."""
-    if len(place) < 3:
-        return None
-    values = np.column_stack([columns.numbers[name] for name in place])
-    values = values[np.isfinite(values).all(axis=1)]
-    if not len(values):
-        return None
-    return int(np.argmin(np.quantile(values, 0.95, axis=0) - np.quantile(values, 0.05, axis=0)))
-
-
-def _roles(bodies: Sequence[_Body]) -> tuple[_Body | None, _Body | None, _Body | None]:
+def _roles(bodies: Sequence[Body], columns: Columns | None) -> tuple[Body | None, Body | None, Body | None]:
     """Which body is the object, which the hand, and which holds the force."""
     force = next((body for body in bodies if body.force), None)
     placed = [body for body in bodies if body.position]
 
-    def called(words: Sequence[str]) -> _Body | None:
+    def called(words: Sequence[str]) -> Body | None:
         return next(
             (b for b in placed if set(re.split(r"[^a-z]+", b.name.lower())) & set(words)
              or any(len(w) > 3 and w in b.name.lower() for w in words)), None,
@@ -286,12 +161,25 @@ def _roles(bodies: Sequence[_Body]) -> tuple[_Body | None, _Body | None, _Body |
     if body is None:
         body = next((one for one in rest if one.rotation), rest[0] if rest else None)
         rest = [one for one in rest if one is not body]
-    if hand is None and rest:
+    if hand is None and body is not None and columns is not None:
+        # What keeps its distance to the object is one of its markers.
+        hand = next((one for one in rest if _is_apart(one, body, columns)), None)
+    elif hand is None and rest:
         hand = rest[0]
     return body, hand, force
 
 
-def _head(source: Path, body: _Body | None, columns: Columns, has_hand: bool) -> list[str]:
+def _is_apart(one: Body, body: Body, columns: Columns) -> bool:
+    """Whether a body's distance to the object changes, or cannot be told."""
+    here, there = (np.column_stack([columns.numbers[name] for name in which.position[:3]]) for which in (one, body))
+    if here.shape != there.shape:
+        return True
+    distances = np.linalg.norm(here - there, axis=1)
+    distances = distances[np.isfinite(distances)]
+    return len(distances) < 2 or float(np.std(distances)) > FIXED * float(np.nanmax(np.nanstd(there, axis=0)))
+
+
+def _head(source: Path, body: Body | None, columns: Columns, has_hand: bool) -> list[str]:
     world = [] if body is None else _world_lines(body, columns)
     hand = ["  hand: {tip: sphere, radius_m: 0.01, stream: measured}   # CHANGE: the tip's shape and size"]
     return [
@@ -307,11 +195,11 @@ def _head(source: Path, body: _Body | None, columns: Columns, has_hand: bool) ->
     ]
 
 
-def _world_lines(body: _Body, columns: Columns) -> list[str]:
+def _world_lines(body: Body, columns: Columns) -> list[str]:
     """Which axis is up: the one along which the object hardly moves; where the table's top is nobody knows."""
     values = np.column_stack([columns.numbers[name] for name in body.position])
     values = LENGTHS[body.unit or "m"] * values[np.isfinite(values).all(axis=1)]
-    up = _up_of(body.position, columns)
+    up = up_of(body.position, columns)
     if up is None:
         return []
     axes = {0: "[y, z, x]", 1: "[z, x, y]", 2: "[x, y, z]"}[up]
@@ -328,9 +216,9 @@ def _world_lines(body: _Body, columns: Columns) -> list[str]:
     ]
 
 
-def _set_units(bodies: Sequence[_Body], columns: Columns) -> str:
+def _set_units(bodies: Sequence[Body], columns: Columns) -> str:
     """Gives all bodies a unit of length: the header's, else one that fits a table; the doubt that is left."""
-    stated = next((body.unit for body in bodies if body.unit in LENGTHS), None)
+    stated = next((body.unit for body in bodies if body.unit in LENGTHS), columns.length)
     values = [np.abs(columns.numbers[name]) for body in bodies for name in body.position]
     largest = max((float(np.nanmax(one, initial=0.0)) for one in values), default=0.0)
     likely = "m" if largest < METRES else "cm" if largest < CENTIMETRES else "mm"
@@ -339,7 +227,7 @@ def _set_units(bodies: Sequence[_Body], columns: Columns) -> str:
     return "" if stated else "   # m, cm or mm?"
 
 
-def _pose_lines(key: str, body: _Body | None, columns: Columns, doubt: str) -> list[str]:
+def _pose_lines(key: str, body: Body | None, columns: Columns, doubt: str, time: str | None) -> list[str]:
     if body is None:
         return [
             f"{key}:",
@@ -348,17 +236,18 @@ def _pose_lines(key: str, body: _Body | None, columns: Columns, doubt: str) -> l
         ]
     lines = [
         f"{key}:   # {body.name}",
+        *_own_time(body, columns, time),
         f"  position: {{columns: {_list(body.position)}, unit: {body.unit}}}{doubt}",
     ]
     if not body.rotation:
         lines.append("  rotation: none" + ("   # is it nowhere in the log?" if key == "object" else ""))
-    elif body.kind in ("wxyz", "xyzw"):
-        other = "" if body.sure else "   # or " + {"wxyz": "xyzw", "xyzw": "wxyz"}[body.kind] + "?"
+    elif body.kind in ("wxyz", "xyzw", "matrix"):
+        other = "" if body.sure else f"   # or {_OTHERS[body.kind]}?"
         lines.append(f"  rotation: {{columns: {_list(body.rotation)}, as: {body.kind}}}{other}")
     else:
         values = np.concatenate([columns.numbers[name] for name in body.rotation])
         unit = "deg" if np.nanmax(np.abs(values), initial=0.0) > 2.5 * np.pi else "rad"
-        order = ", order: ZYX" if body.kind == "euler" else ""
+        order = f", order: {body.order}" if body.kind == "euler" else ""
         lines.append(
             f"  rotation: {{columns: {_list(body.rotation)}, as: {body.kind}{order}, unit: {unit}}}   # deg or rad?"
         )
@@ -367,7 +256,22 @@ def _pose_lines(key: str, body: _Body | None, columns: Columns, doubt: str) -> l
     return lines
 
 
-def _force_lines(force: _Body, columns: Columns) -> list[str]:
+def _own_time(body: Body, columns: Columns, time: str | None) -> list[str]:
+    """A line for a body that has more or fewer samples than the clock of all, and another clock."""
+    count = len(columns.numbers[body.position[0]])
+    words = set(re.split(r"[^a-z]+", body.name.lower())) - {""}
+    fitting = {name: values for name, values in columns.numbers.items() if len(values) == count}
+    called = {n: v for n, v in fitting.items() if _TIME.search(n) and words & set(re.split(r"[^a-z]+", n.lower()))}
+    fitting = called or fitting
+    if time is None or (len(columns.numbers[time]) == count and time in (called or [time])):
+        return []
+    own, unit = _time_of(replace(columns, numbers=fitting))
+    if own is None or unit == "frames":
+        return ['  time: {column: "?", unit: s}   # CHANGE: it has times of its own']
+    return [f"  time: {{column: {_quoted(own)}, unit: {unit}, offset_s: 0.0}}   # is it the same clock?"]
+
+
+def _force_lines(force: Body, columns: Columns) -> list[str]:
     unit = next((columns.units[n] for n in force.force if columns.units.get(n) in FORCES), "N")
     return [
         f"force: {{columns: {_list(force.force)}, unit: {unit}, axes: world, acts_on: object}}"
@@ -403,11 +307,11 @@ def _guess_bag(source: Path) -> Guess:
     read = {topic for topic, _ in found}
     rows += [(topic, str(info.count), "", info.kind, "") for topic, info in topics.items() if topic not in read]
     bodies = {
-        key: _Body(name=f"{key[0]} {key[1] or ''}".strip(), position=["x", "y", "z"], rotation=_turn_columns(columns))
+        key: Body(name=f"{key[0]} {key[1] or ''}".strip(), position=["x", "y", "z"], rotation=_turn_columns(columns))
         for key, columns in found.items()
         if "tx" not in columns.numbers
     }
-    body, hand, _ = _roles(list(bodies.values()))
+    body, hand, _ = _roles(list(bodies.values()), None)
     force = next((key for key, columns in found.items() if "tx" in columns.numbers), None)
     where = {one.name: key for key, one in bodies.items()}
     columns = found[where[body.name]] if body is not None else Columns(source="", numbers={})

@@ -203,7 +203,7 @@ def _sections(rows: _Rows, decimal: str) -> list[tuple[list[list[str]], _Rows]]:
             k += 1
             continue
         below = first = _below_header(rows, k, bottom)
-        while first > bottom and _is_header(rows.fields[first - 1], len(rows.fields[k])):
+        while first > bottom and _is_header(rows.fields[first - 1], len(rows.fields[k]), decimal):
             first -= 1
         bottom = _end(rows, k, decimal)
         kept = [j for j in range(k, bottom) if _there(rows.fields[j])]
@@ -224,9 +224,14 @@ def _as_wide(rows: _Rows, j: int, k: int) -> bool:
     return abs(len(rows.fields[j]) - len(rows.fields[k])) <= 1
 
 
-def _is_header(fields: Sequence[str], width: int) -> bool:
+def _is_header(fields: Sequence[str], width: int, decimal: str) -> bool:
+    """Whether a line is one of a header, and not of the preamble's pairs of a key and its value above it."""
     there = len(_there(fields))
-    return there > 1 or (there == 1 and len(fields) == width)
+    if len(fields) == width or (len(fields) == width - 1 and there > 1):
+        return there > 0
+    # Names over the first column of each body may end before the table does.
+    carried = not fields or not fields[0]
+    return there > 0 and not _numbers_in(fields, decimal) and (carried or 2 * len(fields) >= width)
 
 
 def _end(rows: _Rows, start: int, decimal: str) -> int:
