@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from physid_drake.cell.hand_path import HandPath, subdivided
+from physid_drake.cell.variable_projection import ROUND_OFF_SHARE, VariableProjection
 
 Array = NDArray[np.float64]
 
@@ -118,11 +119,13 @@ class StraightFit:
         return self._white(self._columns(knots))
 
     def _columns(self, knots: Array) -> Array:
-        columns = [np.ones_like(self.times)]
+        lead = 2 if self._moving else 1
+        columns = np.empty((len(self.times), lead + len(knots)))
+        columns[:, 0] = 1.0
         if self._moving:
-            columns += [self.times / self._span]
-        columns += [np.maximum(self.times - k, 0.0) ** 2 / self._span**2 for k in knots]
-        return np.column_stack(columns)
+            columns[:, 1] = self.times / self._span
+        columns[:, lead:] = (np.maximum(self.times[:, None] - knots, 0.0) / self._span) ** 2
+        return columns
 
     def at_rest(self, knots: Array) -> Array:
         """The space (m, m - 2) of coefficients with which velocity and acceleration vanish after the last knot."""
@@ -149,7 +152,7 @@ class StraightFit:
 
     def _within(self, design: Array, space: Array) -> Curve:
         """The best curve with coefficients in a space (m, f)."""
-        inner, *_ = np.linalg.lstsq(design @ space, self._scaled, rcond=1e-13)
+        inner, *_ = np.linalg.lstsq(design @ space, self._scaled, rcond=ROUND_OFF_SHARE)
         coefficients: Array = space @ inner
         return Curve(coefficients, float(((self._scaled - design @ coefficients) ** 2).sum()), space)
 
@@ -202,15 +205,15 @@ class StraightFit:
         return moved if len(moved) == len(knots) and better and self._may_rest(held, free) else knots
 
     def _least(self, knots: Array, evaluations: int, *, ended: bool) -> Array:
-        """Knots of the least residual near others (variable projection, numerical Jacobian); fewer if some meet."""
-
-        def residual(places: Array) -> Array:
-            design = self.design(np.sort(places))
-            space = self.at_rest(np.sort(places)) if ended else np.eye(design.shape[1])
-            return np.asarray((self._scaled - design @ self._within(design, space).coefficients).ravel())
-
+        """Knots of the least residual near others; fewer if some meet."""
+        projection = VariableProjection(self._scaled, self.design, self.at_rest if ended else None)
         found = least_squares(
-            residual, knots, bounds=(-0.5 * SHORTEST_PIECE, self._span), x_scale=0.01, max_nfev=evaluations
+            projection.residual,
+            knots,
+            jac=projection.jacobian,
+            bounds=(-0.5 * SHORTEST_PIECE, self._span),
+            x_scale=0.01,
+            max_nfev=evaluations,
         )
         return self._separate(np.sort(found.x))
 

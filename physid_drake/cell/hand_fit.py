@@ -151,12 +151,19 @@ def stream_std(times: Array, positions: Array) -> float:
 
 
 def _rough(times: Array, positions: Array, order: int) -> float:
-    """Standard deviation of white noise that makes the divided differences (n - order, 2) of a stream."""
-    windows = sliding_window_view(times, order + 1)
+    """Standard deviation of white noise that makes the divided differences (n - order, 2) of a stream.
+
+    Where not a digit changes, the hand was held, or its last sample repeated: that says nothing of its noise.
+    """
+    windows, places = (sliding_window_view(values, order + 1, axis=0) for values in (times, positions))
+    alive = (np.ptp(places, axis=2) > 0.0).any(axis=1)
+    if not alive.any():
+        return 0.0
+    windows, places = windows[alive], places[alive]
     gaps = windows[:, :, None] - windows[:, None, :] + np.eye(order + 1)
     weights = 1.0 / np.prod(gaps / np.ptp(windows, axis=1)[:, None, None], axis=2)
     weights /= np.linalg.norm(weights, axis=1, keepdims=True)
-    differences = np.einsum("ij,ikj->ik", weights, sliding_window_view(positions, order + 1, axis=0))
+    differences = np.einsum("ij,ikj->ik", weights, places)
     return float(np.median(np.abs(differences)) / MEDIAN_OF_NORMAL)
 
 

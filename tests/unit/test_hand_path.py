@@ -6,7 +6,7 @@ from reference.planar import HandPath as ReferencePath
 from scipy.integrate import quad
 
 from physid_drake.cell import HandPath
-from physid_drake.cell.hand_fit import fit_hand_path, fit_hand_paths
+from physid_drake.cell.hand_fit import fit_hand_path, fit_hand_paths, stream_std
 from physid_drake.cell.hand_path import straight_path, subdivided
 
 
@@ -163,3 +163,13 @@ def test_a_hand_that_moves_by_next_to_nothing_is_one_that_stands():
     still = np.column_stack([1e-200 * times**2, np.zeros(60)])
     paths = fit_hand_paths([(times, still)] * 3, 1e-4)
     assert all(np.abs(path.velocities).max() < 1e-6 for path in paths)
+
+
+def test_a_hand_that_is_held_says_nothing_of_its_noise() -> None:
+    """Robots repeat the last sample while they stand: most differences are 0, and the noise is what motion shows."""
+    rng = np.random.default_rng(1)
+    times = np.arange(400) / 120.0
+    moving = np.column_stack([0.1 * times[:120], 0.02 * times[:120]]) + 1e-4 * rng.normal(size=(120, 2))
+    positions = np.vstack([np.repeat(moving[:1], 140, axis=0), moving, np.repeat(moving[-1:], 140, axis=0)])
+    assert 0.6e-4 < stream_std(times, positions) < 1.5e-4
+    assert stream_std(times, np.repeat(moving[:1], 400, axis=0)) == 0.0
