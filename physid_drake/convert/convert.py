@@ -15,10 +15,10 @@ import numpy as np
 from physid_drake.convert.arrays import read_array_table
 from physid_drake.convert.bag import ENDINGS, RECEIVE, STAMP, bag_files, read_bag
 from physid_drake.convert.columns import Columns
-from physid_drake.convert.cutting import Piece, pieces_of, rows_by_value
+from physid_drake.convert.cutting import Piece, pieces_of, rows_by_value, sizes_said
 from physid_drake.convert.map_reading import read_map
 from physid_drake.convert.mapping import Clock, ForceMap, Map, Offset, PoseMap, Quantity, Turn
-from physid_drake.convert.mesh import prism_of
+from physid_drake.convert.prisms import prism_of, prism_of_boxes
 from physid_drake.convert.streams import Streams, end_streams, streams_of
 from physid_drake.convert.text_table import read_text_table
 from physid_drake.errors import RecordingError
@@ -112,7 +112,7 @@ def _convert(
     *,
     whole: bool = False,
 ) -> Recording:
-    chart = _with_mesh(read_map(Path(map_file)))
+    chart = _with_prism(read_map(Path(map_file)))
     pushes: list[Push] = []
     for file in files[:1] if whole else files:
         try:
@@ -128,14 +128,17 @@ def _convert(
     return _written(pushes, chart, _conversion(Path(source), files, chart), folder)
 
 
-def _with_mesh(chart: Map) -> Map:
-    """The map with its mesh as the prism that it is, and the object's pose from the tracked frame to its middle."""
+def _with_prism(chart: Map) -> Map:
+    """The map with the prism that its mesh or its boxes are, and the pose of that in the tracked frame."""
     model = chart.model
     if isinstance(model, ObjectModel):
         return chart
     if chart.object.offset != Offset():
-        raise RecordingError("object: offset stands beside recording.object.frame of a mesh; give one of them.")
-    made = prism_of(model.file, model.scale, model.frame)
+        raise RecordingError("object: offset stands beside recording.object.frame; give one of them.")
+    if isinstance(model.parts, Path):
+        made = prism_of(model.parts, model.scale, model.frame)
+    else:
+        made = prism_of_boxes(model.parts, model.scale, model.frame)
     warnings.warn(f"{made.says}.", UserWarning, stacklevel=2)
     end = chart.object.end
     body = replace(chart.object, offset=made.offset, end=None if end is None else replace(end, offset=made.offset))
@@ -151,8 +154,10 @@ def _pieces(name: str, parts: Parts) -> list[tuple[str, Piece]]:
         with np.errstate(over="ignore", invalid="ignore"):
             streams = end_streams(columns["object"], chart) if chart.cut.by == "rows" else streams_of(columns, chart)
         pieces, left = pieces_of(streams, chart.cut, reach)
+        if not pieces and chart.cut.by == "rest":
+            left.append(f"along x, y, z of W {sizes_said(streams)}; are units and axes right?")
         for line in left:
-            warnings.warn(f"{name}{label}: {line}.", UserWarning, stacklevel=2)
+            warnings.warn(f"{name}{label}: {line}", UserWarning, stacklevel=2)
         found.extend((label, piece) for piece in pieces)
     return found
 

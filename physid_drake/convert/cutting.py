@@ -68,7 +68,7 @@ def pieces_of(streams: Streams, cut: Cut, reach: float) -> tuple[list[Piece], li
             kept.append(Piece(streams=piece, begin=float(piece.object.times[0])))
         else:
             left.setdefault(problem or "", []).append(_span(begin, end))
-    return kept, [f"{spans[0]}{_more(spans)} {problem}; left out" for problem, spans in left.items()]
+    return kept, [f"{spans[0]}{_more(spans)} {problem}; left out." for problem, spans in left.items()]
 
 
 def _more(spans: list[str]) -> str:
@@ -129,15 +129,29 @@ def _no_push(piece: Streams, reach: float) -> str | None:
         return "moves the object by less than 1 mm and 1 degree"
     if heights.max() > max(heights[0], heights[-1]) + LIFTED:
         return "lifts the object"
-    if piece.hand is not None and not _comes_near(piece.object, piece.hand, reach):
+    if piece.hand is not None and _nearest(piece.object, piece.hand) > reach + REACH:
         return "moves the object while the hand is elsewhere"
     return None
 
 
-def _comes_near(body: PoseStream, hand: PoseStream, reach: float) -> bool:
+def _nearest(body: PoseStream, hand: PoseStream) -> float:
+    """The least distance between the hand's tip and the object's origin, seen from above [m]."""
     at = np.column_stack([np.interp(body.times, hand.times, hand.positions[:, k]) for k in (0, 1)])
     gaps: Array = np.linalg.norm(at - body.positions[:, :2], axis=1)
-    return bool(gaps.min() < reach + REACH)
+    return float(gaps.min())
+
+
+def sizes_said(streams: Streams) -> str:
+    """How far object and hand go along x, y and z, for a person who may have mistaken a unit."""
+    said = ["the object " + _ways(streams.object)]
+    if streams.hand is not None:
+        said.append("the hand " + _ways(streams.hand))
+    return " and ".join(said)
+
+
+def _ways(stream: PoseStream) -> str:
+    ways = np.ptp(stream.positions, axis=0)
+    return "goes over " + ", ".join(f"{way:.3g}" for way in ways) + " m"
 
 
 def rows_by_value(values: Array) -> Iterator[tuple[float, NDArray[np.intp]]]:

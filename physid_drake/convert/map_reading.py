@@ -11,33 +11,29 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from physid_drake.convert.map_values import not_negative, positive, rotation_from, size_of_unit, truth, unit_of
 from physid_drake.convert.mapping import (
     COUNTS,
     CUTS,
     FORMAT,
-    NORM_TOLERANCE,
     ROTATIONS,
     Clock,
     Cut,
     ForceMap,
     Map,
-    MeshFrame,
-    MeshMap,
     Offset,
     PoseMap,
     Quantity,
     Turn,
     World,
 )
+from physid_drake.convert.solid_reading import model_from
 from physid_drake.convert.text_table import Dialect
 from physid_drake.convert.units import ANGLES, FORCES, LENGTHS, SPEEDS, TIMES, factor
-from physid_drake.recording import ObjectModel
 from physid_drake.recording.description import (
     Section,
     hand_from,
-    inside,
     load_section,
-    object_from,
     sensors_from,
     table_from,
 )
@@ -76,7 +72,7 @@ def read_map(file: Path) -> Map:
         file=file,
         name=described.text("name"),
         description=described.text("description", ""),
-        model=_model(described, file.parent),
+        model=model_from(described, file.parent),
         table=table_from(described),
         hand=hand,
         sensors=sensors_from(described),
@@ -88,34 +84,6 @@ def read_map(file: Path) -> Map:
         hand_path=path,
         force=force,
         cut=cut,
-    )
-
-
-def _model(described: Section, folder: Path) -> ObjectModel | MeshMap:
-    """The object; a mesh is looked at when the log is converted."""
-    section = cast(Section, described.section("object"))
-    if section.values.get("shape") != "mesh":
-        return object_from(described, folder)
-    section.check_keys("shape", "file", "unit", "up", "frame", "mass_kg", "mass_std_kg")
-    name = section.text("file")
-    file = inside(folder, name)
-    if file is None:
-        raise section.refuse("file", f"must lie in the map's folder, but got {shown(name)}; move it.")
-    frame = section.section("frame", required=False)
-    if frame is not None:
-        frame.check_keys("translation", "rotation_wxyz", "yaw_deg")
-    place = frame.numbers("translation", 3) if frame is not None and frame.has("translation") else (0.0, 0.0, 0.0)
-    up = section.choice("up", "x", "y", "z") if section.has("up") else "z"
-    return MeshMap(
-        file=file,
-        scale=_factor(section, LENGTHS, "m"),
-        frame=MeshFrame(
-            axes=np.roll(np.eye(3), "zxy".index(up), axis=1),
-            translation=(place[0], place[1], place[2]),
-            rotation=(1.0, 0.0, 0.0, 0.0) if frame is None else _rotation(frame),
-        ),
-        mass=section.maybe_number("mass_kg"),
-        mass_std=section.maybe_number("mass_std_kg"),
     )
 
 
@@ -170,17 +138,17 @@ def _world(section: Section) -> World:
     if section.has("pose"):
         return _world_by_pose(section)
     axes = _axes(section) if section.has("axes") else np.eye(3)
-    left = _truth(section, "left_handed")
+    left = truth(section, "left_handed")
     if (np.linalg.det(axes) < 0.0) != left:
         kind = "a mirror image" if not left else "none"
         raise section.refuse(
             "axes", f"these make {kind} of the source; set left_handed: {str(not left).lower()} only if its axes are"
             " left-handed (thumb x, forefinger y, middle finger z of the left hand), else correct the axes."
         )  # fmt: skip
-    scale = _factor(section, LENGTHS, "m")
+    scale = size_of_unit(section, LENGTHS, "m")
     origin = section.numbers("origin", 3) if section.has("origin") else (0.0, 0.0, 0.0)
     return World(
-        axes=axes, origin=(scale * origin[0], scale * origin[1], scale * origin[2]), rotation=_rotation(section)
+        axes=axes, origin=(scale * origin[0], scale * origin[1], scale * origin[2]), rotation=rotation_from(section)
     )
 
 
@@ -191,7 +159,7 @@ def _world_by_pose(section: Section) -> World:
             raise section.refuse(str(key), "stands beside pose, which says all; remove one of them.")
     pose = cast(Section, section.section("pose"))
     pose.check_keys("translation", "unit", "rotation_wxyz", "yaw_deg")
-    place, turn = np.multiply(_factor(pose, LENGTHS, "m"), pose.numbers("translation", 3)), _rotation(pose)
+    place, turn = np.multiply(size_of_unit(pose, LENGTHS, "m"), pose.numbers("translation", 3)), rotation_from(pose)
     origin = -Rotation.from_quat(np.roll(turn, -1)).inv().apply(place)
     return World(origin=(float(origin[0]), float(origin[1]), float(origin[2])), rotation=turn)
 
@@ -212,12 +180,6 @@ def _as_axes(value: object) -> list[str] | None:
     return words if good and len({word[-1] for word in words}) == 3 else None
 
 
-def _truth(section: Section, key: str) -> bool:
-    if not section.has(key):
-        return False
-    return section.get(key, "true or false", lambda value: (value,) if isinstance(value, bool) else None)[0]
-
-
 def _clock(section: Section) -> Clock:
     section.check_keys("column", "unit", "rate_hz", "offset_s")
     if section.has("unit") and section.has("rate_hz"):
@@ -227,7 +189,7 @@ def _clock(section: Section) -> Clock:
         with section.naming("unit"):
             factor(unit, TIMES, "times")
     column = section.text("column") if section.has("column") else None
-    rate = _positive(section, "rate_hz", 1.0) if section.has("rate_hz") else None
+    rate = positive(section, "rate_hz", 1.0) if section.has("rate_hz") else None
     return Clock(column=column, unit=unit, rate=rate, offset=section.maybe_number("offset_s") or 0.0)
 
 
@@ -241,7 +203,7 @@ def _pose(section: Section) -> PoseMap:
     if isinstance(section.values.get("speed"), dict):
         speed = _quantity(cast(Section, section.section("speed")), SPEEDS, (1,))
     elif section.has("speed"):
-        speed = _positive(section, "speed", 1.0)
+        speed = positive(section, "speed", 1.0)
     return replace(first, end=last, speed=speed)
 
 
@@ -276,8 +238,12 @@ def _turn(section: Section) -> Turn | None:
     if kind == "euler" and (sorted(order.lower()) != sorted(set(order.lower())) or _bad_order(order)):
         raise inner.refuse("order", f"must be such as XYZ (about the body's axes) or xyz, but got {shown(order)}.")
     return Turn(
-        columns=columns, kind=kind, unit=_unit(inner, ANGLES, "angles"), order=order, inverse=_truth(inner, "inverse")
-    )  # fmt: skip
+        columns=columns,
+        kind=kind,
+        unit=unit_of(inner, ANGLES, "angles"),
+        order=order,
+        inverse=truth(inner, "inverse"),
+    )
 
 
 def _bad_order(order: str) -> bool:
@@ -295,19 +261,19 @@ def _force(section: Section) -> ForceMap:
     return ForceMap(
         topic=topic,
         clock=_maybe(section, "time", _clock) or Clock(),
-        force=Quantity(columns=columns, unit=_unit(section, FORCES, "forces")),
+        force=Quantity(columns=columns, unit=unit_of(section, FORCES, "forces")),
         in_hand=section.has("axes") and section.choice("axes", "world", "hand") == "hand",
         offset=_maybe(section, "offset", _offset) or Offset(),
         on_hand=section.has("acts_on") and section.choice("acts_on", "object", "hand") == "hand",
-        weight=_not_negative(section, "weight_n", 0.0),
-        tare=_not_negative(section, "tare_s", 0.0),
+        weight=not_negative(section, "weight_n", 0.0),
+        tare=not_negative(section, "tare_s", 0.0),
     )
 
 
 def _quantity(section: Section, kind: Mapping[str, float], counts: tuple[int, ...]) -> Quantity:
     section.check_keys("columns", "unit")
     columns = _names(section, counts) if section.has("columns") else ()
-    return Quantity(columns=columns, unit=_unit(section, kind, "it"))
+    return Quantity(columns=columns, unit=unit_of(section, kind, "it"))
 
 
 def _names(section: Section, counts: tuple[int, ...]) -> tuple[str, ...]:
@@ -321,40 +287,11 @@ def _names(section: Section, counts: tuple[int, ...]) -> tuple[str, ...]:
     return section.get("columns", f"the names of {wanted} column(s)", accept)
 
 
-def _unit(section: Section, kind: Mapping[str, float], what: str) -> str | None:
-    if not section.has("unit"):
-        return None
-    unit = section.text("unit")
-    with section.naming("unit"):
-        factor(unit, kind, what)
-    return unit
-
-
-def _factor(section: Section, kind: Mapping[str, float], default: str) -> float:
-    return kind[_unit(section, kind, "it") or default]
-
-
 def _offset(section: Section) -> Offset:
     section.check_keys("translation", "unit", "rotation_wxyz", "yaw_deg")
-    scale = _factor(section, LENGTHS, "m")
+    scale = size_of_unit(section, LENGTHS, "m")
     place = section.numbers("translation", 3) if section.has("translation") else (0.0, 0.0, 0.0)
-    return Offset(translation=(scale * place[0], scale * place[1], scale * place[2]), rotation=_rotation(section))
-
-
-def _rotation(section: Section) -> tuple[float, float, float, float]:
-    """A rotation that stays, as a quaternion or as an angle about the vertical."""
-    if section.has("rotation_wxyz") and section.has("yaw_deg"):
-        raise section.refuse("yaw_deg", "stands beside rotation_wxyz; give one of them.")
-    if section.has("yaw_deg"):
-        half = 0.5 * np.deg2rad(section.number("yaw_deg"))
-        return float(np.cos(half)), 0.0, 0.0, float(np.sin(half))
-    if not section.has("rotation_wxyz"):
-        return 1.0, 0.0, 0.0, 0.0
-    w, x, y, z = section.numbers("rotation_wxyz", 4)
-    norm = float(np.linalg.norm([w, x, y, z]))
-    if abs(norm - 1.0) > NORM_TOLERANCE:
-        raise section.refuse("rotation_wxyz", f"must have norm 1 within {NORM_TOLERANCE:g}, but got {norm:.4g}.")
-    return w / norm, x / norm, y / norm, z / norm
+    return Offset(translation=(scale * place[0], scale * place[1], scale * place[2]), rotation=rotation_from(section))
 
 
 def _cut(section: Section) -> Cut:
@@ -369,10 +306,10 @@ def _cut(section: Section) -> Cut:
     return Cut(
         by=by,
         column=column,
-        gap=_positive(section, "gap_s", plain.gap),
-        still=_positive(section, "still_s", plain.still),
-        lead=_positive(section, "lead_s", plain.lead),
-        tail=_positive(section, "tail_s", plain.tail),
+        gap=positive(section, "gap_s", plain.gap),
+        still=positive(section, "still_s", plain.still),
+        lead=positive(section, "lead_s", plain.lead),
+        tail=positive(section, "tail_s", plain.tail),
         times=times,
     )
 
@@ -387,17 +324,3 @@ def _as_times(value: object) -> tuple[tuple[float, float], ...] | None:
             return None
         pairs.append((float(one[0]), float(one[1])))
     return tuple(pairs)
-
-
-def _positive(section: Section, key: str, default: float) -> float:
-    value = section.maybe_number(key)
-    if value is not None and value <= 0.0:
-        raise section.refuse(key, f"must be positive, but got {value:g}.")
-    return default if value is None else value
-
-
-def _not_negative(section: Section, key: str, default: float) -> float:
-    value = section.maybe_number(key)
-    if value is not None and value < 0.0:
-        raise section.refuse(key, f"must not be negative, but got {value:g}.")
-    return default if value is None else value

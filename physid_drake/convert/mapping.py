@@ -86,7 +86,7 @@ class Offset:
 
 @dataclass(frozen=True, kw_only=True)
 class MeshFrame:
-    """How an object's mesh lies.
+    """How an object's mesh, or its boxes, lie.
 
     Attributes:
         axes: (3, 3) turns the mesh's coordinates into some whose z is up.
@@ -100,10 +100,26 @@ class MeshFrame:
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeshMap:
-    """An object that is given by a mesh: its file, the size of its unit [m], how it lies, and what it weighs."""
+class BoxPart:
+    """One of the boxes that an object is made of: sizes and centre (x, y, z) in their unit, and its yaw [rad]."""
 
-    file: Path
+    size: tuple[float, float, float]
+    centre: tuple[float, float, float]
+    yaw: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolidMap:
+    """An object that is given by a mesh or by boxes.
+
+    Attributes:
+        parts: the mesh's file, or the boxes.
+        scale: size of their unit [m].
+        frame: how they lie, and where the tracked frame is in them.
+        mass: [kg], and its standard deviation; None where nobody weighed it.
+    """
+
+    parts: Path | tuple[BoxPart, ...]
     scale: float
     frame: MeshFrame
     mass: float | None
@@ -207,7 +223,7 @@ class Map:
     Attributes:
         file: of the map.
         name, description, model, table, hand, sensors: of the recording, as in ``recording.yaml``; the object may
-            be a mesh.
+            be a mesh, or boxes.
         dialect: how a table is written.
         by_receive: of a bag: whether times are those of arrival, instead of those in the messages' headers.
         world: where W lies.
@@ -219,7 +235,7 @@ class Map:
     file: Path
     name: str
     description: str
-    model: ObjectModel | MeshMap
+    model: ObjectModel | SolidMap
     table: Table
     hand: Hand | None
     sensors: Sensors

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.ndimage import median_filter
+from scipy.spatial import ConvexHull
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.pushes.force_windows import WINDOW, too_seldom
@@ -11,8 +12,10 @@ from physid_drake.pushes.frames import AT_A_TIME, SELDOM, UNSEEN_WAY, depths_at_
 from physid_drake.pushes.hand_stream import touching_radius
 from physid_drake.pushes.plausible import implausible, some_names
 from physid_drake.pushes.stated import too_loud
-from physid_drake.recording import Cylinder, Push, Recording
+from physid_drake.recording import Cylinder, MeshShape, Push, Recording
+from physid_drake.recording.obj import read_obj
 
+FILLS = 0.95  # of its convex hull: a mesh that fills less has notches, or is hollow
 LEANS = 8.0  # degrees by which an object's lean changes: on a table it stands on its face
 RISES = 8e-3  # m by which an object's height changes: on a table it does not
 BESIDE = 3e-3  # m between tip and face as objects begin to move: 1 mm at most where description and frames agree
@@ -26,6 +29,7 @@ def doubts(recording: Recording) -> tuple[str, ...]:
         *_beside_the_tip(recording),
         *_sparse_forces(recording),
         *_hand_seldom_seen(recording),
+        *_notched_mesh(recording),
         *implausible(recording),
         *too_loud(recording),
     )
@@ -53,6 +57,25 @@ def _rising(recording: Recording) -> tuple[str, ...]:
     return (
         f"the object's height changes by more than {1e3 * RISES:.0f} mm; is it on the table all the time, and is z of"
         f" W the table's normal? {some_names(names)}",
+    )
+
+
+def _notched_mesh(recording: Recording) -> tuple[str, ...]:
+    """A mesh that does not fill its convex hull: a tip may reach into what the hull covers."""
+    shape = recording.object.shape
+    if not isinstance(shape, MeshShape):
+        return ()
+    mesh = read_obj(shape.file)
+    corners = mesh.vertices[mesh.triangles][:, :, :2]
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    # What overhangs counts twice: the true share is no larger.
+    facing_up = 0.5 * np.maximum(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0], 0.0).sum()
+    share = facing_up / ConvexHull(mesh.vertices[:, :2]).volume
+    if not 0.0 < share < FILLS:
+        return ()
+    return (
+        f"seen from above, the object's mesh fills {100.0 * share:.0f} % of its convex hull, which is what counts:"
+        " give its outline as a prism, or convert with a map whose object is the mesh",
     )
 
 

@@ -47,8 +47,9 @@ from physid_drake.report.numbers import (
     tenths,
     tiny,
 )
+from physid_drake.report.outline import outline_of
 from physid_drake.report.svg import AFTER, BEFORE, CONTACT, FREE, INK, MUTED, drawn
-from physid_drake.report.table_view import MM, ShownPush, TableView, outline_of
+from physid_drake.report.table_view import MM, ShownPush, TableView
 
 __all__ = ["ShownPush", "diagnosis_page"]
 

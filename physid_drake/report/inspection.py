@@ -15,7 +15,8 @@ from rich.table import Table
 
 from physid_drake.recording.rounding import rounding_std
 from physid_drake.recording.statistics import NoiseEstimate, PushSummary, estimate_noise, summarise
-from physid_drake.recording.values import Array, Box, Cylinder, Prism, Recording, Shape
+from physid_drake.recording.values import Array, Recording
+from physid_drake.report.outline import outline_of
 
 MOST_KINDS = 8
 """Lines of warnings for a recording."""
@@ -104,7 +105,7 @@ def draw_pushes(recording: Recording) -> Figure:
     """
     figure = Figure(figsize=(8.0, 8.0), layout="constrained")
     axes = figure.add_subplot()
-    outline = _outline(recording.object.shape)
+    outline = outline_of(recording.object.shape)
     many = len(recording.pushes) > _MANY_PUSHES
     width = 0.5 if many else 1.2
     for push in recording.pushes:
@@ -145,22 +146,6 @@ def _finish(axes: Axes, recording: Recording) -> None:
         handles.append(Line2D([], [], color="tab:orange", label="hand path (dot: end)"))
     axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, -0.07), ncols=3, frameon=False)
     axes.grid(linewidth=0.3)
-
-
-def _outline(shape: Shape) -> Array | None:
-    """Corners (n, 2) in m of the shape seen from above; None for a mesh, whose file is not read here."""
-    if isinstance(shape, Prism):
-        return np.array(shape.polygon)
-    if isinstance(shape, Cylinder) and shape.axis == "z":
-        angles = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
-        return shape.radius * np.column_stack([np.cos(angles), np.sin(angles)])
-    if isinstance(shape, Cylinder):
-        x, y = shape.radius, 0.5 * shape.length
-    elif isinstance(shape, Box):
-        x, y = 0.5 * shape.size[0], 0.5 * shape.size[1]
-    else:
-        return None
-    return np.array([[-x, -y], [x, -y], [x, y], [-x, y]])
 
 
 def _rounding(recording: Recording) -> tuple[float, float]:

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from physid_drake.effects.rollout import Geometry, geometry_with
 from physid_drake.plan import DistanceToGoal, Ending, Hindsight, InsideRegion, Outcome, Plan, SweepRow
+from physid_drake.report.outline import outline_of
 from physid_drake.report.plan import plan_rows, push_files, title_of
 from physid_drake.report.svg import MUTED, drawn, svg_of
-from physid_drake.report.table_view import MM, outline_of, placed
+from physid_drake.report.table_view import MM, placed
 
 Array = NDArray[np.float64]
 

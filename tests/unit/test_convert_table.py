@@ -82,6 +82,16 @@ def test_an_object_that_is_carried_back_is_left_out_and_said_once(sealed: Record
     assert len(said) == 1 and len(found.pushes) == 11
 
 
+def test_a_unit_that_is_wrong_shows_in_how_far_things_go(sealed: Recording, tmp_path: Path) -> None:
+    chart = foreign.qualisys(sealed, tmp_path / "log.tsv")
+    (tmp_path / "map.yaml").write_text(chart.replace("mug Z], unit: mm", "mug Z], unit: m"))
+    with (
+        pytest.warns(UserWarning, match=r"the object goes over 237, \d+, 104 m and the hand goes over 0\.25"),
+        pytest.raises(RecordingError, match="no push was found"),
+    ):
+        convert_table(tmp_path / "log.tsv", tmp_path / "out", tmp_path / "map.yaml")
+
+
 def test_written_in_the_recording_and_read_back(sealed: Recording, tmp_path: Path) -> None:
     found = converted(sealed, foreign.lerobot, "data.parquet", tmp_path) if _has("pyarrow") else None
     if found is None:

@@ -15,7 +15,7 @@ from physid_drake.pushes.doubts import doubts
 from physid_drake.pushes.frames import _brakes_hardly_seen, check_force_direction
 from physid_drake.pushes.problem import problems_of
 from physid_drake.pushes.refusals import refusals
-from physid_drake.recording import ForceStream, PoseStream
+from physid_drake.recording import ForceStream, MeshShape, PoseStream
 from physid_drake.report.tables import estimates_table, verdict
 
 
@@ -200,3 +200,27 @@ def test_pushes_that_fit_by_frictions_alone_are_not_said_to_be_explained():
     assert "frictions that differ by 14 %" in verdict(told)
     told.explains = True
     assert verdict(told).startswith("The plain cell explains")
+
+
+def _boxes_obj(*boxes):
+    """Boxes (x0, y0, x1, y1), 30 mm high, as one OBJ file in m, every face wound outwards."""
+    vertices, faces = [], []
+    for x0, y0, x1, y1 in boxes:
+        n = len(vertices)
+        vertices += [(x, y, z) for z in (0.0, 0.03) for x, y in ((x0, y0), (x1, y0), (x1, y1), (x0, y1))]
+        quads = ((4, 3, 2, 1), (5, 6, 7, 8), (1, 2, 6, 5), (2, 3, 7, 6), (3, 4, 8, 7), (4, 1, 5, 8))
+        faces += [[n + k for k in quad] for quad in quads]
+    rows = [f"v {x} {y} {z}" for x, y, z in vertices] + ["f " + " ".join(map(str, face)) for face in faces]
+    return "\n".join(rows) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("boxes", "said"),
+    [(((-0.05, -0.02, 0.05, 0.02),), []), (((-0.05, 0.0, 0.05, 0.02), (-0.01, -0.06, 0.01, 0.0)), ["fills 57 %"])],
+)
+def test_a_mesh_with_notches(boxes, said, recording, tmp_path):
+    (tmp_path / "object.obj").write_text(_boxes_obj(*boxes))
+    shape = MeshShape(file=tmp_path / "object.obj")
+    meshed = replace(recording, object=replace(recording.object, shape=shape))
+    found = [line for line in doubts(meshed) if "convex hull" in line]
+    assert len(found) == len(said) and all(part in line for part, line in zip(said, found, strict=True))

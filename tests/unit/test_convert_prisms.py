@@ -1,4 +1,4 @@
-"""Meshes become prisms: outline with notches, height, middle; in any unit, with any axis up; else one line."""
+"""Meshes and boxes become prisms: outline with notches, height, middle; any unit, any axis up; else one line."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from physid_drake.convert import convert_table
-from physid_drake.convert.mapping import MeshFrame
-from physid_drake.convert.mesh import prism_of
+from physid_drake.convert.mapping import BoxPart, MeshFrame
+from physid_drake.convert.prisms import prism_of, prism_of_boxes
 from physid_drake.errors import RecordingError
 from physid_drake.recording import Prism, Recording, outline_distance, polygon_centroid, read_recording
 from physid_drake.recording.outlines import _triangles
@@ -121,15 +121,58 @@ def test_broken_meshes_are_one_line(name: str, content: bytes, said: str, tmp_pa
     assert "\n" not in str(caught.value)
 
 
-def test_a_map_with_a_mesh(tee: trimesh.Trimesh, tmp_path: Path) -> None:
+BAR = BoxPart(size=(160.0, 40.0, HEIGHT), centre=(0.0, 20.0, 15.0), yaw=0.0)
+STEM = BoxPart(size=(40.0, 120.0, HEIGHT), centre=(0.0, -60.0, 15.0), yaw=0.0)
+
+
+def test_two_boxes_are_a_tee() -> None:
+    made = prism_of_boxes((BAR, STEM), 1e-3, MeshFrame())
+    centre = polygon_centroid(TEE)
+    assert len(made.shape.polygon) == 8 and made.shape.height == pytest.approx(0.03)
+    assert np.abs(outline_distance(1e-3 * (TEE - centre), np.array(made.shape.polygon))).max() < 1e-6
+    assert made.offset.translation == pytest.approx([*(1e-3 * centre), 0.015], abs=1e-6)
+
+
+def test_boxes_may_be_turned() -> None:
+    """A square and one turned by 45 degrees are a star of eight points and sixteen corners."""
+    square = BoxPart(size=(2.0, 2.0, 1.0), centre=(0.0, 0.0, 0.0), yaw=0.0)
+    turned = BoxPart(size=(2.0, 2.0, 1.0), centre=(0.0, 0.0, 0.0), yaw=np.pi / 4.0)
+    radii = np.linalg.norm(prism_of_boxes((square, turned), 0.05, MeshFrame()).shape.polygon, axis=1)
+    assert len(radii) == 16 and radii.max() == pytest.approx(0.05 * np.sqrt(2.0), abs=1e-6)
+    # An edge of one crosses an edge of the other half way between two points of the star.
+    assert radii.min() == pytest.approx(0.05 / np.cos(np.pi / 8.0), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("other", "said"),
+    [
+        (
+            BoxPart(size=(40.0, 120.0, 20.0), centre=(0.0, -60.0, 10.0), yaw=0.0),
+            r"reach from 0\.0 to 30\.0, 0\.0 to 20",
+        ),
+        (BoxPart(size=(40.0, 20.0, HEIGHT), centre=(0.0, -60.0, 15.0), yaw=0.0), "it is in several parts"),
+    ],
+)
+def test_boxes_that_are_no_prism(other: BoxPart, said: str) -> None:
+    with pytest.raises(RecordingError, match=said) as caught:
+        prism_of_boxes((BAR, other), 1e-3, MeshFrame())
+    assert "\n" not in str(caught.value)
+
+
+BOXES = "boxes: [{size: [160, 40, 30], centre: [0, 20, 15]}, {size: [40, 120, 30], centre: [0, -60, 15], yaw_deg: 0}]"
+
+
+@pytest.mark.parametrize("given", ["mesh", "boxes"])
+def test_a_map_with_a_mesh_or_boxes(given: str, tee: trimesh.Trimesh, tmp_path: Path) -> None:
     sealed: Recording = read_recording(SEALED).subset([0, 1])
     chart = foreign.german(sealed, tmp_path / "log.csv")
     tee.export(tmp_path / "tee.stl")
     ours = "object: {shape: cylinder, radius_m: 0.0356, length_m: 0.0459, axis: z, mass_kg: 0.90393}"
     assert ours in chart
-    mesh = "object: {shape: mesh, file: tee.stl, unit: mm, mass_kg: 0.4, frame: {translation: [0, 0, 15]}}"
+    parts = {"mesh": "shape: mesh, file: tee.stl", "boxes": f"shape: boxes, {BOXES}"}[given]
+    mesh = f"object: {{{parts}, unit: mm, mass_kg: 0.4, frame: {{translation: [0, 0, 15]}}}}"
     (tmp_path / "map.yaml").write_text(chart.replace(ours, mesh))
-    with pytest.warns(UserWarning, match=r"tee.stl: a prism of 8 corners"):
+    with pytest.warns(UserWarning, match=r"(tee.stl|2 boxes): a prism of 8 corners"):
         found = convert_table(tmp_path / "log.csv", tmp_path / "out", tmp_path / "map.yaml")
     assert isinstance(found.object.shape, Prism) and found.object.mass == 0.4
     shift = 1e-3 * polygon_centroid(TEE)
@@ -142,3 +185,24 @@ def test_a_map_with_a_mesh(tee: trimesh.Trimesh, tmp_path: Path) -> None:
     with warnings.catch_warnings(), pytest.raises(RecordingError, match="offset stands beside"):
         warnings.simplefilter("ignore")
         convert_table(tmp_path / "log.csv", tmp_path / "again", tmp_path / "both.yaml")
+
+
+@pytest.mark.parametrize(
+    "boxes",
+    [
+        "[]",
+        "3",
+        "[{size: [1, 1, 1]}]",
+        "[{size: [1, 1, -1], centre: [0, 0, 0]}]",
+        "[{size: [1, 1], centre: [0, 0, 0]}]",
+        "[{size: [1, 1, .inf], centre: [0, 0, 0]}]",
+        "[{size: [1, 1, 1], centre: [0, 0, 0], roll: 3}]",
+        "[{size: [1, 1, true], centre: [0, 0, 0]}]",
+    ],
+)
+def test_boxes_that_are_none(boxes: str, tmp_path: Path) -> None:
+    chart = foreign.german(read_recording(SEALED).subset([0]), tmp_path / "log.csv")
+    ours = "object: {shape: cylinder, radius_m: 0.0356, length_m: 0.0459, axis: z, mass_kg: 0.90393}"
+    (tmp_path / "map.yaml").write_text(chart.replace(ours, f"object: {{shape: boxes, boxes: {boxes}}}"))
+    with pytest.raises(RecordingError, match=r"object\.boxes: must be a list of \{size: \[x, y, z\]"):
+        convert_table(tmp_path / "log.csv", tmp_path / "out", tmp_path / "map.yaml")
