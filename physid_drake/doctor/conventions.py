@@ -18,6 +18,7 @@ from scipy.optimize import least_squares
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.cell.touch import Tip
+from physid_drake.errors import RecordingError
 from physid_drake.recording import (
     Box,
     Cylinder,
@@ -41,6 +42,13 @@ MOVING: Final = 0.02
 LEAST_LATE: Final = 0.015
 LEAST_SHIFT: Final = 2e-3
 """s, m: clocks and frames that differ by less are physics (lag, offset), or noise."""
+UNITS: Final = {
+    1e-3: "1000 times too large (mm for m)", 1e-2: "100 times too large (cm for m)",
+    0.1: "10 times too large (mm for cm)", 0.0254: "39.4 times too large (inch for m)",
+    10.0: "10 times too small (cm for mm)", 100.0: "100 times too small (m for cm)",
+    1e3: "1000 times too small (m for mm)",
+}  # fmt: skip
+"""Factors that put places right whose unit is another one than was said."""
 POUND: Final = 0.45359237
 EARTH: Final = 9.80665
 
@@ -62,13 +70,29 @@ class Convention:
 
 def conventions_of(recording: Recording) -> Iterator[Convention]:
     """Everything that may be wrong with places, turns, sizes and clocks, one at a time."""
-    yield from _rotations(recording)
-    if recording.hand is not None:
-        yield from _axes(recording)
-        yield from _sizes_of_tip(recording)
-        yield from _clocks(recording)
-        yield from _shifts(recording)
-    yield from _sizes_of_object(recording)
+    for propose in _kinds(recording):
+        yield from propose(recording)
+
+
+def pairs_of(recording: Recording) -> Iterator[Convention]:
+    """Two of these at once, of different kinds; what is measured, such as a shift, after what is not."""
+    kinds = _kinds(recording)
+    for k, propose in enumerate(kinds):
+        for first in propose(recording):
+            for other in kinds[k + 1 :]:
+                for second in other(first.recording):
+                    yield Convention(
+                        says=f"{first.says}, and {second.says}",
+                        remedy=f"{first.remedy}; {second.remedy}",
+                        recording=second.recording,
+                    )
+
+
+def _kinds(recording: Recording) -> list[Callable[[Recording], Iterator[Convention]]]:
+    """Of one kind, one thing is wrong at most."""
+    if recording.hand is None:
+        return [_rotations, _sizes_of_object]
+    return [_units, _axes, _rotations, _sizes_of_object, _sizes_of_tip, _clocks, _shifts]
 
 
 def conventions_of_forces(recording: Recording) -> Iterator[Convention]:
@@ -85,14 +109,14 @@ def without_forces(recording: Recording) -> Recording:
 
 
 def gap_of(recording: Recording) -> float:
-    """How far the tip is from the outline while something pushes the object [m], the median; 0 where nobody can tell.
+    """How far the tip is from the outline while something pushes the object [m], the median; NaN if nothing does.
 
     It takes milliseconds, and tells most of what is wrong with frames apart.
     """
     if recording.hand is None:
-        return 0.0
+        return math.nan
     gaps = _gaps(recording, [_driven(push) for push in recording.pushes])
-    return float(np.median(np.abs(gaps))) if len(gaps) else 0.0
+    return float(np.median(np.abs(gaps))) if len(gaps) else math.nan
 
 
 def _each(recording: Recording, change: Callable[[Push], Push]) -> Recording:
@@ -177,6 +201,31 @@ def _axes(recording: Recording) -> Iterator[Convention]:
             remedy="map: world.axes with left_handed: true, or columns of object.position and hand.position",
             recording=_each(recording, partial(_both_axes, matrix=np.array(matrices[said]))),
         )
+
+
+def _units(recording: Recording) -> Iterator[Convention]:
+    """Places of one stream, or of both, in another unit than was said."""
+    streams: Sequence[tuple[str, bool, bool]] = (
+        ("the hand's places", False, True), ("the object's places", True, False),
+        ("the places of object and hand", True, True),
+    )  # fmt: skip
+    for said, of_object, of_hand in streams:
+        for factor, how in UNITS.items():
+            change = partial(_resized, of_object=factor if of_object else 1.0, of_hand=factor if of_hand else 1.0)
+            try:
+                resized = _each(recording, change)
+            except RecordingError:  # further away than anything is
+                continue
+            yield Convention(says=f"{said} are {how}", remedy="map: unit of its position", recording=resized)
+
+
+def _resized(push: Push, of_object: float, of_hand: float) -> Push:
+    assert push.hand is not None
+    return replace(
+        push,
+        object=replace(push.object, positions=of_object * push.object.positions),
+        hand=replace(push.hand, positions=of_hand * push.hand.positions),
+    )
 
 
 def _hand_axes(push: Push, matrix: Array) -> Push:

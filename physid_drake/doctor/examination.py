@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -12,6 +13,7 @@ from physid_drake.doctor.conventions import (
     conventions_of,
     conventions_of_forces,
     gap_of,
+    pairs_of,
     without_forces,
 )
 from physid_drake.errors import PhysidError
@@ -35,6 +37,8 @@ NEAR: Final = 3e-3
 """m between tip and object as it is pushed: a convention by which it is so near is fitted."""
 HAND_NOISE: Final = 3e-4
 """m: the hand's path is followed no better than that. A finer one has many more knots, and tells no frames."""
+MOST_PAIRS: Final = 12
+"""Pairs of conventions that are fitted."""
 STARTS: Final = 32
 STEPS: Final = 6
 
@@ -101,18 +105,36 @@ def examined(recording: Recording, tick: Progress | None = None) -> Finding:
         tried = list(conventions_of_forces(few))
     else:
         before, tried = placed, _likely(list(conventions_of(unforced)))
-    found: list[tuple[float, Convention]] = []
-    for k, convention in enumerate(tried):
-        if tick is not None:
-            tick("other conventions", k, len(tried))
-        left, _ = _left(convention.recording)
-        if left is not None:
-            found.append((left, convention))
+    # To be fitted at all is worth much, where it is refused as it is.
+    enough = MUCH * FAR if before is None else before / MUCH
+    found = _fitted("other conventions", tried, tick)
     least = min((left for left, _ in found), default=np.inf)
-    if not least < (FAR if before is None else before / MUCH):
+    if not least < FAR and gap_of(unforced) > NEAR:
+        # No physics leaves the tip elsewhere than at what it pushes.
+        pairs = _fitted("two at once", _likely(list(pairs_of(unforced))), tick, most=MOST_PAIRS)
+        both = min((left for left, _ in pairs), default=np.inf)
+        if both < min(least, enough) / MUCH:
+            found, least = pairs, both
+    if not least < enough:
         return Finding(before=before, refused=refused)
     best = sorted((pair for pair in found if pair[0] <= ALIKE * least), key=lambda pair: pair[0])
     return Finding(before=before, refused=refused, after=least, better=tuple(one for _, one in best))
+
+
+def _fitted(
+    stage: str, conventions: Sequence[Convention], tick: Progress | None, most: int | None = None
+) -> list[tuple[float, Convention]]:
+    """What the baseline leaves by each of the first conventions that are not refused."""
+    found: list[tuple[float, Convention]] = []
+    for convention in conventions:
+        if len(found) == most:
+            break
+        if tick is not None:
+            tick(stage, len(found), most or len(conventions))
+        left, _ = _left(convention.recording)
+        if left is not None:
+            found.append((left, convention))
+    return found
 
 
 def _few(recording: Recording) -> Recording:
@@ -126,10 +148,13 @@ def _few(recording: Recording) -> Recording:
 
 
 def _likely(conventions: list[Convention]) -> list[Convention]:
-    """Those by which the tip is about as near to what it pushes as by the best of them."""
-    gaps = [gap_of(convention.recording) for convention in conventions]
-    least = min(gaps, default=0.0)
-    return [one for one, gap in zip(conventions, gaps, strict=True) if gap < max(NEAR, MUCH * least)]
+    """Those by which the tip is about as near to what it pushes as by the best of them, the nearest first."""
+    gaps = [(gap_of(convention.recording), convention) for convention in conventions]
+    known = [gap for gap, _ in gaps if gap >= 0.0]
+    if not known:
+        return conventions
+    near = [pair for pair in gaps if pair[0] < max(NEAR, MUCH * min(known))]
+    return [convention for _, convention in sorted(near, key=lambda pair: pair[0])]
 
 
 def _left(recording: Recording) -> tuple[float | None, str]:

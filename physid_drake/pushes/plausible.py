@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from physid_drake.cell.solid import Solid, solid_of
+from physid_drake.cell.touch import Tip
 from physid_drake.pushes.force_windows import windows_of
 from physid_drake.pushes.frames import HEAVIEST, LIGHTEST, MOVED
 from physid_drake.recording import Push, Recording
 from physid_drake.recording.clocks import FEWEST
+
+Array = NDArray[np.float64]
 
 FEW_NAMES = 5
 WIDE_TABLE = 20.0  # m: longer than any in a laboratory
@@ -20,6 +24,9 @@ GRAVITY = 9.81  # m/s^2
 # a force in mN is a thousand times beyond, and so is one in kN.
 WEAKEST, STRONGEST = 0.01, 20.0
 LIGHTEST_GUESS, HEAVIEST_GUESS = 20.0, 8000.0  # kg/m^3, between which a mass is sought that nobody stated
+UNTOUCHED = 5e-3  # m between tip and face: nothing is touched
+FEW_FORCES = 10  # samples, of which no mean is taken
+OFFSET = 0.2  # of the force that pushes: less is drift and noise
 HOVERS = 0.01  # m above or below the table: beyond a frame's errors
 HOVERS_SHARE = 0.25  # of its height: half of it is an origin at the object's foot
 HASTY = 4e-4  # s between samples of the object: no tracker is as fast, and one of 40 Hz seems so in minutes
@@ -33,6 +40,7 @@ def implausible(recording: Recording) -> tuple[str, ...]:
         *_table(recording, solid),
         *_density(recording, solid),
         *_forces(recording, solid),
+        *_forces_untouched(recording, solid),
         *_hasty(recording),
         *_hovering(recording, solid),
         *_never_turning(recording),
@@ -88,6 +96,41 @@ def _forces(recording: Recording, solid: Solid) -> tuple[str, ...]:
         f"the hand pushes with {force:.3g} N (largest mean over a tenth of a second, median over pushes), and the"
         f" object's weight is {against}; are forces in N, and its mass in kg?",
     )
+
+
+def _forces_untouched(recording: Recording, solid: Solid) -> tuple[str, ...]:
+    """Forces that are felt before the tip is at the object: an offset of the sensor, or the tool's weight."""
+    forced = [push for push in recording.pushes if push.force is not None]
+    if not forced or recording.hand is None:
+        return ()
+    every = [push.force.forces for push in forced if push.force is not None]
+    if all(float(np.ptp(forces, axis=0).max()) == 0.0 for forces in every) and any(forces.any() for forces in every):
+        return ("the force is the same in all samples of a push; is it the right column or topic?",)
+    tip = Tip(solid.outline, recording.hand.radius)
+    means = [mean for push in forced if (mean := _mean_untouched(push, tip)) is not None]
+    pushing = [_pushing_force(push) for push in forced if _moves(push)]
+    if not means or not pushing:
+        return ()
+    offset = float(np.linalg.norm(np.median(means, axis=0)))
+    if not offset > OFFSET * float(np.median(pushing)):
+        return ()
+    return (
+        f"forces are {offset:.3g} N (mean, median over pushes) while the tip is {1e3 * UNTOUCHED:g} mm and more from"
+        " the object; take the offset away (map: force: tare_s), or the tool's weight (weight_n)",
+    )
+
+
+def _mean_untouched(push: Push, tip: Tip) -> Array | None:
+    """The mean force in the plane (2,) [N] before the tip is first near the object; None of few samples."""
+    assert push.force is not None
+    if push.hand is None:
+        return None
+    times, hand, planar = push.force.times, push.hand, push.object.planar
+    at = [np.interp(times, hand.times, column) for column in hand.positions[:, :2].T]
+    poses = [np.interp(times, push.object.times, column) for column in planar.T]
+    near = [tip.gap(*state)[0] < UNTOUCHED for state in np.column_stack([*poses, *at]).tolist()]
+    before = int(np.argmax(near)) if any(near) else 0
+    return np.asarray(push.force.forces[:before, :2].mean(axis=0)) if before >= FEW_FORCES else None
 
 
 def _pushing_force(push: Push) -> float:

@@ -1,4 +1,7 @@
-"""Foreign logs: tables and bags in the layouts of others, with damaged bytes, odd fields, and maps that are wrong."""
+"""Foreign logs: tables and bags in the layouts of others, with damaged bytes, odd fields, and maps that are wrong.
+
+Some have an object of their own: a mesh of any format, or boxes.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +27,7 @@ TABLES = foreign.TABLES | {
     "rows.csv": foreign.Log(write=foreign.rulers),
     "tracks": foreign.Log(write=foreign.video),
 }
+MESHES = ("stl", "obj", "glb", "ply", "off")
 FIELDS = ("nan", "inf", "-inf", "1e308", "-1", "x", "", "0", "1e400", "9" * 400, "1_0", "1,5", "1.000,5", "\u0661",
           '"', "NULL", "--", "1e-320", "0x1", "true")  # fmt: skip
 
@@ -34,6 +38,9 @@ def make(rng: Random, folder: Path) -> Case:
     name = rng.choice([name for name, log in logs.items() if importlib.util.find_spec(log.needs)])
     files, chart = _written(name)
     changed = dict(files)
+    if rng.random() < 0.2:
+        more, chart = _other_object(rng, chart)
+        changed |= more
     what = rng.random()
     if what < 0.55:
         victim = rng.choice(list(changed))
@@ -42,9 +49,10 @@ def make(rng: Random, folder: Path) -> Case:
     if what > 0.45:
         chart = _other_map(rng, chart)
     seeds.lay(folder / "s", changed)
-    (folder / "map.yaml").write_bytes(chart)
+    # Beside the files of the log, where a mesh is looked for.
+    (folder / "s/map.yaml").write_bytes(chart)
     if rng.random() < 0.03:
-        replaced(rng, rng.choice([folder / "map.yaml", *((folder / "s" / one) for one in changed)]))
+        replaced(rng, rng.choice([folder / "s/map.yaml", *((folder / "s" / one) for one in changed)]))
     convert = convert_bag if name in foreign.BAGS else convert_table
     if rng.random() < 0.2:
         return Case(partial(guess_map, folder / "s" / name))
@@ -54,7 +62,7 @@ def make(rng: Random, folder: Path) -> Case:
 def _convert(convert: Any, source: Path, folder: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        recording = convert(source, folder / "converted", folder / "map.yaml")
+        recording = convert(source, folder / "converted", folder / "s/map.yaml")
     look_at(recording, folder / "again")
 
 
@@ -68,6 +76,28 @@ def _written(name: str) -> tuple[seeds.Files, bytes]:
             str(file.relative_to(scratch)): file.read_bytes() for file in Path(scratch).rglob("*") if file.is_file()
         }
     return found, chart.encode()
+
+
+def _other_object(rng: Random, chart: bytes) -> tuple[seeds.Files, bytes]:
+    """A map whose object is a mesh, with its file, or boxes."""
+    tree = yaml.safe_load(chart)
+    kind = rng.choice(["boxes", *(MESHES if importlib.util.find_spec("trimesh") else [])])
+    if kind == "boxes":
+        boxes = [{"size": [0.16, 0.04, 0.03], "centre": [0, 0.02, 0.0]},
+                 {"size": [0.04, 0.12, 0.03], "centre": [0, -0.06, 0.0], "yaw_deg": 0}]  # fmt: skip
+        tree["recording"]["object"] = {"shape": "boxes", "boxes": boxes}
+        return {}, yaml_text(tree).encode()
+    tree["recording"]["object"] = {"shape": "mesh", "file": f"object.{kind}", "up": rng.choice("zzzy")}
+    content = _mesh(kind)
+    return {f"object.{kind}": damaged(rng, content) if rng.random() < 0.7 else content}, yaml_text(tree).encode()
+
+
+@cache
+def _mesh(kind: str) -> bytes:
+    import trimesh
+
+    content = trimesh.creation.box((0.1, 0.05, 0.04)).export(file_type=kind)
+    return content.encode() if isinstance(content, str) else bytes(content)
 
 
 def _other_fields(rng: Random, content: bytes) -> bytes:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from physid_drake.doctor import examined
-from physid_drake.doctor.conventions import conventions_of, conventions_of_forces, gap_of
+from physid_drake.doctor.conventions import conventions_of, conventions_of_forces, gap_of, pairs_of
 from physid_drake.recording import Box, Cylinder, ForceStream, Push, Recording, read_recording
 
 RECORDINGS = Path(__file__).parents[2] / "recordings"
@@ -159,6 +159,30 @@ def test_what_is_right_undoes_what_is_wrong(eraser: Recording) -> None:
             assert other.hand.times == pytest.approx(push.hand.times, abs=0.011)
             assert other.hand.positions == pytest.approx(push.hand.positions, abs=6e-4)
             assert other.object.positions == pytest.approx(push.object.positions, abs=1e-9)
+
+
+def in_cm(push: Push) -> Push:
+    assert push.hand is not None
+    return replace(push, hand=replace(push.hand, positions=100.0 * push.hand.positions))
+
+
+def test_units_of_places(eraser: Recording) -> None:
+    """Refused as it is: the hand never comes near."""
+    finding = examined(each(eraser, in_cm))
+    assert finding.before is None and "never" not in finding.refused and finding.refused
+    assert [one.says for one in finding.better] == ["the hand's places are 100 times too large (cm for m)"]
+
+
+@pytest.mark.slow
+def test_two_at_once(eraser: Recording) -> None:
+    (line, *_) = examined(each(each(eraser, late), mirrored_hand)).lines()
+    assert "of the hand, y is mirrored, and the hand's times are 100 ms too late" in line
+
+
+def test_pairs_are_of_different_kinds(eraser: Recording) -> None:
+    said = [pair.says for pair in pairs_of(eraser.subset([0, 4]))]
+    assert len(set(said)) == len(said) > 300
+    assert not any(one.count("quaternions") > 1 or one.count("the hand's places") > 1 for one in said)
 
 
 def test_a_tip_is_at_what_it_pushes(eraser: Recording) -> None:

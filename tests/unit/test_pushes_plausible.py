@@ -168,3 +168,25 @@ def test_an_object_in_a_box_of_another_height_is_doubted(recording):
     tall = replace(recording.object, shape=Box(size=(0.127, 0.051, 0.3)))
     (doubt,) = implausible(replace(recording, object=replace(tall, mass=None, mass_std=None)))
     assert "135 mm below" in doubt
+
+
+def with_offset(recording, newtons):
+    """A sensor that was not tared: the same force in all samples, that of the push upon it."""
+
+    def shifted(push):
+        assert push.force is not None
+        return replace(push, force=replace(push.force, forces=push.force.forces + np.array([newtons, 0.0, 0.0])))
+
+    return replace(recording, pushes=tuple(shifted(push) for push in recording.pushes))
+
+
+def test_a_force_where_nothing_is_touched(recording):
+    friction = pushed_with(recording, 0.5)
+    assert not any("while the tip is" in line for line in doubts(friction))
+    (line,) = [line for line in doubts(with_offset(friction, 0.4)) if "while the tip is" in line]
+    assert "forces are 0.4" in line and "tare_s" in line
+
+
+def test_a_force_that_never_changes(recording):
+    still = with_offset(pushed_with(recording, 0.0), 0.3)
+    assert any("the force is the same in all samples" in line for line in doubts(still))
