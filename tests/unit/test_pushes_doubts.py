@@ -150,7 +150,7 @@ def test_forces_that_are_too_seldom_to_be_used_are_said(recording):
     def forced(interval):
         first, *others = recording.pushes
         times = np.arange(first.object.times[0], first.object.times[-1], interval)
-        force = ForceStream(times=times, forces=np.tile([1.0, 0.0, 0.0], (len(times), 1)))
+        force = ForceStream(times=times, forces=np.outer(times > times.mean(), [1.0, 0.0, 0.0]))
         return replace(recording, pushes=(replace(first, force=force), *others))
 
     assert doubts(forced(0.04)) == ()
