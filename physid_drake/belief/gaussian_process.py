@@ -24,6 +24,7 @@ LENGTH_BOUNDS = (0.05, 20.0)
 NOISE_BOUNDS = (1e-6, 1e-1)
 _FEWEST_TO_FIT = 4
 _JITTER = 1e-10
+_LARGEST = 1e150  # of a target: its square is a number
 _LOG_LENGTH_VARIANCE = 3.0
 
 _Arguments = ParamSpec("_Arguments")
@@ -102,8 +103,10 @@ class GaussianProcess:
             raise ParameterError(
                 f"gaussian process: u is (m, {d}) for m targets, but got {self.u.shape} for {self.targets.shape}."
             )
-        if not np.isfinite(self.targets).all():
-            raise ParameterError("gaussian process: targets are finite; give failed trials a high value.")
+        if not (np.abs(self.targets) < _LARGEST).all():
+            raise ParameterError(
+                "gaussian process: targets are finite, and so are their squares; give failed trials a high value."
+            )
 
     @property
     def offset(self) -> float:
@@ -337,6 +340,8 @@ def _features(u: Any, frequencies: Any) -> Any:
 
 
 def _cholesky_with_jitter(covariance: Array, amplitude: float) -> Array:
+    if not np.isfinite(covariance).all():
+        raise ParameterError("gaussian process: the posterior covariance is not finite; are u and targets?")
     jitter = _JITTER * amplitude
     diagonal = np.diag_indices_from(covariance)
     for _ in range(8):

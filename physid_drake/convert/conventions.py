@@ -47,6 +47,8 @@ def rotation_of(turn: Turn, values: Array, scale: float, world: World) -> Rotati
         rotation = Rotation.from_rotvec(scale * values)
     else:
         rotation = Rotation.from_rotvec(scale * values * world.axes[2])
+    if not np.isfinite(rotation.as_quat()).all():
+        raise RecordingError("its angles are out of all proportion; are these the columns of a rotation?")
     return rotation.inv() if turn.inverse else rotation
 
 

@@ -43,5 +43,6 @@ def broken(file: Path, why: str, remedy: str) -> ProofError:
 
 
 def is_number(value: object) -> bool:
-    """Whether a value of a JSON file is a number; it may be no finite one."""
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """Whether a value of a JSON file is a number; it may be no finite one, but no whole one beyond all floats."""
+    whole = isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**1023
+    return whole or isinstance(value, float)

@@ -302,6 +302,7 @@ def push_entries(top: Section, folder: Path) -> list[tuple[str, Path, str]]:
     if not entries:
         raise top.refuse("pushes", "must not be empty; add at least one push.")
     found: list[tuple[str, Path, str]] = []
+    taken: set[Path] = set()
     for k, entry in enumerate(entries):
         key = f"pushes[{k}]"
         if not isinstance(entry, dict):
@@ -314,8 +315,9 @@ def push_entries(top: Section, folder: Path) -> list[tuple[str, Path, str]]:
             raise section.refuse("file", f"must lie inside the recording's folder, but got {shown(name)}; move it.")
         if not _is_there(path):
             raise section.refuse("file", f"missing file {shown(name)}; add it or remove this push.")
-        if any(path == other for _, other, _ in found):
+        if path in taken:
             raise section.refuse("file", f"{shown(name)} is listed twice; remove one.")
+        taken.add(path)
         found.append((_plain_name(name, path, folder), path, section.text("note", "")))
     return found
 

@@ -36,6 +36,8 @@ HAND_QUATERNION: Final = ("hand_qw", "hand_qx", "hand_qy", "hand_qz")
 OBJECT_POSITION: Final = ("object_x_m", "object_y_m", "object_z_m")
 OBJECT_QUATERNION: Final = ("object_qw", "object_qx", "object_qy", "object_qz")
 OBJECT_YAW: Final = "object_yaw_rad"
+YAW_DIGITS: Final = 12
+"""Behind the point [rad]."""
 FORCE: Final = ("force_x_n", "force_y_n", "force_z_n")
 MOST_ROWS: Final = 200_000
 """Of one table: three minutes at 1 kHz. A push takes seconds, and each of its rows some 20 us to read."""
@@ -338,6 +340,8 @@ def _yaw_stream(table: _PushTable, warnings: list[str]) -> PoseStream | None:
     _check_seconds(table, times, "object")
     _check_near(table, rows, OBJECT_POSITION, FURTHEST, "m")
     _check_near(table, rows, [OBJECT_YAW], MOST_YAW, "rad")
+    # Turns and digits that do not count are taken away: what is written of it and read again is the same.
+    yaw = np.round(np.remainder(yaw + np.pi, 2.0 * np.pi) - np.pi, YAW_DIGITS)
     zeros = np.zeros(len(yaw))
     quaternions = np.column_stack([np.cos(0.5 * yaw), zeros, zeros, np.sin(0.5 * yaw)])
     screened = screen_poses(times, positions, quaternions, [table.lines[k] for k in rows], "object", turned=False)

@@ -23,6 +23,7 @@ from physid_drake.recording.reading import (
     OBJECT_QUATERNION,
     OBJECT_YAW,
     TIME,
+    YAW_DIGITS,
 )
 from physid_drake.recording.values import (
     Box,
@@ -126,7 +127,8 @@ def _add_poses(
         values = np.column_stack([values, stream.quaternions])
     elif stream.rotation == "yaw":
         columns.append(OBJECT_YAW)
-        values = np.column_stack([values, stream.planar[:, 2]])
+        # One digit more than counts: whole turns are no round numbers.
+        values = np.column_stack([values, np.round(stream.planar[:, 2], YAW_DIGITS + 1)])
     for time, row in zip(stream.times, values, strict=True):
         rows.setdefault(float(time), {}).update(zip(columns, row, strict=True))
     return columns

@@ -1,6 +1,7 @@
 import os
 from functools import partial
 
+import numpy as np
 import pytest
 from written import HEADER, ROWS, YAML, write
 
@@ -319,6 +320,15 @@ YAW_HEADER = "time_s,object_x_m,object_y_m,object_z_m,object_yaw_rad,hand_x_m,ha
 
 def yaw_rows(yaws):
     return [f"{0.1 * k:.1f},0.1,0,0.015,{yaw},0,0,0.015" for k, yaw in enumerate(yaws)]
+
+
+def test_a_yaw_that_is_written_and_read_again_is_the_same(written, tmp_path):
+    """Its digits and its whole turns are none of what is said."""
+    rng = np.random.default_rng(0)
+    yaws = np.cumsum(rng.normal(0.0, 0.4, size=400)) + 9.0
+    recording = read_recording(written(header=YAW_HEADER, rows=yaw_rows([repr(float(yaw)) for yaw in yaws])))
+    write_recording(recording, tmp_path / "again")
+    assert digest_of(read_recording(tmp_path / "again")) == digest_of(recording)
 
 
 def test_a_yaw_alone_is_a_rotation_of_which_no_more_is_said(written, tmp_path):
