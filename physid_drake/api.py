@@ -34,7 +34,7 @@ from physid_drake.recording import (
 )
 from physid_drake.report.diagnosis import diagnosis_json
 from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
-from physid_drake.report.progress import progress_bar
+from physid_drake.report.progress import DIAGNOSIS_STAGES, progress_bar
 from physid_drake.report.terminal import terminal
 from physid_drake.run_diagnose import COMMAND, write
 from physid_drake.run_folder import RunFolder, write_whole
@@ -138,6 +138,6 @@ def diagnose(
     if progress is not None:
         diagnosis, evidence = diagnose_case(case, seed=seed, alpha=alpha, effects=effects, tick=progress)
     else:
-        with progress_bar(terminal()) as tick:
+        with progress_bar(terminal(), DIAGNOSIS_STAGES) as tick:
             diagnosis, evidence = diagnose_case(case, seed=seed, alpha=alpha, effects=effects, tick=tick)
     return Answer(diagnosis=diagnosis, evidence=evidence)

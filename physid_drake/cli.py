@@ -1,9 +1,10 @@
-"""The command line: ``inspect``, ``convert``, ``diagnose``, ``plan``, ``prove``, ``experiment``."""
+"""The command line: ``inspect``, ``convert``, ``diagnose``, ``plan``, ``run_cell``, ``prove``, ``experiment``."""
 
 from __future__ import annotations
 
 import argparse
 import os
+import sys
 import warnings
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 from physid_drake.door import Parser, enter, path
 from physid_drake.errors import ConfigError
 from physid_drake.recording import Recording
-from physid_drake.run_folder import write_whole
+from physid_drake.run_folder import made_with, write_whole
 
 if TYPE_CHECKING:
     Subparsers = argparse._SubParsersAction[Parser]
@@ -30,7 +31,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    arguments = build_parser().parse_args(argv)
+    words = sys.argv[1:] if argv is None else list(argv)
+    if words[:1] == ["run_cell"]:
+        # Drake takes a second to import, which the other commands need not wait for.
+        from physid_drake.run_cell import main as run_cell  # noqa: PLC0415
+
+        return run_cell(words[1:])
+    arguments = build_parser().parse_args(words)
     return int(arguments.run(arguments))
 
 
@@ -40,11 +47,35 @@ def build_parser() -> argparse.ArgumentParser:
         prog="physid_drake",
         description="Identify an object's mass and friction from recorded pushes, and find the physics "
         "that a simulation leaves out.",
+        epilog="`physid_drake COMMAND --help` says more. Start: physid_drake diagnose eraser_reference",
     )
+    parser.add_argument("--version", action=_Version, nargs=0, help="versions of this and of Drake")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for register in COMMANDS:
         register(subparsers)
     return parser
+
+
+EFFECTS = "the effects"
+"""Stands for their names, for which the catalogue is imported only when help is asked for."""
+
+
+class _WithEffects(argparse.HelpFormatter):
+    def add_text(self, text: str | None) -> None:
+        if text == EFFECTS:
+            from physid_drake.effects import CATALOGUE  # noqa: PLC0415
+
+            names = ", ".join(sorted(kind.name for kind in CATALOGUE))
+            text = f"effects: {names}. What each one is: docs/effects.md"
+        super().add_text(text)
+
+
+class _Version(argparse.Action):
+    """Says the versions that results depend on."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        print(made_with())
+        parser.exit()
 
 
 def _register_inspect(subparsers: Subparsers) -> None:
@@ -149,7 +180,12 @@ def _published(arguments: argparse.Namespace) -> Recording:
 
 
 def _register_diagnose(subparsers: Subparsers) -> None:
-    parser = subparsers.add_parser("diagnose", help="say what physics a recording has that the simulation leaves out")
+    parser = subparsers.add_parser(
+        "diagnose", help="say what physics a recording has that the simulation leaves out",
+        description="Say whether recorded pushes differ from a Drake simulation, where, and what physics was left "
+        "out; write a page, a 3D scene and a model with what was found.",
+        epilog=EFFECTS, formatter_class=_WithEffects,
+    )  # fmt: skip
     parser.add_argument("recording", metavar="RECORDING", help="a FOLDER, or the name of a recording that ships")
     parser.add_argument("--out", type=path, metavar="FOLDER", help="where results go (default: diagnoses/FOLDER)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (default 0)")
@@ -173,7 +209,12 @@ def _run_diagnose(arguments: argparse.Namespace) -> int:
 
 
 def _register_prove(subparsers: Subparsers) -> None:
-    parser = subparsers.add_parser("prove", help="measure the diagnosis on sealed worlds of another simulator")
+    parser = subparsers.add_parser(
+        "prove", help="measure the diagnosis on sealed worlds of another simulator",
+        description="Make recordings of pushes in MuJoCo, with and without an effect that Drake's model lacks; seal "
+        "the truth; diagnose them; open the truth and count: found, named, placed, false alarms (pip install "
+        "'.[proof]'). A minute for each world; goes on where it stopped.",
+    )  # fmt: skip
     parser.add_argument("--worlds", type=int, metavar="N", help="how many (default 200)")
     parser.add_argument("--quick", action="store_true", help="ten worlds")
     parser.add_argument("--seed", type=int, metavar="N",
@@ -263,7 +304,13 @@ def _run_plan(arguments: argparse.Namespace) -> int:
 
 
 def _register_experiment(subparsers: Subparsers) -> None:
-    parser = subparsers.add_parser("experiment", help="repeat an experiment of the paper in hidden worlds")
+    parser = subparsers.add_parser(
+        "experiment", help="repeat an experiment of the paper in hidden worlds",
+        description="Repeat an experiment of the paper, with MuJoCo worlds in the place of its robot.",
+        epilog="motion_prediction: how well identified frictions predict pushes. mit_pushes: the same on MIT's "
+        "recorded pushes. push_direction: directions that bring an object to a goal. push_speed: speeds that let it "
+        "slide there. next_push: whether the push that is offered tells rivals apart.",
+    )  # fmt: skip
     parser.add_argument(
         "name", metavar="NAME", help="motion_prediction, mit_pushes, push_direction, push_speed or next_push"
     )
@@ -287,11 +334,17 @@ def _run_experiment(arguments: argparse.Namespace) -> int:
     return run(arguments)
 
 
+def _register_run_cell(subparsers: Subparsers) -> None:
+    # Its own parser reads its words, once Drake is imported.
+    subparsers.add_parser("run_cell", help="all at once: identify, diagnose, plan and show", add_help=False)
+
+
 COMMANDS: list[Callable[[Subparsers], None]] = [
     _register_inspect,
     _register_convert,
     _register_diagnose,
     _register_plan,
+    _register_run_cell,
     _register_prove,
     _register_experiment,
 ]

@@ -25,7 +25,7 @@ from physid_drake.pushes.task import Task
 from physid_drake.recording import digest_of, read_recording, recording_folder
 from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
 from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
-from physid_drake.report.progress import progress_bar
+from physid_drake.report.progress import DIAGNOSIS_STAGES, progress_bar
 from physid_drake.report.scene_page import scene_page
 from physid_drake.report.stage import MOST_ARROW, ShownMotion, Stage
 from physid_drake.report.terminal import terminal
@@ -100,7 +100,7 @@ def run_case(
     kept: KeptRollouts | None = None,
 ) -> tuple[Diagnosis, Evidence]:
     """Diagnose with a progress bar."""
-    with progress_bar(console) as tick:
+    with progress_bar(console, DIAGNOSIS_STAGES) as tick:
         return diagnose(case, seed=seed, alpha=alpha, effects=effects, tick=tick, kept=kept)
 
 

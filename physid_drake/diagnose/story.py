@@ -78,7 +78,7 @@ def gathered(
             found = searched(known.finder, known.found, kinds, seed=seed, alpha=alpha, tick=tick)
     case, plain, before = known.case, known.fit, known.errors
     decision = decided(found, most=loudest(case.noise))
-    tick("in the Drake cell", 0, 0)
+    tick("what was found, in the Drake cell", 0, 0)
     judge = Judge(known.finder)
     if decision.verdict != "underpowered" and is_own_error(accuracy_of(case, before)):
         decision = Decision(verdict="consistent")

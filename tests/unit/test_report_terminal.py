@@ -1,8 +1,12 @@
 """What is printed is printed as it is: neither units nor names of pushes are markup."""
 
+import io
+import re
+
+from rich.console import Console
 from rich.table import Table
 
-from physid_drake.report.progress import progress_bar
+from physid_drake.report.progress import DIAGNOSIS_STAGES, Forecast, progress_bar
 from physid_drake.report.terminal import NARROWEST, terminal
 
 WORDS = ("path [mm]", "wild[/b].csv", "[red]")
@@ -38,12 +42,71 @@ def test_a_log_says_every_stage_once_and_apart_from_the_results(capsys):
     assert printed.out == ""
 
 
+class Clock:
+    """Seconds that pass when a test says so."""
+
+    def __init__(self, monkeypatch):
+        self.now = 100.0
+        monkeypatch.setattr("time.monotonic", lambda: self.now)
+
+
 def test_a_log_says_once_a_minute_how_far_a_long_stage_is(capsys, monkeypatch):
-    clock = iter([100.0, 100.0, 130.0, 170.0, 200.0, 231.0, 300.0])
-    monkeypatch.setattr("time.monotonic", lambda: next(clock))
+    clock = Clock(monkeypatch)
     with progress_bar(terminal()) as tick:
-        for done in range(5):
+        for done, seconds in enumerate((0.0, 30.0, 70.0, 100.0, 131.0)):
+            clock.now = 100.0 + seconds
             tick("search", done, 9)
+        clock.now = 300.0
         tick("search", 0, 0)  # nobody knows how far
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.strip() for line in lines] == ["0 s  search", "70 s  search, 2 of 9", "131 s  search, 4 of 9"]
+    lines = [line.strip() for line in capsys.readouterr().err.splitlines()]
+    assert lines == [
+        "0 s  search", "70 s  search, 2 of 9 (4 min left)", "131 s  search, 4 of 9 (3 min left)"
+    ]  # fmt: skip
+
+
+STAGES = {"first": 1.0, "second": 4.0, "third": 2.0}
+
+
+def test_what_is_left_of_all_stages_by_how_long_the_first_lasted(monkeypatch):
+    clock = Clock(monkeypatch)
+    forecast = Forecast(STAGES)
+    forecast.tell("first", 0, 0)
+    assert forecast.left() is None and forecast.words() == ""
+    clock.now += 10.0
+    forecast.tell("second", 0, 0)
+    assert forecast.left() == 60.0 and forecast.words() == "at most 60 s left"
+    clock.now += 30.0
+    assert forecast.left() == 30.0
+    clock.now += 30.0  # longer than usual
+    assert forecast.left() == 24.0 and forecast.words() == "at most 25 s left"
+    forecast.tell("third", 0, 0)
+    assert forecast.left() == 20.0
+
+
+def test_a_stage_may_be_left_out_or_unknown(monkeypatch):
+    clock = Clock(monkeypatch)
+    forecast = Forecast(STAGES)
+    forecast.tell("first", 0, 0)
+    clock.now += 10.0
+    forecast.tell("third", 0, 0)
+    assert forecast.left() == 20.0
+    forecast.tell("something else", 0, 0)
+    assert forecast.left() is None
+    clock.now += 5.0
+    forecast.tell("something else", 1, 3)
+    assert forecast.left() == 10.0 and forecast.words() == "10 s left"
+
+
+def test_eighty_columns_hold_the_line(monkeypatch):
+    """Every stage's name, a bar, the time that passed and what is left."""
+    console = Console(width=80, force_terminal=True, file=io.StringIO(), markup=False)
+    clock = Clock(monkeypatch)
+    for stage in DIAGNOSIS_STAGES:
+        with progress_bar(console, DIAGNOSIS_STAGES) as tick:
+            tick(next(iter(DIAGNOSIS_STAGES)), 0, 0)
+            clock.now += 100.0
+            tick(stage, 0, 0)
+    written = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", console.file.getvalue())
+    lines = [line for line in re.split(r"[\r\n]+", written) if line.strip()]
+    assert lines and max(map(len, lines)) <= 80 and not any("…" in line for line in lines)
+    assert any("left" in line for line in lines)
