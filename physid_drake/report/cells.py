@@ -11,16 +11,18 @@ from rich.table import Table
 
 from physid_drake.identify import CellsTold
 from physid_drake.report.svg import INK, drawn, svg_of
+from physid_drake.report.terminal import narrow_table, numbers, words
 
 Array = NDArray[np.float64]
 
 
 def cells_table(cells: CellsTold) -> Table:
     """What the pushes tell about combinations of the cells' frictions, told best first."""
-    table = Table(title="what these pushes tell about the cells", title_justify="left", caption=cells_verdict(cells),
-                  caption_justify="left")  # fmt: skip
-    for header in ("combination of ln frictions", "singular value", "prior's std left", "told"):
-        table.add_column(header, justify="left" if header.startswith("comb") else "right")
+    headings = ("singular\nvalue", "prior's\nstd left", "told")
+    table = narrow_table(
+        "what these pushes tell about the cells", words("combination of ln frictions"), *map(numbers, headings),
+        caption=cells_verdict(cells),
+    )  # fmt: skip
     for c in cells.combinations:
         table.add_row(combination_text(cells, c.weights), f"{c.strength:.3g}", f"{100 * c.left:.0f} %",
                       "yes" if c.told else "no")  # fmt: skip

@@ -13,6 +13,7 @@ from physid_drake.diagnose import Diagnosis
 from physid_drake.diagnose.values import EffectFinding, FitQuality, Location, Partly
 from physid_drake.effects import effect_named
 from physid_drake.report.numbers import rounded
+from physid_drake.report.terminal import narrow_table, numbers, words
 
 FORMAT = "physid-diagnosis/1"
 
@@ -109,14 +110,19 @@ def _location(location: Location) -> dict[str, Any]:
 
 def findings_table(diagnosis: Diagnosis) -> Table:
     """The effects found, with their parameters."""
-    table = Table(title=f"what is missing in '{diagnosis.recording}'", title_justify="left")
-    for column in ("effect", "parameter", "value", "90 % interval", "cannot be told from", "probability"):
-        table.add_column(column)
+    alike = [
+        f"{e.name} cannot be told from {', '.join(e.indistinguishable_from)}"
+        for e in diagnosis.effects
+        if e.indistinguishable_from
+    ]
+    table = narrow_table(
+        f"what is missing in '{diagnosis.recording}'", words("effect"), words("parameter"), numbers("value"),
+        words("90 % interval"), numbers("probability"), caption="; ".join(alike) or None,
+    )  # fmt: skip
     for effect in diagnosis.effects:
         for k, (name, p) in enumerate(effect.parameters.items()):
-            first = (effect.name, ", ".join(effect.indistinguishable_from) or "-", f"{effect.probability:.2f}")
-            label, alike, probability = first if k == 0 else ("", "", "")
-            table.add_row(label, name, _shown(p.value, p.unit), _interval(p.ci90), alike, probability)
+            label, probability = (effect.name, f"{effect.probability:.2f}") if k == 0 else ("", "")
+            table.add_row(label, name, _shown(p.value, p.unit), _interval(p.ci90), probability)
     return table
 
 
@@ -134,9 +140,10 @@ def _interval(ci90: Any) -> str:
 
 def ranking_table(diagnosis: Diagnosis, most: int = 8) -> Table:
     """The effects that explain most, and why the others lose."""
-    table = Table(title="the catalogue, best first", title_justify="left")
-    for column in ("effect", "score gain", "p", "held-out gain", "why"):
-        table.add_column(column)
+    table = narrow_table(
+        "the catalogue, best first", words("effect"), numbers("score\ngain"), numbers("p"), numbers("held-out\ngain"),
+        words("why"),
+    )  # fmt: skip
     for r in diagnosis.ranking[:most]:
         unsure = "" if r.held_out_se is None else f" +- {r.held_out_se:.0f}"
         held_out = "-" if r.held_out_gain is None else f"{r.held_out_gain:.0f}{unsure}"
@@ -146,9 +153,10 @@ def ranking_table(diagnosis: Diagnosis, most: int = 8) -> Table:
 
 def regime_table(diagnosis: Diagnosis) -> Table:
     """Whether what one regime teaches holds in the other."""
-    table = Table(title="gain of pushes of another regime than those fitted to", title_justify="left")
-    for column in ("fitted to", "tested on", "gain in log density"):
-        table.add_column(column)
+    table = narrow_table(
+        "gain of pushes of another regime than those fitted to", words("fitted to"), words("tested on"),
+        numbers("gain in log density"),
+    )  # fmt: skip
     for r in diagnosis.fit.regimes:
         table.add_row(r.fitted_on, r.tested_on, f"{r.gain:.0f} +- {r.standard_error:.0f}")
     return table
@@ -156,10 +164,11 @@ def regime_table(diagnosis: Diagnosis) -> Table:
 
 def fit_table(diagnosis: Diagnosis) -> Table:
     """How well pushes are predicted that were left out, before and after."""
-    table = Table(title="pushes predicted while left out (root mean square)", title_justify="left")
     forced = diagnosis.fit.force_before is not None
-    for column in ("model", "mm", "deg", *(("N",) if forced else ()), "sigmas", "reduced chi-square"):
-        table.add_column(column, justify="right")
+    headings = ("mm", "deg", *(("N",) if forced else ()), "sigmas", "reduced\nchi-square")
+    table = narrow_table(
+        "pushes predicted while left out (root mean square)", words("model"), *map(numbers, headings)
+    )
     for name, figures in held_out_figures(diagnosis):
         table.add_row(name, *(f"{value:.2f}" if math.isfinite(value) else "-" for value in figures))
     return table

@@ -11,10 +11,12 @@ from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from rich.table import Column
 from rich.table import Table as RichTable
 
 from physid_drake.experiments.values import Entry, Panel, Result, Table
 from physid_drake.report.svg import AFTER, BEFORE, CONTACT, FREE, INK, MUTED
+from physid_drake.report.terminal import narrow_table, words
 
 COLOURS = (AFTER, BEFORE, CONTACT, FREE, INK)
 
@@ -30,9 +32,8 @@ def table_csv(table: Table) -> str:
 
 def rich_table(table: Table) -> RichTable:
     """A table for a terminal."""
-    shown = RichTable(title=table.title, title_justify="left")
-    for k, column in enumerate(table.columns):
-        shown.add_column(column, justify="left" if k == 0 else "right")
+    first, *others = table.columns
+    shown = narrow_table(table.title, words(first), *(Column(o, justify="right", overflow="fold") for o in others))
     for row in table.rows:
         shown.add_row(*[_text(v) for v in row])
     return shown

@@ -17,6 +17,7 @@ from physid_drake.recording.rounding import rounding_std
 from physid_drake.recording.statistics import NoiseEstimate, PushSummary, estimate_noise, summarise
 from physid_drake.recording.values import Array, Recording
 from physid_drake.report.outline import outline_of
+from physid_drake.report.terminal import narrow_table, numbers, words
 
 MOST_KINDS = 8
 """Lines of warnings for a recording."""
@@ -27,36 +28,27 @@ _MANY_PUSHES = 12
 def inspection_table(recording: Recording) -> Table:
     """One row for each push, speeds at their largest, and the noise of all in the caption."""
     steps = _rounding(recording)
-    table = Table(
-        title=recording.name,
-        caption=_noise_line(estimate_noise(recording), steps),
-        caption_justify="left",
+    headings = (
+        "poses", "time\n[s]", "hand\n[mm/s]", "object\n[mm/s]", "moved\n[mm]", "turned\n[deg]", "gaps", "noise\n[mm]",
+        "noise\n[deg]", "warn",
+    )  # fmt: skip
+    table = narrow_table(
+        recording.name, words("push"), *map(numbers, headings), caption=_noise_line(estimate_noise(recording), steps)
     )
-    table.add_column("push", no_wrap=True)
-    for heading in (
-        "poses",
-        "time\n[s]",
-        "hand\n[mm/s]",
-        "object\n[mm/s]",
-        "moved\n[mm]",
-        "turned\n[deg]",
-        "gaps",
-        "noise\n[mm]",
-        "noise\n[deg]",
-        "warn",
-    ):
-        table.add_column(heading, justify="right")
     for push in recording.pushes:
-        table.add_row(push.name, *_cells(summarise(push), steps, push.object.rotation != "none"))
+        table.add_row(_short(push.name), *_cells(summarise(push), steps, push.object.rotation != "none"))
     return table
+
+
+def _short(name: str) -> str:
+    """A push's name without the folder and the ending that all have."""
+    return name.removeprefix("pushes/").removesuffix(".csv")
 
 
 def log_table(name: str, rows: Sequence[tuple[str, ...]]) -> Table:
     """What a foreign log holds: a row for each column or topic."""
-    table = Table(title=name, title_justify="left")
-    table.add_column("column or topic", overflow="fold")
-    for heading in ("samples", "rate\n[Hz]", "least", "largest"):
-        table.add_column(heading, justify="right")
+    headings = ("samples", "rate\n[Hz]", "least", "largest")
+    table = narrow_table(name, words("column or topic"), *map(numbers, headings))
     for row in rows:
         table.add_row(*row)
     return table

@@ -21,6 +21,7 @@ from physid_drake.plan import (
     caveats_of,
 )
 from physid_drake.plan.trajectory import tip_height_of
+from physid_drake.report.terminal import narrow_table, words
 
 FORMAT = "physid-plan/1"
 
@@ -79,9 +80,7 @@ def plan_json(
 
 def plan_table(plan: Plan, *, with_effects: Outcome | None = None, hindsight: Hindsight | None = None) -> Table:
     """The best push and what is expected of it."""
-    table = Table(title=title_of(plan), title_justify="left", show_header=False)
-    table.add_column("what")
-    table.add_column("value")
+    table = narrow_table(title_of(plan), words("what"), words("value"), header=False)
     for what, value in plan_rows(plan, with_effects=with_effects, hindsight=hindsight):
         table.add_row(what, value)
     return table

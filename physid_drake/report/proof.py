@@ -12,6 +12,7 @@ from rich.table import Table
 
 from physid_drake.prove.figures import Figures, decimals, held_out_table, json_of, power_table, table
 from physid_drake.prove.score import HeldOut, Outcome, number
+from physid_drake.report.terminal import narrow_table, words
 
 FORMAT = "physid-proof/1"
 MAIN = ("", "figure", "95 % interval", "asked for")
@@ -203,14 +204,10 @@ def _markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def proof_tables(proof: Proof) -> tuple[Table, Table]:
     """What the command prints: the figures, and power against size."""
-    main = Table(title=_worlds(proof), title_justify="left")
-    for column in MAIN:
-        main.add_column(column)
+    main = narrow_table(_worlds(proof), *map(words, MAIN))
     for row in table(proof.figures):
         main.add_row(*row)
-    power = Table(title="single effects by size", title_justify="left")
-    for column in POWER:
-        power.add_column(column)
+    power = narrow_table("single effects by size", *map(words, POWER))
     for row_of_power in power_table(proof.figures):
         power.add_row(*row_of_power)
     return main, power

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from physid_drake.prove.figures import decimals
 from physid_drake.prove.real_score import NEAR, Pressure, RealOutcome
+from physid_drake.report.terminal import narrow_table, words
 
 FORMAT = "physid-proof-real/1"
 COLUMNS = ("case", "pushes", "chi2 plain", "after", "verdict", "names", "held out mm", "deg", "N", "fresh mm", "deg",
@@ -82,10 +83,8 @@ def real_markdown(outcomes: Sequence[RealOutcome]) -> str:
 
 def real_table(outcomes: Sequence[RealOutcome]) -> Table:
     """The columns that fit a terminal."""
-    table = Table(title="real recordings", title_justify="left")
     shown = [0, 1, 2, 3, 4, 5, 6, 7, 8]
-    for k in shown:
-        table.add_column(COLUMNS[k])
+    table = narrow_table("real recordings", *(words(COLUMNS[k]) for k in shown))
     for row in real_rows(outcomes):
         table.add_row(*(row[k] for k in shown))
     return table

@@ -9,14 +9,15 @@ from rich.table import Table
 from physid_drake.identify import Accuracy, Identification
 from physid_drake.identify.identify import EXPLAINED
 from physid_drake.pushes.stated import FAR_BELOW, quieter_by
+from physid_drake.report.terminal import narrow_table, numbers, words
 
 
 def estimates_table(result: Identification, title: str) -> Table:
     """Theta with intervals, and whether these pushes tell it."""
-    table = Table(title=title, title_justify="left")
-    for header, justify in (("parameter", "left"), ("estimate", "right"), ("90 % interval", "right"),
-                            ("told by these pushes", "left"), ("before", "right")):  # fmt: skip
-        table.add_column(header, justify=justify)  # type: ignore[arg-type]
+    table = narrow_table(
+        title, words("parameter"), numbers("estimate"), numbers("90 % interval"), words("told by these pushes"),
+        numbers("before"),
+    )  # fmt: skip
     for e in result.estimates:
         unit = "" if e.unit == "-" else f" {e.unit}"
         told = "yes" if e.identifiable else "no: anything in this interval"
@@ -30,18 +31,10 @@ def estimates_table(result: Identification, title: str) -> Table:
 
 def accuracy_table(result: Identification) -> Table:
     """How well pushes are predicted, before and after."""
-    table = Table(title="error of prediction (root mean square)", title_justify="left")
-    for header in (
-        "pushes",
-        "theta",
-        "path [mm]",
-        "path [deg]",
-        "end [mm]",
-        "end [deg]",
-        "force [N]",
-        "std of sensors",
-    ):
-        table.add_column(header, justify="left" if header in ("pushes", "theta") else "right")
+    headings = ("path\n[mm]", "path\n[deg]", "end\n[mm]", "end\n[deg]", "force\n[N]", "std of\nsensors")
+    table = narrow_table(
+        "error of prediction (root mean square)", words("pushes"), words("theta"), *map(numbers, headings)
+    )
     rows = (
         ("each, left out", "before", result.before),
         ("each, left out", "after", result.after),
