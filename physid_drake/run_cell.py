@@ -31,6 +31,9 @@ from physid_drake.recording import Recording, digest_of, read_recording, recordi
 from physid_drake.report.cells import cells_table
 from physid_drake.report.inspection import warning_lines
 from physid_drake.report.page import result_page
+from physid_drake.report.pages import DIAGNOSIS as DIAGNOSIS_PAGE
+from physid_drake.report.pages import INDEX, SCENE
+from physid_drake.report.pages import PLAN as PLAN_PAGE
 from physid_drake.report.plan import plan_table, push_files
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.result import result_json
@@ -47,9 +50,8 @@ from physid_drake.scenario_schema import Scenario
 
 COMMAND = "run_cell"
 BELIEF = "belief.npz"  # of an interrupted identification
-DIAGNOSIS_PAGE = "diagnosis.html"
-DIAGNOSIS = ("diagnosis.json", DIAGNOSIS_PAGE, "scene.html")
-RESULTS = ("result.json", "page.html", "model.yaml", *DIAGNOSIS, *PLAN)
+DIAGNOSIS = ("diagnosis.json", DIAGNOSIS_PAGE, SCENE)
+RESULTS = ("result.json", INDEX, "model.yaml", *DIAGNOSIS, *PLAN)
 MOST_WARNINGS = 5  # printed
 SHOWN = 12  # pushes in the animation
 
@@ -137,15 +139,20 @@ def _fill(
     marks = stage.play(_scenes(examined.known))
     for stale in (*DIAGNOSIS, "result.json"):  # an earlier run's, of another model
         folder.forget(stale)
-    folder.write("page.html", result_page(
+    pages = (
+        INDEX,
+        *(() if arguments.no_diagnosis else (DIAGNOSIS_PAGE, SCENE)),
+        *(() if plan is None else (PLAN_PAGE,)),
+    )
+    folder.write(INDEX, result_page(
         stage.meshcat.StaticHtml(), examined, name=recording.name, marks=marks,
-        note=f"{recording.description} Seed {scenario.seed}.", plan=plan, hindsight=hindsight,
+        note=f"{recording.description} Seed {scenario.seed}.", plan=plan, hindsight=hindsight, pages=pages,
     ))  # fmt: skip
-    _keep_plan(plan, scenario, folder, hindsight=hindsight)
+    _keep_plan(plan, scenario, folder, hindsight=hindsight, pages=pages)
     if examined.evidence is None or examined.diagnosis is None:
         folder.write("model.yaml", work.model(examined).dump())
     else:
-        write(folder, examined.diagnosis, examined.evidence, page=DIAGNOSIS_PAGE)
+        write(folder, examined.diagnosis, examined.evidence, pages=pages)
     # Last: where it is, all is.
     folder.write("result.json", result_json(examined, recording, scenario.seed, versions()))
     _show(examined.known, recording, console, alone=examined.diagnosis is None)
@@ -153,9 +160,9 @@ def _fill(
         show(console, examined.diagnosis)
     if plan is not None:
         console.print(plan_table(plan, hindsight=hindsight))
-    files = ["result.json", "page.html", "model.yaml", *(() if arguments.no_diagnosis else DIAGNOSIS)]
+    files = ["result.json", "model.yaml", *(() if arguments.no_diagnosis else DIAGNOSIS[:1])]
     files += [] if plan is None else ["plan.json", *push_files(plan)]
-    console.print(f"written: {', '.join(files)} in {folder.path}")
+    console.print(f"written: {', '.join(files)} and pages; open {folder.path / INDEX}")
     folder.forget(STATE)
     folder.forget(BELIEF)
     return stage
@@ -282,12 +289,12 @@ def _show(result: Identification, recording: Recording, console: Console, *, alo
 
 
 def _keep_plan(
-    plan: Plan | None, scenario: Scenario, folder: RunFolder, *, hindsight: Hindsight | None = None
+    plan: Plan | None, scenario: Scenario, folder: RunFolder, *, hindsight: Hindsight | None, pages: Sequence[str]
 ) -> None:
     """Write the plan; an earlier one is dropped."""
     forget_plan(folder)
     if plan is not None:
-        write_plan(folder, plan, seed=scenario.seed, hindsight=hindsight, page=None)
+        write_plan(folder, plan, seed=scenario.seed, hindsight=hindsight, pages=pages)
 
 
 def _live(recording: Recording, host: str, console: Console) -> Stage:

@@ -24,7 +24,8 @@ from physid_drake.pushes.rollouts import simulate
 from physid_drake.pushes.task import Task
 from physid_drake.recording import digest_of, read_recording, recording_folder
 from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
-from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
+from physid_drake.report.diagnosis_page import MEANING, diagnosis_page, shown_pushes
+from physid_drake.report.pages import DIAGNOSIS, INDEX, SCENE, index_page
 from physid_drake.report.progress import DIAGNOSIS_STAGES, progress_bar
 from physid_drake.report.scene_page import scene_page
 from physid_drake.report.stage import MOST_ARROW, ShownMotion, Stage
@@ -33,7 +34,8 @@ from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_t
 
 COMMAND = "diagnose"
 STATE = "rollouts.bin"
-FILES = ("diagnosis.json", "page.html", "scene.html", "model.yaml")
+PAGES = (INDEX, DIAGNOSIS, SCENE)
+FILES = ("diagnosis.json", "model.yaml", *PAGES)
 SHOWN = 12  # pushes in the animation
 MOST_NOTES = 8  # on the terminal
 ALPHA = 0.01  # false-alarm rate
@@ -86,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
         write(folder, diagnosis, evidence)
         folder.forget(STATE)
     show(console, diagnosis)
-    console.print(f"written: diagnosis.json, page.html, scene.html and model.yaml in {folder.path}")
+    console.print(f"written: diagnosis.json, model.yaml and pages; open {folder.path / INDEX}")
     return 0
 
 
@@ -133,20 +135,29 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
         )
 
 
-def write(
-    folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, page: str = "page.html", scene: str = "scene.html"
-) -> None:
+def write(folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, pages: Sequence[str] = PAGES) -> None:
     """Write ``diagnosis.json``, the page, ``model.yaml`` and a scene of Meshcat that opens in any browser.
+
+    Args:
+        folder: where.
+        diagnosis: what was found.
+        evidence: and how.
+        pages: that the folder has; its index is written by whoever names others than these.
 
     Raises:
         OutputError: if one cannot be written.
     """
     pushes = shown_pushes(diagnosis, evidence)
     folder.forget("diagnosis.json")  # an earlier one's belongs to another model
-    folder.write(page, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches, scene=scene))
+    folder.write(
+        DIAGNOSIS, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches, pages=pages)
+    )
     folder.write("model.yaml", model_of(evidence).dump())
     stage = staged(evidence).StaticHtml()
-    folder.write(scene, scene_page(stage, diagnosis, evidence.wrenches, unit_force_of(evidence)))
+    folder.write(SCENE, scene_page(stage, diagnosis, evidence.wrenches, unit_force_of(evidence), pages))
+    if pages is PAGES:
+        lines = [diagnosis.sentence, f"{diagnosis.verdict.capitalize()}: {MEANING[diagnosis.verdict]}"]
+        folder.write(INDEX, index_page(f"Diagnosis of {diagnosis.recording}", lines, FILES))
     folder.write("diagnosis.json", diagnosis_json(diagnosis))  # last: where it is, all is
 
 

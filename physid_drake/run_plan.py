@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses as dc
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,8 @@ from physid_drake.plan.story import outcome_under
 from physid_drake.plan.task import Choices, policy_for
 from physid_drake.plan.trajectory import tip_height_of
 from physid_drake.policies import push_csv
-from physid_drake.report.plan import plan_json, plan_table, push_files
+from physid_drake.report.pages import INDEX, PLAN, index_page
+from physid_drake.report.plan import plan_json, plan_rows, plan_table, push_files, title_of
 from physid_drake.report.plan_page import plan_page, plan_png
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.terminal import terminal
@@ -28,7 +30,8 @@ from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_t
 from physid_drake.wording import shown
 
 COMMAND = "plan"
-FILES = ("plan.json", "push.csv", "push_1.csv", "push_2.csv")
+PAGES = (INDEX, PLAN)
+FILES = ("plan.json", "push.csv", "push_1.csv", "push_2.csv", "plan.png", PLAN)
 FEWEST_TRIALS, TRIALS_PER_SETTING = 24, 16  # of a search
 MOST_PUSHES = 1_000_000  # of a recording
 
@@ -98,8 +101,8 @@ def run(arguments: argparse.Namespace) -> int:
         console.print(f"No push at all would leave the object nearer: {1e3 * nothing:.1f} mm.")
     if made.spread is None and arguments.draws:
         console.print("The model has no intervals to draw from: no spread, no success rate.")
-    names = ["plan.json", *push_files(made), "plan.png", "page.html"]
-    console.print(f"written: {', '.join(names)} in {folder.path}")
+    names = ["plan.json", *push_files(made), "plan.png"]
+    console.print(f"written: {', '.join(names)} and pages; open {folder.path / INDEX}")
     return 0
 
 
@@ -110,9 +113,17 @@ def _budget(settings: int) -> int:
 
 def write(
     folder: RunFolder, made: Plan, *, seed: int, with_effects: Outcome | None = None,
-    hindsight: Hindsight | None = None, page: str | None = "page.html",
+    hindsight: Hindsight | None = None, pages: Sequence[str] = PAGES,
 ) -> None:  # fmt: skip
-    """Write ``plan.json``, the hand's paths, and with ``page`` the picture and the page.
+    """Write ``plan.json``, the hand's paths, the picture and the page.
+
+    Args:
+        folder: where.
+        made: the plan.
+        seed: of the run.
+        with_effects: what the push does under the model with its effects, where it was planned without them.
+        hindsight: what a diagnosis leaves open.
+        pages: that the folder has; its index is written by whoever names others than these.
 
     Raises:
         OutputError: if one cannot be written.
@@ -121,9 +132,12 @@ def write(
     height = tip_height_of(made.model, made.situation)
     for name, path in zip(push_files(made), made.predicted.paths, strict=True):
         folder.write(name, push_csv(path, height))
-    if page is not None:
-        folder.write_bytes("plan.png", plan_png(made))
-        folder.write(page, plan_page(made, seed=seed, with_effects=with_effects, hindsight=hindsight))
+    folder.write_bytes("plan.png", plan_png(made))
+    folder.write(PLAN, plan_page(made, seed=seed, with_effects=with_effects, hindsight=hindsight, pages=pages))
+    if pages is PAGES:
+        lines = [f"{what}: {value}." for what, value in plan_rows(made, with_effects=with_effects)[:6]]
+        files = ("plan.json", *push_files(made), "plan.png", *PAGES)
+        folder.write(INDEX, index_page(f"Plan: {title_of(made)}", lines, files))
     # Last: where it is, all is.
     folder.write("plan.json", plan_json(made, seed=seed, with_effects=with_effects, hindsight=hindsight))
 

@@ -43,7 +43,7 @@ from physid_drake.run_folder import SETTINGS, RunFolder, settings_text, versions
 
 WORLDS, QUICK, MOST_WORLDS = 200, 10, 100_000
 COMMAND = "prove"
-WRITTEN = ("page.html", "proof.md", "proof.json", "confusion.png")
+WRITTEN = ("index.html", "proof.md", "proof.json", "confusion.png")
 UNKNOWN = "unknown"  # what hid the truth from a diagnosis that does not say so
 Commander = Callable[..., tuple[str, ...]]
 """Recording, folder of the results, what must not be seen (one or more): the words of the command that diagnoses."""
@@ -260,6 +260,6 @@ def write(folder: RunFolder, proof: Proof) -> None:
     """
     folder.write("proof.json", proof_json(proof))
     folder.write("proof.md", proof_markdown(proof))
-    folder.write("page.html", proof_page(proof))
+    folder.write("index.html", proof_page(proof))
     with drawn():
         folder.write_bytes("confusion.png", png_of(confusion_picture(proof.figures)))

@@ -25,7 +25,7 @@ from physid_drake.wording import shown
 DIAGNOSE: Final = "diagnose"
 """The command that answers."""
 RESULT: Final = "diagnosis.json"
-OTHERS: Final = ("page.html", "scene.html", "model.yaml")
+OTHERS: Final = ("index.html", "diagnosis.html", "scene.html", "model.yaml")
 """What it writes beside it."""
 ATTEMPT: Final = "attempt.json"
 """Beside a diagnosis: how long it took [s], or why there is none."""

@@ -1,4 +1,4 @@
-"""``page.html`` of a diagnosis: one file that opens without a network, read from top to bottom.
+"""``diagnosis.html``: one file that opens without a network, read from top to bottom.
 
 It reads and draws what was computed; the statistics are all made before. The template is ``diagnosis_page.html``.
 """
@@ -6,7 +6,7 @@ It reads and draws what was computed; the statistics are all made before. The te
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +48,7 @@ from physid_drake.report.numbers import (
     tiny,
 )
 from physid_drake.report.outline import outline_of
+from physid_drake.report.pages import DIAGNOSIS, SCENE, nav
 from physid_drake.report.svg import AFTER, BEFORE, CONTACT, FREE, INK, MUTED, drawn
 from physid_drake.report.table_view import MM, ShownPush, TableView
 
@@ -97,7 +98,7 @@ def diagnosis_page(
     shown: Sequence[ShownPush],
     wrenches: Sequence[MissingWrench],
     *,
-    scene: str | None = None,
+    pages: Collection[str] = (),
 ) -> str:
     """The page as HTML; the same arguments give the same bytes.
 
@@ -106,7 +107,7 @@ def diagnosis_page(
         recording: what it was made from.
         shown: its pushes, in the recording's order.
         wrenches: what is missing from the plain cell, window by window.
-        scene: name of the file with the pushes in Meshcat, if it lies beside the page.
+        pages: that lie beside this one.
     """
     friction = diagnosis.theta.get("support_friction")
     view = TableView(
@@ -116,7 +117,8 @@ def diagnosis_page(
         friction=None if friction is None else _told(friction),
     )
     with drawn():
-        content = {"scene": scene, **_content(diagnosis, recording, view)}
+        scene = SCENE if SCENE in pages else None
+        content = {"scene": scene, "nav": nav(DIAGNOSIS, pages), **_content(diagnosis, recording, view)}
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["degrees"] = lambda angle: fixed(math.degrees(angle))
     environment.filters.update(number=number, fixed=fixed, quantity=quantity, chance=chance, tiny=tiny)

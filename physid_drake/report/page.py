@@ -1,7 +1,8 @@
-"""``page.html``: Meshcat's static page with the results beside it; it opens without a network."""
+"""``index.html`` of the main job: Meshcat's static page with the results beside it; it opens without a network."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 from jinja2 import Environment, StrictUndefined
@@ -12,13 +13,14 @@ from physid_drake.identify.accuracy import accuracy_of
 from physid_drake.identify.estimates import estimates_of
 from physid_drake.plan import Hindsight, Plan
 from physid_drake.report.cells import cells_figure, cells_verdict, combination_text
+from physid_drake.report.pages import INDEX, nav
 from physid_drake.report.panel import with_panel
 from physid_drake.report.plan import plan_rows
 from physid_drake.report.plan_page import caption_of, curve_svg
 from physid_drake.report.tables import accuracy_cells, verdict
 
 _PANEL = """
-<div id="physid"><details open><summary><b>{{ name }}</b></summary>
+<div id="physid">{{ nav }}<details open><summary><b>{{ name }}</b></summary>
   {% if diagnosis %}<p><b>{{ diagnosis.verdict }}</b>. {{ diagnosis.sentence }} <a href="diagnosis.html">How sure, and
     where</a>; <a href="scene.html">in Meshcat</a>.</p>{% else %}<p>{{ verdict }}</p>{% endif %}
   <h2>theta{{ with_effects }}</h2>
@@ -61,6 +63,7 @@ def result_page(
     note: str,
     plan: Plan | None = None,
     hindsight: Hindsight | None = None,
+    pages: Collection[str] = (),
 ) -> str:
     """Meshcat's static page with a panel of results.
 
@@ -72,6 +75,7 @@ def result_page(
         note: one line on how it was made.
         plan: the plan made with what was found, whose curve is shown; None for none.
         hindsight: what a diagnosis says of the plan that was made before it.
+        pages: that lie beside this one.
     """
     known, evidence = examined.known, examined.evidence
     fitter, fit = (known.fitter, known.fit) if evidence is None else (evidence.fitter, evidence.leaving)
@@ -93,6 +97,7 @@ def result_page(
         note=note,
         plan=None if plan is None else _shown_plan(plan, hindsight),
         diagnosis=examined.diagnosis,
+        nav=nav(INDEX, pages),
         cells=None if known.cells is None else _shown_cells(known.cells),
     )
     return with_panel(html, panel)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Collection
 
 import numpy as np
 from jinja2 import Environment, StrictUndefined
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from physid_drake.effects.rollout import Geometry, geometry_with
 from physid_drake.plan import DistanceToGoal, Ending, Hindsight, InsideRegion, Outcome, Plan, SweepRow
 from physid_drake.report.outline import outline_of
+from physid_drake.report.pages import PLAN, nav
 from physid_drake.report.plan import plan_rows, push_files, title_of
 from physid_drake.report.svg import MUTED, drawn, svg_of
 from physid_drake.report.table_view import MM, placed
@@ -48,8 +50,9 @@ def plan_png(plan: Plan) -> bytes:
 
 
 def plan_page(
-    plan: Plan, *, seed: int, with_effects: Outcome | None = None, hindsight: Hindsight | None = None
-) -> str:
+    plan: Plan, *, seed: int, with_effects: Outcome | None = None, hindsight: Hindsight | None = None,
+    pages: Collection[str] = (),
+) -> str:  # fmt: skip
     """The page as HTML.
 
     Args:
@@ -58,6 +61,7 @@ def plan_page(
         with_effects: trajectory and cost of the same push under the model with its effects, where it was planned
             without them.
         hindsight: what a diagnosis leaves open.
+        pages: that lie beside this one.
     """
     with drawn():
         above = Figure(figsize=(6.4, 4.4), layout="constrained")
@@ -68,7 +72,7 @@ def plan_page(
         title=title_of(plan), rows=plan_rows(plan, with_effects=with_effects, hindsight=hindsight),
         above=picture,
         curve=curve_svg(plan) if plan.sweep else None, caption=caption_of(plan), files=push_files(plan),
-        seed=seed, other=with_effects is not None, trials=plan.search.belief.n_trials,
+        seed=seed, other=with_effects is not None, trials=plan.search.belief.n_trials, nav=nav(PLAN, pages),
     ) + "\n"  # fmt: skip
 
 
@@ -191,6 +195,7 @@ i { display: inline-block; width: 18px; height: 4px; border-radius: 2px; vertica
   margin: 0 6px 0 12px; }
 @media (max-width: 800px) { .columns { grid-template-columns: minmax(0, 1fr); } main { padding: 18px 14px; } }
 </style></head><body><main>
+{{ nav }}
 <h1>{{ title }}</h1>
 <div class="columns">
 <figure>{{ above }}<figcaption><i style="background:#2563c9; margin-left:0"></i>object

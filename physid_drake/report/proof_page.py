@@ -1,4 +1,4 @@
-"""``page.html`` of a proof: one file that opens without a network."""
+"""``index.html`` of a proof: one file that opens without a network."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def proof_page(proof: Proof) -> str:
     """The page as HTML; the same proof gives the same bytes.
 
     Args:
-        proof: what to show; the pages of its diagnoses are linked as ``diagnoses/<id>/page.html``.
+        proof: what to show; the pages of its diagnoses are linked as ``diagnoses/<id>/diagnosis.html``.
     """
     with drawn():
         pictures = {
@@ -57,7 +57,7 @@ def _content(proof: Proof, pictures: dict[str, Markup]) -> dict[str, Any]:
         "seconds": f"{median:.0f} s median, {longest:.0f} s at most" if math.isfinite(median) else "not measured",
         "faults": [
             {"id": o.id, "fault": o.fault, "truth": truth_of(o), "size": f"{o.size:.1f}", "said": said_of(o),
-             "page": None if o.failed else f"diagnoses/{o.id}/page.html"}
+             "page": None if o.failed else f"diagnoses/{o.id}/diagnosis.html"}
             for o in proof.faults
         ],
     }  # fmt: skip

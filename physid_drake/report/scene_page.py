@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from jinja2 import Environment, StrictUndefined
 
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.values import Diagnosis
+from physid_drake.report.pages import SCENE, nav
 from physid_drake.report.panel import with_panel
 from physid_drake.report.stage import ARROW, MISSING, NOTHING, RECORDED, SIMULATED
 
 _PANEL = """
-<div id="physid"><details open><summary><b>{{ name }}</b></summary>
+<div id="physid">{{ nav }}<details open><summary><b>{{ name }}</b></summary>
   <p>{{ sentence }}</p>
   {% for colour, what in legend %}<div><span class="dot" style="background: rgb({{ colour }})"></span>{{ what }}</div>
   {% endfor %}
@@ -21,7 +22,9 @@ _PANEL = """
 """
 
 
-def scene_page(html: str, diagnosis: Diagnosis, wrenches: Sequence[MissingWrench], unit_force: float) -> str:
+def scene_page(
+    html: str, diagnosis: Diagnosis, wrenches: Sequence[MissingWrench], unit_force: float, pages: Collection[str] = ()
+) -> str:
     """Meshcat's static page with a legend.
 
     Args:
@@ -29,6 +32,7 @@ def scene_page(html: str, diagnosis: Diagnosis, wrenches: Sequence[MissingWrench
         diagnosis: whose scene it is.
         wrenches: those drawn.
         unit_force: that is drawn as long as ``ARROW`` [N].
+        pages: that lie beside this one.
     """
     legend = [
         (_css(RECORDED), "object as recorded, and its paths"),
@@ -40,7 +44,7 @@ def scene_page(html: str, diagnosis: Diagnosis, wrenches: Sequence[MissingWrench
         legend.append((_css(NOTHING), "force that is within two standard deviations of nothing"))
     panel = Environment(undefined=StrictUndefined, autoescape=True).from_string(_PANEL).render(
         name=diagnosis.recording, sentence=diagnosis.sentence, legend=legend, arrow=ARROW,
-        unit_force=unit_force if wrenches else None,
+        unit_force=unit_force if wrenches else None, nav=nav(SCENE, pages),
     )  # fmt: skip
     return with_panel(html, panel)
 

@@ -22,7 +22,7 @@ from physid_drake.run_folder import RunFolder
 from physid_drake.run_plan import _learnt
 
 COMMAND, SETTINGS = "diagnose", "settings.json"
-STATE, RESULTS = ("rollouts.bin",), ("diagnosis.json", "page.html", "model.yaml")
+STATE, RESULTS = ("rollouts.bin",), ("diagnosis.json", "diagnosis.html", "model.yaml")
 OWN = (SETTINGS, *STATE, *RESULTS)
 FOREIGN = ("notes.txt", "page.html", "diagnosis.json", "model.yaml", "sub/page.html", "settings.json",
            "rollouts.bin",

@@ -263,9 +263,11 @@ def test_gains_across_regimes_are_shown_where_there_are_any(page):
 
 
 def test_a_scene_beside_the_page_is_linked(page):
-    linked = diagnosis_page(diagnosis_with(), recording_of(), shown_pushes(), WRENCHES, scene="scene.html")
-    assert linked.count('<a href="scene.html">') == 1 and not Tags(linked).open
-    assert linked.index("Where it is") < linked.index("scene.html") < linked.index("What is missing over time")
+    pages = ("index.html", "diagnosis.html", "scene.html")
+    linked = diagnosis_page(diagnosis_with(), recording_of(), shown_pushes(), WRENCHES, pages=pages)
+    assert linked.count('<a href="scene.html"') == 2 and linked.count('<a href="index.html"') == 1
+    assert not Tags(linked).open and 'href="plan.html"' not in linked and 'href="diagnosis.html"' not in linked
+    assert linked.index("Where it is") < linked.rindex("scene.html") < linked.index("What is missing over time")
     assert "<a" not in page
 
 

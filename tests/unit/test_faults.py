@@ -99,8 +99,9 @@ def test_a_full_disk_is_one_line_and_leaves_no_scraps(command, largest, recordin
     done = faulty(command(recording, out), largest=largest)
     errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
     assert done.returncode == 1 and "Traceback" not in done.stderr
-    assert len(errors) == 1 and "page.html': cannot be written: File too large." in errors[0]
-    assert not {".page.html.part", "page.html", LOCK} & {path.name for path in out.iterdir()}
+    page = {run_cell: "index.html", diagnose: "diagnosis.html"}[command]
+    assert len(errors) == 1 and f"{page}': cannot be written: File too large." in errors[0]
+    assert not {f".{page}.part", page, LOCK} & {path.name for path in out.iterdir()}
     assert faulty(command(recording, out)).returncode == 0
 
 
@@ -112,7 +113,7 @@ def test_a_cache_that_cannot_be_written_ends_no_run(recording, tmp_path):
     (largest,) = [len(value) for name, value in content(whole).items() if name == "config.yaml"]
     done = faulty(run_cell(recording, out), largest=largest)
     assert "warning: the search's state is not kept" in done.stderr
-    assert done.returncode == 1 and "page.html" in done.stderr.splitlines()[-1]
+    assert done.returncode == 1 and "index.html" in done.stderr.splitlines()[-1]
 
 
 @pytest.mark.slow
@@ -139,7 +140,7 @@ def test_foreign_files_in_an_output_folder_stay(recording, tmp_path):
     """In a folder of somebody's own nothing is written; in a run's, what is beside its files stays."""
     own = tmp_path / "own"
     own.mkdir()
-    for name in ("config.yaml", "model.yaml", "page.html", "push.csv", "push_1.csv", "plan.json", "settings.json"):
+    for name in ("config.yaml", "model.yaml", "index.html", "push.csv", "push_1.csv", "plan.json", "settings.json"):
         (own / name).write_text(f"my {name}")
     before = content(own)
     for argv in (

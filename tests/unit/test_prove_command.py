@@ -97,7 +97,7 @@ def test_a_world_that_fails_is_counted_and_listed_and_ends_nothing(worlds, capsy
         content["figures"]["effect_clear"]["right"]["count"],
         content["figures"]["effect_clear"]["right"]["of"],
     ) == (1, 2)
-    for name in ("proof.md", "page.html", "confusion.png"):
+    for name in ("proof.md", "index.html", "confusion.png"):
         assert (worlds / name).stat().st_size > 500
     said = capsys.readouterr().out
     assert said.index("sha256 " + content["seal_sha256"]) < said.index(world(worlds, 0))  # before the first diagnosis

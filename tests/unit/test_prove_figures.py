@@ -172,7 +172,7 @@ def test_the_page_is_self_contained_and_lists_every_fault(proof):
     assert page.count("<svg") == 3
     assert not re.search(r"""(src|href)\s*=\s*["'](https?:|//|/)|url\((?!#)|<script|@import""", page)
     for outcome_ in proof.faults:
-        assert (f'href="diagnoses/{outcome_.id}/page.html"' in page) is (not outcome_.failed)
+        assert (f'href="diagnoses/{outcome_.id}/diagnosis.html"' in page) is (not outcome_.failed)
     assert "error: out of memory" in page
     assert proof.seal in page
 

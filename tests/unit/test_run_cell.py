@@ -38,7 +38,7 @@ def test_a_run_leaves_its_configuration_its_result_and_its_page(done):
         "manifest.json",
         "config.yaml",
         "result.json",
-        "page.html",
+        "index.html",
         "model.yaml",
     }
     assert {oct(path.stat().st_mode & 0o777) for path in done.iterdir()} == {"0o644"}
@@ -91,7 +91,7 @@ class Page(HTMLParser):
 @pytest.fixture(scope="module")
 def page(done):
     parser = Page()
-    parser.feed((done / "page.html").read_text())
+    parser.feed((done / "index.html").read_text())
     return parser
 
 
@@ -122,7 +122,7 @@ def test_the_page_lets_a_person_choose_every_push(page, done):
 def test_a_name_that_looks_like_html_stays_text(tmp_path):
     folder = write_small(tmp_path / "odd", name="<b>odd</b> & [red]$x$")
     assert quick(tmp_path / "out", recording=folder) == 0
-    assert "&lt;b&gt;odd&lt;/b&gt; &amp; [red]$x$" in (tmp_path / "out" / "page.html").read_text()
+    assert "&lt;b&gt;odd&lt;/b&gt; &amp; [red]$x$" in (tmp_path / "out" / "index.html").read_text()
 
 
 def test_the_terminal_shows_theta_accuracy_and_verdict(recording, tmp_path, capsys):
@@ -253,7 +253,7 @@ def test_a_pipe_that_closes_loses_no_result(tmp_path, monkeypatch):
     monkeypatch.setattr(run_cell, "_show", closed)
     with pytest.raises(SystemExit):
         quick(tmp_path / "out", recording=write_small(tmp_path / "recording", 2))
-    assert {"result.json", "page.html", "model.yaml"} <= {file.name for file in (tmp_path / "out").iterdir()}
+    assert {"result.json", "index.html", "model.yaml"} <= {file.name for file in (tmp_path / "out").iterdir()}
 
 
 def test_an_unknown_search_is_refused_before_anything_is_written(tmp_path, capsys):
@@ -286,7 +286,7 @@ def test_a_recordings_folder_is_no_place_for_results(tmp_path, capsys):
 
 def test_a_configurations_folder_is_no_place_for_results(tmp_path, recording, capsys):
     (tmp_path / "config.yaml").write_text(f"lab: {{recording: {recording}}}")
-    for name in ("model.yaml", "page.html", "push.csv"):
+    for name in ("model.yaml", "index.html", "push.csv"):
         (tmp_path / name).write_text("mine")
     before = everything(tmp_path)
     assert "read from" in refused(capsys, tmp_path / "config.yaml", "--out", tmp_path)
@@ -294,9 +294,9 @@ def test_a_configurations_folder_is_no_place_for_results(tmp_path, recording, ca
 
 
 def test_a_folder_of_somebodys_own_is_refused(tmp_path, recording, capsys):
-    (tmp_path / "page.html").write_text("mine")
+    (tmp_path / "index.html").write_text("mine")
     assert "is not empty" in refused(capsys, "--recording", recording, "--out", tmp_path)
-    assert everything(tmp_path) == {Path("page.html"): b"mine"}
+    assert everything(tmp_path) == {Path("index.html"): b"mine"}
 
 
 @pytest.mark.parametrize(("flag", "file"), [("--no-diagnosis", "diagnosis.json"), ("--no-plan", "plan.json")])

@@ -50,7 +50,15 @@ def few_rows(monkeypatch):
 def test_the_command_writes_the_plan_and_the_same_seed_the_same_bytes(folder, tmp_path, capsys, few_rows):
     files = planned_files(folder, tmp_path / "one")
     shown = capsys.readouterr().out
-    assert set(files) == {"plan.json", "push.csv", "plan.png", "page.html", "settings.json", "manifest.json"}
+    assert set(files) == {
+        "plan.json",
+        "push.csv",
+        "plan.png",
+        "plan.html",
+        "index.html",
+        "settings.json",
+        "manifest.json",
+    }
     again = planned_files(folder, tmp_path / "two")
     assert all(again[name] == content for name, content in files.items() if name != "settings.json")
     content = json.loads(files["plan.json"])
@@ -58,7 +66,7 @@ def test_the_command_writes_the_plan_and_the_same_seed_the_same_bytes(folder, tm
     assert content["pushes"][0]["speed_mps"] == content["settings"]["speed"]["value"]
     assert content["belief"]["draws"] == 2 and len(content["sweep"]["rows"]) == 3
     assert f"{content['settings']['speed']['value']:.4f} m/s" in shown and "table_tilt" in shown
-    page = files["page.html"].decode()
+    page = files["plan.html"].decode()
     assert f"{content['settings']['speed']['value']:.4f} m/s" in page
     assert "http" not in page.replace("http://www.w3.org", "")
 
@@ -126,7 +134,7 @@ def test_what_a_diagnosis_leaves_open_stands_beside_a_plan(folder, tmp_path, cap
     files = planned_files(folder, tmp_path / "out")
     caveat = json.loads(files["plan.json"])["caveat"]
     assert caveat is None if said is None else said in caveat
-    assert ("beware" in capsys.readouterr().out) is ("beware" in files["page.html"].decode()) is (said is not None)
+    assert ("beware" in capsys.readouterr().out) is ("beware" in files["plan.html"].decode()) is (said is not None)
 
 
 @pytest.mark.parametrize(("known", "warned"), [(0.01, True), (2.0, False), (None, False)])
@@ -134,7 +142,7 @@ def test_a_push_faster_than_every_recorded_one_is_said(folder, tmp_path, few_row
     (folder / "model.yaml").write_text(replace(TILTED, top_speed=known).dump())
     files = planned_files(folder, tmp_path / "out")
     caveat = json.loads(files["plan.json"])["caveat"] or ""
-    page = files["page.html"].decode()
+    page = files["plan.html"].decode()
     assert ("fastest recorded push at 0.01 m/s" in caveat) is ("fastest recorded push" in page) is warned
 
 
@@ -250,7 +258,7 @@ def test_the_main_job_plans_with_what_it_identified(tmp_path):
     )
     assert yaml.safe_load((out / "config.yaml").read_text())["small"]["plan"]["budget"] == 6
     assert (out / "push.csv").exists() and not (out / "plan.png").exists()
-    page = (out / "page.html").read_text()
+    page = (out / "plan.html").read_text()
     assert f"{content['settings']['speed']['value']:.4f} m/s" in page and "Cost against speed" in page
 
 
@@ -294,7 +302,7 @@ def test_the_main_job_plans_again_with_what_its_diagnosis_found(
     flags = ["--recording", str(recording), "--out", str(tmp_path / "out"), "--set", override, "--no-view"]
     assert run_cell.main(flags) == 0
     content = json.loads((tmp_path / "out" / "plan.json").read_text())
-    shown, page = " ".join(capsys.readouterr().out.split()), (tmp_path / "out" / "page.html").read_text()
+    shown, page = " ".join(capsys.readouterr().out.split()), (tmp_path / "out" / "plan.html").read_text()
     assert f"<b>{verdict}</b>. Said &amp; done." in page
     assert content["effects"] == [e.name for e in effects]
     assert ("push_speed, with table_tilt" in shown) == ("push_speed, with table_tilt" in page) == bool(effects)
