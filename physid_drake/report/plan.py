@@ -103,6 +103,8 @@ def plan_rows(
         rows.append(("goal", f"{1e3 * gx:.0f}, {1e3 * gy:.0f} mm"))
     rows += _settings_rows(plan)
     rows.append(("predicted end", _said(plan.predicted, plan.cost)))
+    if isinstance(plan.cost_function, DistanceToGoal) and plan.tolerance < plan.cost < plan.loss:
+        rows.append(("misses the goal", f"by {1e3 * plan.cost:.1f} mm; {1e3 * plan.tolerance:g} mm were allowed"))
     if with_effects is not None:
         rows.append(("with the effects found", _said(*with_effects)))
     if plan.spread is not None:

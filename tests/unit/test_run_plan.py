@@ -1,6 +1,7 @@
 """What the command and the main job plan, write and refuse."""
 
 import json
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -371,3 +372,24 @@ def test_no_goal_that_fits_is_no_reason_to_stop_but_a_wrong_one_is(capsys):
     assert "No push is planned" in " ".join(capsys.readouterr().out.split())
     with pytest.raises(ConfigError, match="not on the table"):
         run_cell._planner(Scenario(plan=PlanConfig(goal_m=[5.0, 5.0])), small, identifier, Console())
+
+
+def test_a_push_that_misses_is_said_and_another_policy_is_offered(folder, tmp_path, capsys, few_rows):
+    """Along a direction that leads aside, no speed brings it to the goal."""
+    out = tmp_path / "out"
+    argv = ["--goal", "0.1", "0.05", "--direction", "-40", "--budget", "30", "--draws", "0", "--out", str(out)]
+    assert main(["plan", str(folder), *argv]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    missed = 1e3 * json.loads((out / "plan.json").read_text())["predicted"]["cost_m"]
+    assert missed > 20.0 and f"The best push misses the goal by {missed:.1f} mm; 10 mm were allowed." in shown
+    nearer = re.search(r"--policy (push|two_pushes) (reaches it|comes nearer): off by ([\d.]+) mm\.", shown)
+    assert nearer is not None and float(nearer[3]) < missed
+    assert (nearer[2] == "reaches it") == (float(nearer[3]) <= 10.0)
+    assert f"by {missed:.1f} mm; 10 mm were allowed" in (out / "plan.html").read_text()
+
+
+def test_a_push_that_reaches_its_goal_says_nothing_of_the_kind(folder, tmp_path, capsys, few_rows):
+    argv = ["--goal", "0.1", "0.05", "--tolerance", "0.03", "--budget", "30", "--draws", "0"]
+    assert main(["plan", str(folder), *argv, "--policy", "push", "--out", str(tmp_path / "out")]) == 0
+    shown = capsys.readouterr().out
+    assert "misses the goal" not in shown and "--policy" not in shown
