@@ -22,7 +22,6 @@ from physid_drake.errors import RecordingError
 from physid_drake.recording import (
     Box,
     Cylinder,
-    ForceStream,
     PoseStream,
     Prism,
     Push,
@@ -49,8 +48,6 @@ UNITS: Final = {
     1e3: "1000 times too small (m for mm)",
 }  # fmt: skip
 """Factors that put places right whose unit is another one than was said."""
-POUND: Final = 0.45359237
-EARTH: Final = 9.80665
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,19 +92,6 @@ def _kinds(recording: Recording) -> list[Callable[[Recording], Iterator[Conventi
     return [_units, _axes, _rotations, _sizes_of_object, _sizes_of_tip, _clocks, _shifts]
 
 
-def conventions_of_forces(recording: Recording) -> Iterator[Convention]:
-    """What may be wrong with forces, and with the mass, which forces alone tell."""
-    yield from _forces(recording)
-    yield from _masses(recording)
-
-
-def without_forces(recording: Recording) -> Recording:
-    """The recording without its forces; itself where there are none."""
-    if all(push.force is None for push in recording.pushes):
-        return recording
-    return _each(recording, lambda push: replace(push, force=None))
-
-
 def gap_of(recording: Recording) -> float:
     """How far the tip is from the outline while something pushes the object [m], the median; NaN if nothing does.
 
@@ -119,7 +103,8 @@ def gap_of(recording: Recording) -> float:
     return float(np.median(np.abs(gaps))) if len(gaps) else math.nan
 
 
-def _each(recording: Recording, change: Callable[[Push], Push]) -> Recording:
+def each_push(recording: Recording, change: Callable[[Push], Push]) -> Recording:
+    """The recording with every push changed alike."""
     return replace(recording, pushes=tuple(map(change, recording.pushes)))
 
 
@@ -130,26 +115,26 @@ def _rotations(recording: Recording) -> Iterator[Convention]:
             yield Convention(
                 says=f"the object's quaternions are {order}",
                 remedy=f"map: object.rotation: {said}",
-                recording=_each(recording, partial(_reordered, shift=shift)),
+                recording=each_push(recording, partial(_reordered, shift=shift)),
             )  # fmt: skip
     if kinds & {"full", "yaw"}:
         yield Convention(
             says="the object's rotations turn the other way (R_BW, or an axis that is mirrored)",
             remedy="map: object.rotation: inverse: true, or world.left_handed",
-            recording=_each(recording, _inverted),
+            recording=each_push(recording, _inverted),
         )
     if "yaw" in kinds:
         yield Convention(
             says="the object's yaw is in degrees",
             remedy="map: object.rotation: unit: deg; or object_yaw_rad in rad",
-            recording=_each(recording, _yaw_from_degrees),
+            recording=each_push(recording, _yaw_from_degrees),
         )
     if kinds & {"full", "yaw"}:
         for degrees in (90, 180, 270):
             yield Convention(
                 says=f"the object's frame is turned by {degrees} degrees in it",
                 remedy=f"map: object.offset: yaw_deg: {degrees}",
-                recording=_each(recording, partial(_turned_in_itself, turn=math.radians(degrees))),
+                recording=each_push(recording, partial(_turned_in_itself, turn=math.radians(degrees))),
             )
 
 
@@ -193,13 +178,13 @@ def _axes(recording: Recording) -> Iterator[Convention]:
         yield Convention(
             says=f"of the hand, {said}",
             remedy="map: columns of hand.position, or world for the hand's stream",
-            recording=_each(recording, partial(_hand_axes, matrix=np.array(matrix))),
+            recording=each_push(recording, partial(_hand_axes, matrix=np.array(matrix))),
         )
     for said in ("y is mirrored", "x and y are swapped"):
         yield Convention(
             says=f"of both places, but not of the rotations, {said}",
             remedy="map: world.axes with left_handed: true, or columns of object.position and hand.position",
-            recording=_each(recording, partial(_both_axes, matrix=np.array(matrices[said]))),
+            recording=each_push(recording, partial(_both_axes, matrix=np.array(matrices[said]))),
         )
 
 
@@ -213,7 +198,7 @@ def _units(recording: Recording) -> Iterator[Convention]:
         for factor, how in UNITS.items():
             change = partial(_resized, of_object=factor if of_object else 1.0, of_hand=factor if of_hand else 1.0)
             try:
-                resized = _each(recording, change)
+                resized = each_push(recording, change)
             except RecordingError:  # further away than anything is
                 continue
             yield Convention(says=f"{said} are {how}", remedy="map: unit of its position", recording=resized)
@@ -290,7 +275,7 @@ def _clocks(recording: Recording) -> Iterator[Convention]:
         yield Convention(
             says=f"the hand's times are {abs(1e3 * late):.0f} ms too {'early' if late > 0.0 else 'late'}",
             remedy=f"map: hand.time: offset_s: {late:.3g}, added to what is there",
-            recording=_each(recording, partial(_later, late=late)),
+            recording=each_push(recording, partial(_later, late=late)),
         )
 
 
@@ -342,7 +327,7 @@ def _shifts(recording: Recording) -> Iterator[Convention]:
             yield Convention(
                 says=f"{what} {said}",
                 remedy=f"map: {key}: [{shift[0]:.4f}, {shift[1]:.4f}, 0], added to what is there",
-                recording=_each(recording, partial(change, shift=shift)),
+                recording=each_push(recording, partial(change, shift=shift)),
             )
 
 
@@ -366,44 +351,7 @@ def _shift(recording: Recording, change: Callable[..., Push]) -> Array | None:
         return None
 
     def gaps(shift: Array) -> Array:
-        return _gaps(_each(recording, partial(change, shift=shift)), rows)
+        return _gaps(each_push(recording, partial(change, shift=shift)), rows)
 
     found = least_squares(gaps, np.zeros(2), loss="soft_l1", f_scale=2e-3, x_scale=0.01, max_nfev=12)
     return np.asarray(found.x)
-
-
-def _forces(recording: Recording) -> Iterator[Convention]:
-    yield Convention(
-        says="the force is that of the object on the hand",
-        remedy="map: force: acts_on: hand",
-        recording=_each(recording, partial(_scaled, factor=-1.0)),
-    )
-    factors: Sequence[tuple[float, str]] = (
-        (1e-3, "mN"), (1e3, "kN"), (EARTH, "kgf"), (1e-3 * EARTH, "gf"), (POUND * EARTH, "lbf"),
-    )  # fmt: skip
-    for factor, unit in factors:
-        yield Convention(
-            says=f"forces are in {unit}",
-            remedy=f"map: force: unit: {unit}",
-            recording=_each(recording, partial(_scaled, factor=factor)),
-        )
-
-
-def _scaled(push: Push, factor: float) -> Push:
-    force = push.force
-    scaled = None if force is None else ForceStream(times=force.times, forces=factor * force.forces)
-    return replace(push, force=scaled)
-
-
-def _masses(recording: Recording) -> Iterator[Convention]:
-    mass, std = recording.object.mass, recording.object.mass_std
-    if mass is None or std is None:
-        return
-    for factor, unit in ((POUND, "lb"), (1.0 / EARTH, "N"), (1e-3, "g")):
-        yield Convention(
-            says=f"the mass is in {unit}",
-            remedy=f"object: mass_kg: {factor * mass:.4g}",
-            recording=replace(
-                recording, object=replace(recording.object, mass=factor * mass, mass_std=factor * std)
-            ),
-        )  # fmt: skip

@@ -11,11 +11,10 @@ import numpy as np
 from physid_drake.doctor.conventions import (
     Convention,
     conventions_of,
-    conventions_of_forces,
     gap_of,
     pairs_of,
-    without_forces,
 )
+from physid_drake.doctor.forces import conventions_of_forces, without_forces
 from physid_drake.errors import PhysidError
 from physid_drake.identify.baseline import plain
 from physid_drake.inference.fit import Fitter

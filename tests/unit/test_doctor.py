@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from physid_drake.doctor import examined
-from physid_drake.doctor.conventions import conventions_of, conventions_of_forces, gap_of, pairs_of
+from physid_drake.doctor.conventions import conventions_of, gap_of, pairs_of
+from physid_drake.doctor.forces import conventions_of_forces
 from physid_drake.recording import Box, Cylinder, ForceStream, Push, Recording, read_recording
 
 RECORDINGS = Path(__file__).parents[2] / "recordings"
