@@ -30,7 +30,7 @@ DIAGNOSIS_STAGES: Final[Mapping[str, float]] = {
     "physics without a name": 1.1, "what was found, in the Drake cell": 0.8, "the missing wrench": 0.05,
     "the next push": 0.1,
 }  # fmt: skip
-"""How long the stages of a diagnosis last beside its first, about: what `benchmarks/diagnosis_time.py` prints of one."""
+"""How long a diagnosis' stages last beside its first, about; `benchmarks/diagnosis_time.py` prints those of one."""
 
 
 class Forecast:
