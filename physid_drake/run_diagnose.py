@@ -135,14 +135,14 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
         )
 
 
-def write(folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, pages: Sequence[str] = PAGES) -> None:
+def write(folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, pages: Sequence[str] | None = None) -> None:
     """Write ``diagnosis.json``, the page, ``model.yaml`` and a scene of Meshcat that opens in any browser.
 
     Args:
         folder: where.
         diagnosis: what was found.
         evidence: and how.
-        pages: that the folder has; its index is written by whoever names others than these.
+        pages: of a folder whose index somebody else writes; None: these alone, and it is written here.
 
     Raises:
         OutputError: if one cannot be written.
@@ -150,12 +150,12 @@ def write(folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, pages:
     pushes = shown_pushes(diagnosis, evidence)
     folder.forget("diagnosis.json")  # an earlier one's belongs to another model
     folder.write(
-        DIAGNOSIS, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches, pages=pages)
+        DIAGNOSIS, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches, pages=pages or PAGES)
     )
     folder.write("model.yaml", model_of(evidence).dump())
     stage = staged(evidence).StaticHtml()
-    folder.write(SCENE, scene_page(stage, diagnosis, evidence.wrenches, unit_force_of(evidence), pages))
-    if pages is PAGES:
+    folder.write(SCENE, scene_page(stage, diagnosis, evidence.wrenches, unit_force_of(evidence), pages or PAGES))
+    if pages is None:
         lines = [diagnosis.sentence, f"{diagnosis.verdict.capitalize()}: {MEANING[diagnosis.verdict]}"]
         folder.write(INDEX, index_page(f"Diagnosis of {diagnosis.recording}", lines, FILES))
     folder.write("diagnosis.json", diagnosis_json(diagnosis))  # last: where it is, all is

@@ -154,7 +154,7 @@ def _budget(settings: int) -> int:
 
 def write(
     folder: RunFolder, made: Plan, *, seed: int, with_effects: Outcome | None = None,
-    hindsight: Hindsight | None = None, pages: Sequence[str] = PAGES,
+    hindsight: Hindsight | None = None, pages: Sequence[str] | None = None,
 ) -> None:  # fmt: skip
     """Write ``plan.json``, the hand's paths, the picture and the page.
 
@@ -164,7 +164,7 @@ def write(
         seed: of the run.
         with_effects: what the push does under the model with its effects, where it was planned without them.
         hindsight: what a diagnosis leaves open.
-        pages: that the folder has; its index is written by whoever names others than these.
+        pages: of a folder whose index somebody else writes; None: these alone, and it is written here.
 
     Raises:
         OutputError: if one cannot be written.
@@ -174,8 +174,10 @@ def write(
     for name, path in zip(push_files(made), made.predicted.paths, strict=True):
         folder.write(name, push_csv(path, height))
     folder.write_bytes("plan.png", plan_png(made))
-    folder.write(PLAN, plan_page(made, seed=seed, with_effects=with_effects, hindsight=hindsight, pages=pages))
-    if pages is PAGES:
+    folder.write(
+        PLAN, plan_page(made, seed=seed, with_effects=with_effects, hindsight=hindsight, pages=pages or PAGES)
+    )
+    if pages is None:
         lines = [f"{what}: {value}." for what, value in plan_rows(made, with_effects=with_effects)[:6]]
         files = ("plan.json", *push_files(made), "plan.png", *PAGES)
         folder.write(INDEX, index_page(f"Plan: {title_of(made)}", lines, files))
