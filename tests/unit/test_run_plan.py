@@ -258,9 +258,10 @@ def test_the_main_job_plans_with_what_it_identified(tmp_path):
         content["policy"] == "push_speed" and len(content["sweep"]["rows"]) == 3 and content["belief"]["draws"] == 2
     )
     assert yaml.safe_load((out / "config.yaml").read_text())["small"]["plan"]["budget"] == 6
-    assert (out / "push.csv").exists() and not (out / "plan.png").exists()
-    page = (out / "plan.html").read_text()
-    assert f"{content['settings']['speed']['value']:.4f} m/s" in page and "Cost against speed" in page
+    assert (out / "push.csv").exists() and (out / "plan.png").exists()
+    for page in ("plan.html", "index.html"):
+        text = (out / page).read_text()
+        assert f"{content['settings']['speed']['value']:.4f} m/s" in text and "Cost against speed" in text
 
 
 TILT = (TableTilt(x=0.04),)
@@ -304,12 +305,12 @@ def test_the_main_job_plans_again_with_what_its_diagnosis_found(
     assert run_cell.main(flags) == 0
     content = json.loads((tmp_path / "out" / "plan.json").read_text())
     shown, page = " ".join(capsys.readouterr().out.split()), (tmp_path / "out" / "plan.html").read_text()
-    assert f"<b>{verdict}</b>. Said &amp; done." in page
+    assert f"<b>{verdict}</b>. Said &amp; done." in (tmp_path / "out" / "index.html").read_text()
     assert content["effects"] == [e.name for e in effects]
     assert ("push_speed, with table_tilt" in shown) == ("push_speed, with table_tilt" in page) == bool(effects)
     assert ("planned without effects" in shown) == ("planned without effects" in page) == bool(effects)
     warned = content["caveat"] or ""
-    assert (page.count("<td>beware") > 0) == bool(warned)
+    assert (page.count("<th>beware") > 0) == bool(warned)
     for said in ("cannot tell table_tilt from tether or magnet", "it may not hold"):
         assert warned.count(said) == page.count(said) == (said == caveat)
     plain = content["plain_push"]
