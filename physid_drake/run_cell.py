@@ -25,19 +25,27 @@ from physid_drake.pushes.case import UNIT_SCATTER
 from physid_drake.pushes.doubts import doubts
 from physid_drake.pushes.kept_rollouts import KeptRollouts
 from physid_drake.pushes.problem import HandUse
-from physid_drake.pushes.rollouts import simulate
-from physid_drake.pushes.task import Task
 from physid_drake.recording import Recording, digest_of, read_recording, recording_folder
+from physid_drake.report.acts import acts_of, acts_of_plan, setting_of, unit_force_of
 from physid_drake.report.cells import cells_table
 from physid_drake.report.inspection import warning_lines
-from physid_drake.report.page import result_page
+from physid_drake.report.live import Live
+from physid_drake.report.meshcat_server import LOOPBACK
+from physid_drake.report.overview import overview_page
 from physid_drake.report.pages import DIAGNOSIS as DIAGNOSIS_PAGE
 from physid_drake.report.pages import INDEX, SCENE
 from physid_drake.report.pages import PLAN as PLAN_PAGE
 from physid_drake.report.plan import plan_table, push_files
-from physid_drake.report.progress import progress_bar
+from physid_drake.report.progress import (
+    DIAGNOSIS_STAGES,
+    HINDSIGHT,
+    IDENTIFICATION_STAGES,
+    JOB_STAGES,
+    PLANNING_STAGES,
+    progress_bar,
+)
 from physid_drake.report.result import result_json
-from physid_drake.report.stage import LOOPBACK, ShownMotion, Stage, served
+from physid_drake.report.scene_page import scene_page
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
 from physid_drake.report.terminal import terminal
 from physid_drake.run_diagnose import ALPHA, STATE, show, write
@@ -50,10 +58,9 @@ from physid_drake.scenario_schema import Scenario
 
 COMMAND = "run_cell"
 BELIEF = "belief.npz"  # of an interrupted identification
-DIAGNOSIS = ("diagnosis.json", DIAGNOSIS_PAGE, SCENE)
-RESULTS = ("result.json", INDEX, "model.yaml", *DIAGNOSIS, *PLAN)
+DIAGNOSIS = ("diagnosis.json", DIAGNOSIS_PAGE)
+RESULTS = ("result.json", INDEX, SCENE, "model.yaml", *DIAGNOSIS, *PLAN)
 MOST_WARNINGS = 5  # printed
-SHOWN = 12  # pushes in the animation
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -107,11 +114,13 @@ def run(arguments: argparse.Namespace, console: Console) -> None:
     planner = None if arguments.no_plan else _planner(scenario, recording, identifier, console)
     # A comment, so that the file is still a configuration that can be given to this command.
     made_by = f"{dump_scenario(name, scenario)}# of recording {digest_of(recording)}\n# by {made_with()}\n"
-    stage = None if arguments.no_view else _live(recording, arguments.host, console)
+    live = None if arguments.no_view else Live(recording, arguments.host)
+    if live is not None:
+        console.print(f"Meshcat: {live.url}")
     with RunFolder.open(out, COMMAND, made_by, state=(BELIEF, STATE), results=RESULTS) as folder:
         _refuse_to_drop(folder, arguments)
-        stage = _fill(folder, identifier, planner, scenario, recording, stage, arguments, console)
-    _keep_serving(arguments.no_view, stage, console)
+        _fill(folder, identifier, planner, scenario, recording, live, arguments, console)
+    _keep_serving(live, console)
 
 
 def _refuse_to_drop(folder: RunFolder, arguments: argparse.Namespace) -> None:
@@ -128,31 +137,33 @@ def _refuse_to_drop(folder: RunFolder, arguments: argparse.Namespace) -> None:
 
 def _fill(
     folder: RunFolder, identifier: Identifier, planner: Planner | None, scenario: Scenario, recording: Recording,
-    stage: Stage | None, arguments: argparse.Namespace, console: Console,
-) -> Stage:  # fmt: skip
+    live: Live | None, arguments: argparse.Namespace, console: Console,
+) -> None:  # fmt: skip
     """Identify, diagnose and plan; then all is written, each file once, and then shown: a pipe may close."""
     folder.own(BELIEF)
     identifier.case.pool.kept = KeptRollouts(folder.own(STATE))
-    work = Work(identifier, planner, scenario, recording, console, diagnosing=not arguments.no_diagnosis)
+    work = Work(identifier, planner, scenario, recording, console, diagnosing=not arguments.no_diagnosis, live=live)
     examined, plan, hindsight = work.done()
-    stage = stage or Stage(recording)
-    marks = stage.play(_scenes(examined.known))
+    diagnosis, evidence = examined.diagnosis, examined.evidence
+    planned = [] if plan is None else acts_of_plan(plan, hindsight)
     for stale in (*DIAGNOSIS, "result.json"):  # an earlier run's, of another model
         folder.forget(stale)
+    files = ["result.json", "model.yaml", *(() if arguments.no_diagnosis else DIAGNOSIS[:1])]
+    files += [] if plan is None else ["plan.json", *push_files(plan)]
     pages = (
-        INDEX,
-        *(() if arguments.no_diagnosis else (DIAGNOSIS_PAGE, SCENE)),
-        *(() if plan is None else (PLAN_PAGE,)),
-    )
-    folder.write(INDEX, result_page(
-        stage.meshcat.StaticHtml(), examined, name=recording.name, marks=marks,
-        note=f"{recording.description} Seed {scenario.seed}.", plan=plan, hindsight=hindsight, pages=pages,
+        INDEX, *(() if arguments.no_diagnosis else (DIAGNOSIS_PAGE,)), SCENE, *(() if plan is None else (PLAN_PAGE,)),
+    )  # fmt: skip
+    folder.write(INDEX, overview_page(
+        examined, name=recording.name, note=f"{recording.description} Seed {scenario.seed}.", plan=plan,
+        hindsight=hindsight, files=[*files, *pages],
     ))  # fmt: skip
     _keep_plan(plan, scenario, folder, hindsight=hindsight, pages=pages)
-    if examined.evidence is None or examined.diagnosis is None:
+    if evidence is None or diagnosis is None:
         folder.write("model.yaml", work.model(examined).dump())
+        setting, acts = setting_of(examined.known, None), [*acts_of(examined.known, None), *planned]
+        folder.write(SCENE, scene_page(setting, acts, name=recording.name, pages=pages))
     else:
-        write(folder, examined.diagnosis, examined.evidence, pages=pages)
+        write(folder, diagnosis, evidence, pages=pages, planned=planned)
     # Last: where it is, all is.
     folder.write("result.json", result_json(examined, recording, scenario.seed, versions()))
     _show(examined.known, recording, console, alone=examined.diagnosis is None)
@@ -160,12 +171,12 @@ def _fill(
         show(console, examined.diagnosis)
     if plan is not None:
         console.print(plan_table(plan, hindsight=hindsight))
-    files = ["result.json", "model.yaml", *(() if arguments.no_diagnosis else DIAGNOSIS[:1])]
-    files += [] if plan is None else ["plan.json", *push_files(plan)]
     console.print(f"written: {', '.join(files)} and pages; open {folder.path / INDEX}")
     folder.forget(STATE)
     folder.forget(BELIEF)
-    return stage
+    if live is not None:
+        acts = [*acts_of(examined.known, evidence), *planned]
+        live.play(setting_of(examined.known, evidence), acts, 1.0 if evidence is None else unit_force_of(evidence))
 
 
 class Work:
@@ -173,7 +184,7 @@ class Work:
 
     def __init__(
         self, identifier: Identifier, planner: Planner | None, scenario: Scenario, recording: Recording,
-        console: Console, *, diagnosing: bool,
+        console: Console, *, diagnosing: bool, live: Live | None = None,
     ) -> None:  # fmt: skip
         """Prepare.
 
@@ -184,15 +195,18 @@ class Work:
             recording: the pushes.
             console: for the progress.
             diagnosing: whether to look for what is missing, too.
+            live: what shows how far it is, beside the console.
         """
         self._identifier, self._planner, self._scenario = identifier, planner, scenario
         self._recording, self._console, self._diagnosing = recording, console, diagnosing
+        self._live = live
         self._hindsight: Hindsight | None = None
 
     def done(self) -> tuple[Examined, Plan | None, Hindsight | None]:
         """Wire and run: the recording's player, what learns from its pushes, what examines that, the policy's."""
         last = len(self._recording.pushes) * PUSH_PERIOD  # what the last push teaches is seen at the next update
-        with progress_bar(self._console) as bar:
+        with progress_bar(self._console, self._stages()) as shown:
+            bar = shown if self._live is None else self._live.watching(shown)
             builder = DiagramBuilder()
             player = builder.AddSystem(RecordingPlayer(self._recording.pushes))
             space = self._identifier.case.thetas.space
@@ -243,8 +257,10 @@ class Work:
             bar("in the Drake cell", 0, 0)
             known = with_prior(in_the_cell(known))
         if not self._diagnosing:
+            self._say(f"identified: {', '.join(e.name for e in known.estimates if e.identifiable)}")
             return Examined(known=known)
         diagnosis, evidence = diagnose_from(known, seed=self._scenario.seed, alpha=ALPHA, tick=bar)
+        self._say(f"{diagnosis.verdict}: {diagnosis.sentence}")
         return Examined(known=evidence.known, diagnosis=diagnosis, evidence=evidence)
 
     def _planned(self, planner: Planner, examined: Examined, bar: Progress) -> Plan:
@@ -253,9 +269,24 @@ class Work:
         fit = examined.known.fit if evidence is None else evidence.leaving
         scatter, pushes = UNIT_SCATTER * fit.scatter, len(fit.pushes)
         plan = planner.with_model(model, friction_scatter=scatter, pushes=pushes, tick=bar)
+        self._say(f"planned: off by {1e3 * plan.cost:.1f} mm")
         if diagnosis is not None:
             self._hindsight = self._with_plain(planner, examined, diagnosis, model, bar)
         return plan
+
+    def _say(self, line: str) -> None:
+        """Something was found."""
+        if self._live is not None:
+            self._live.found(line)
+
+    def _stages(self) -> dict[str, float]:
+        """The stages of this job, and how long each lasts beside the others."""
+        stages = set(JOB_STAGES)
+        if not self._diagnosing:
+            stages -= set(DIAGNOSIS_STAGES) - set(IDENTIFICATION_STAGES)
+        if self._planner is None:
+            stages -= set(PLANNING_STAGES)
+        return {name: lasts for name, lasts in JOB_STAGES.items() if name in stages}
 
     def _with_plain(
         self, planner: Planner, examined: Examined, diagnosis: Diagnosis, model: Model, bar: Progress
@@ -263,8 +294,8 @@ class Work:
         caveat = caveat_of(diagnosis.verdict, {e.name: e.indistinguishable_from for e in diagnosis.effects})
         if not model.effects:
             return Hindsight(caveat=caveat) if caveat else None
-        bar("what the plain cell would have planned", 0, 0)
-        plain = planner.run(examined.known, bar)
+        # Its own search and sweep are one stage of the job.
+        plain = planner.run(examined.known, lambda _, done, total: bar(HINDSIGHT, done, total))
         return Hindsight(plain=plain, outcome=outcome_under(plain, model), caveat=caveat)
 
 
@@ -297,13 +328,6 @@ def _keep_plan(
         write_plan(folder, plan, seed=scenario.seed, hindsight=hindsight, pages=pages)
 
 
-def _live(recording: Recording, host: str, console: Console) -> Stage:
-    stage = Stage(recording, meshcat=served(host))
-    stage.show_start()
-    console.print(f"Meshcat: {stage.meshcat.web_url()}")
-    return stage
-
-
 def _identifier(scenario: Scenario, recording: Recording, out: Path) -> Identifier:
     return Identifier(
         recording,
@@ -332,21 +356,10 @@ def _planner(scenario: Scenario, recording: Recording, identifier: Identifier, c
         return None
 
 
-def _scenes(known: Identification) -> list[ShownMotion]:
-    """Pushes as the plain cell predicts them: with nothing of their own fitted."""
-    case, scenes = known.case, []
-    for push, problem, nuisance in list(zip(case.recording.pushes, case.problems, case.nuisances, strict=True))[
-        :SHOWN
-    ]:
-        task = Task(problem=problem, theta=known.theta, nuisance=nuisance, values=0.0 * nuisance.stds)
-        scenes.append(ShownMotion(push=push, motion=simulate(case.pool.spec, case.thetas, task)))
-    return scenes
-
-
-def _keep_serving(no_view: bool, stage: Stage, console: Console) -> None:
-    if no_view or not (sys.stdin.isatty() and sys.stdout.isatty()):
+def _keep_serving(live: Live | None, console: Console) -> None:
+    if live is None or not (sys.stdin.isatty() and sys.stdout.isatty()):
         return
-    console.print(f"The animation plays at {stage.meshcat.web_url()}; press Enter to end.")
+    console.print(f"The animation plays at {live.url}; press Enter to end.")
     sys.stdin.readline()
 
 

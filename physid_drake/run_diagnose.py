@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import argparse
 import dataclasses as dc
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-from pydrake.geometry import Meshcat
 from rich.console import Console
 from rich.text import Text
 
@@ -20,15 +17,14 @@ from physid_drake.errors import ConfigError
 from physid_drake.pushes.case import Case, case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.pushes.kept_rollouts import KeptRollouts
-from physid_drake.pushes.rollouts import simulate
-from physid_drake.pushes.task import Task
 from physid_drake.recording import digest_of, read_recording, recording_folder
+from physid_drake.report.acts import acts_of, setting_of, unit_force_of
 from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
 from physid_drake.report.diagnosis_page import MEANING, diagnosis_page, shown_pushes
 from physid_drake.report.pages import DIAGNOSIS, INDEX, SCENE, index_page
 from physid_drake.report.progress import DIAGNOSIS_STAGES, progress_bar
 from physid_drake.report.scene_page import scene_page
-from physid_drake.report.stage import MOST_ARROW, ShownMotion, Stage
+from physid_drake.report.stage import Act
 from physid_drake.report.terminal import terminal
 from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text, versions
 
@@ -36,7 +32,6 @@ COMMAND = "diagnose"
 STATE = "rollouts.bin"
 PAGES = (INDEX, DIAGNOSIS, SCENE)
 FILES = ("diagnosis.json", "model.yaml", *PAGES)
-SHOWN = 12  # pushes in the animation
 MOST_NOTES = 8  # on the terminal
 ALPHA = 0.01  # false-alarm rate
 LONGEST_STEP = 0.05  # s
@@ -135,7 +130,10 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
         )
 
 
-def write(folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, pages: Sequence[str] | None = None) -> None:
+def write(
+    folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, pages: Sequence[str] | None = None,
+    planned: Sequence[Act] = (),
+) -> None:  # fmt: skip
     """Write ``diagnosis.json``, the page, ``model.yaml`` and a scene of Meshcat that opens in any browser.
 
     Args:
@@ -143,6 +141,7 @@ def write(folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, pages:
         diagnosis: what was found.
         evidence: and how.
         pages: of a folder whose index somebody else writes; None: these alone, and it is written here.
+        planned: pushes that the scene plays after the recorded ones.
 
     Raises:
         OutputError: if one cannot be written.
@@ -153,35 +152,28 @@ def write(folder: RunFolder, diagnosis: Diagnosis, evidence: Evidence, *, pages:
         DIAGNOSIS, diagnosis_page(diagnosis, evidence.case.recording, pushes, evidence.wrenches, pages=pages or PAGES)
     )
     folder.write("model.yaml", model_of(evidence).dump())
-    stage = staged(evidence).StaticHtml()
-    folder.write(SCENE, scene_page(stage, diagnosis, evidence.wrenches, unit_force_of(evidence), pages or PAGES))
+    folder.write(SCENE, diagnosis_scene(diagnosis, evidence, pages=pages or PAGES, planned=planned))
     if pages is None:
         lines = [diagnosis.sentence, f"{diagnosis.verdict.capitalize()}: {MEANING[diagnosis.verdict]}"]
         folder.write(INDEX, index_page(f"Diagnosis of {diagnosis.recording}", lines, FILES))
     folder.write("diagnosis.json", diagnosis_json(diagnosis))  # last: where it is, all is
 
 
-def staged(evidence: Evidence, meshcat: Meshcat | None = None) -> Meshcat:
-    """The pushes in Meshcat: recorded, and as the model that leaves has them, with what the plain cell lacks."""
-    case, fit = evidence.case, evidence.leaving
-    h, z = fit.hypothesis, fit.point.z
-    stage = Stage(case.recording, meshcat)
-    scenes = []
-    for i in range(min(SHOWN, len(case.problems))):
-        problem, nuisance = case.problems[i], case.nuisances[i]
-        task = Task(
-            problem=problem, theta=h.theta(z), nuisance=nuisance,
-            values=np.zeros(len(nuisance.names)),  # nothing known of the pushes themselves
-            effects=h.effects(z),
-        )  # fmt: skip
-        scenes.append(ShownMotion(push=case.recording.pushes[i], motion=simulate(case.pool.spec, case.thetas, task)))
-    stage.play(scenes)
-    stage.show_missing(evidence.wrenches, unit_force_of(evidence))
-    return stage.meshcat
+def diagnosis_scene(
+    diagnosis: Diagnosis, evidence: Evidence, *, pages: Sequence[str] = (), planned: Sequence[Act] = ()
+) -> str:
+    """``scene.html``: the pushes as recorded, as the baseline has them and as the model that leaves does.
 
-
-def unit_force_of(evidence: Evidence) -> float:
-    """The force whose arrow has unit length [N]: a tenth of the friction, more where more is surely missing."""
-    around, sure = evidence.case.around, [w for w in evidence.wrenches if w.stands_out]
-    strongest = max((math.hypot(*w.wrench[:2]) for w in sure), default=0.0)
-    return max(0.1 * around.friction * around.weight, strongest / MOST_ARROW)
+    Args:
+        diagnosis: what was found.
+        evidence: and how.
+        pages: that lie beside it.
+        planned: pushes that are played after the recorded ones.
+    """
+    named = " and ".join(effect.name for effect in diagnosis.effects)
+    return scene_page(
+        setting_of(evidence.known, evidence), [*acts_of(evidence.known, evidence), *planned],
+        name=diagnosis.recording, lines=[f"{diagnosis.verdict.capitalize()}. {diagnosis.sentence}"],
+        corrected=f"with {named}" if named else "with a force without a name",
+        unit_force=unit_force_of(evidence), pages=pages,
+    )  # fmt: skip

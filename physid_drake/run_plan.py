@@ -22,10 +22,12 @@ from physid_drake.plan.story import outcome_under
 from physid_drake.plan.task import Choices, policy_for
 from physid_drake.plan.trajectory import tip_height_of
 from physid_drake.policies import Policy, push_csv
-from physid_drake.report.pages import INDEX, PLAN, index_page
+from physid_drake.report.acts import acts_of_plan, setting_of_plan
+from physid_drake.report.pages import INDEX, PLAN, SCENE, index_page
 from physid_drake.report.plan import plan_json, plan_rows, plan_table, push_files, title_of
 from physid_drake.report.plan_page import plan_page, plan_png
 from physid_drake.report.progress import progress_bar
+from physid_drake.report.scene_page import scene_page
 from physid_drake.report.terminal import terminal
 from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text
 from physid_drake.wording import shown
@@ -33,7 +35,7 @@ from physid_drake.wording import shown
 WIDER = {"push_speed": ("push", "two_pushes"), "push_direction": ("push", "two_pushes"), "push": ("two_pushes",)}
 """Policies that reach more than one does, in the order in which they are tried."""
 COMMAND = "plan"
-PAGES = (INDEX, PLAN)
+PAGES = (INDEX, SCENE, PLAN)
 FILES = ("plan.json", "push.csv", "push_1.csv", "push_2.csv", "plan.png", PLAN)
 FEWEST_TRIALS, TRIALS_PER_SETTING = 24, 16  # of a search
 MOST_PUSHES = 1_000_000  # of a recording
@@ -178,6 +180,9 @@ def write(
         PLAN, plan_page(made, seed=seed, with_effects=with_effects, hindsight=hindsight, pages=pages or PAGES)
     )
     if pages is None:
+        setting, acts = setting_of_plan(made), acts_of_plan(made)
+        corrected = "with " + " and ".join(e.name for e in made.model.effects)
+        folder.write(SCENE, scene_page(setting, acts, name=title_of(made), corrected=corrected, pages=PAGES))
         lines = [f"{what}: {value}." for what, value in plan_rows(made, with_effects=with_effects)[:6]]
         files = ("plan.json", *push_files(made), "plan.png", *PAGES)
         folder.write(INDEX, index_page(f"Plan: {title_of(made)}", lines, files))

@@ -1,4 +1,4 @@
-"""The hand as it looks: SDF text of each kind of tip, and its visuals on the link that the cell prescribes."""
+"""The hand as it looks: SDF text of each kind of tip, and the visuals that it holds."""
 
 from __future__ import annotations
 
@@ -8,11 +8,10 @@ from functools import cache
 from typing import get_args
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from pydrake.geometry import GeometryInstance, SceneGraph
+from pydrake.geometry import Rgba, SceneGraph, Shape
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import RigidBody
 
 from physid_drake.errors import CellError
 from physid_drake.recording.values import TipShape
@@ -110,47 +109,33 @@ def _templates() -> Environment:
     )
 
 
-def add_hand_visual(
-    plant: MultibodyPlant,
-    link: RigidBody,
+@dataclass(frozen=True, kw_only=True)
+class Looks:
+    """One visual of a hand: its name, shape, pose ``X_PG`` and colour."""
+
+    name: str
+    shape: Shape
+    X_PG: RigidTransform
+    rgba: Rgba
+
+
+def hand_looks(
     tip: TipShape,
     radius: float,
     length: float | None = None,
     preshape: Preshape | None = None,
     *,
     forearm: bool = True,
-    height: float = 0.0,
-) -> None:
-    """Show a hand on a link, its P at the link's frame, before ``plant.Finalize()``.
-
-    Only shapes to look at are added, no body, joint, mass or collision geometry: a welded hand would change
-    the mass of the link, which the cell reads its contact force from.
-
-    Args:
-        plant: not finalized, registered with a scene graph.
-        link: the body whose frame is P.
-        tip: kind of tip.
-        radius: of the tip [m].
-        length: as in ``hand_model_sdf`` [m].
-        preshape: of a ``reflex_sf``.
-        forearm: whether the wrist above the flange is shown.
-        height: of P above the link's frame [m], for a rod that is pushed with below its middle.
+) -> list[Looks]:
+    """What a hand looks like, found by a plant that is thrown away; arguments as in ``hand_model_sdf``.
 
     Raises:
         CellError: as ``hand_model_sdf``.
     """
-    text = hand_model_sdf(tip, radius, length, preshape, forearm=forearm)
-    X_LP = RigidTransform([0.0, 0.0, height])
-    for X_PG, looks in _looks(text):
-        looks.set_pose(X_LP @ X_PG)
-        plant.RegisterVisualGeometry(link, looks)
-
-
-def _looks(text: str) -> list[tuple[RigidTransform, GeometryInstance]]:
-    """Every visual of a hand with its pose in P, found by a plant that is thrown away."""
     scene_graph = SceneGraph()
     plant = MultibodyPlant(time_step=0.0)
     plant.RegisterAsSourceForSceneGraph(scene_graph)
+    text = hand_model_sdf(tip, radius, length, preshape, forearm=forearm)
     (hand,) = Parser(plant).AddModelsFromString(text, "sdf")
     plant.Finalize()
     context = plant.CreateDefaultContext()
@@ -161,8 +146,12 @@ def _looks(text: str) -> list[tuple[RigidTransform, GeometryInstance]]:
         body = plant.get_body(index)
         X_PL = X_PW @ body.EvalPoseInWorld(context)
         for gid in plant.GetVisualGeometriesForBody(body):
-            name = "hand_" + inspector.GetName(gid).rpartition("::")[2]
-            looks = GeometryInstance(RigidTransform(), inspector.GetShape(gid), name)
-            looks.set_illustration_properties(inspector.GetIllustrationProperties(gid))
-            found.append((X_PL @ inspector.GetPoseInFrame(gid), looks))
+            found.append(
+                Looks(
+                    name=inspector.GetName(gid).rpartition("::")[2],
+                    shape=inspector.GetShape(gid),
+                    X_PG=X_PL @ inspector.GetPoseInFrame(gid),
+                    rgba=inspector.GetIllustrationProperties(gid).GetProperty("phong", "diffuse"),
+                )
+            )
     return found

@@ -180,7 +180,7 @@ def identified(
         RecordingError: if no push can be rolled out.
     """
     say: Progress = tick or (lambda stage, done, total: None)
-    say("theta", 0, 0)
+    say("theta" if search is None else "search for theta", 0, 0)  # what is compiled, is compiled here
     finder = fitter_of(case, seed)
     best = None if search is None else search.run(finder)
     starts = [] if best is None or not np.isfinite(best.error_best) else [best.theta_best]

@@ -99,13 +99,12 @@ class CellSpec:
 
 def spec_of(recording: Recording, config: CellConfig) -> CellSpec:
     """The cell of a recording."""
-    (cx, cy), (sx, sy) = recording.table.centre, recording.table.size
     height = solid_of(recording.object.shape).height
     return CellSpec(
         shape=recording.object.shape,
         hand_radius=None if recording.hand is None else touching_radius(recording, height),
         config=config,
-        table=((cx - 0.5 * sx, cy - 0.5 * sy), (cx + 0.5 * sx, cy + 0.5 * sy)),
+        table=recording.table.corners,
     )
 
 

@@ -299,6 +299,12 @@ class Table:
         check_positive("size_m", "m", *self.size)
         check_table(self.size, self.centre)
 
+    @property
+    def corners(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Lower and upper corner [m]."""
+        (sx, sy), (cx, cy) = self.size, self.centre
+        return (cx - 0.5 * sx, cy - 0.5 * sy), (cx + 0.5 * sx, cy + 0.5 * sy)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Hand:

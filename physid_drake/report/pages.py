@@ -16,7 +16,7 @@ PLAN: Final = "plan.html"
 TITLES: Final = {INDEX: "Overview", DIAGNOSIS: "Diagnosis", SCENE: "In 3D", PLAN: "Plan"}
 TELLS: Final = {
     DIAGNOSIS: "what is missing, how sure that is, where it shows, and what it changes",
-    SCENE: "the pushes in three dimensions, recorded and simulated",
+    SCENE: "the pushes in three dimensions: recorded, simulated and planned",
     PLAN: "the push that brings the object to its goal, and what may come of it",
 }
 """What each page says, for the one that leads."""
@@ -36,12 +36,17 @@ body { margin: 0; color: #1c2330; background: #fff;
 main { max-width: 46em; margin: 0 auto; padding: 36px 28px 60px; overflow-wrap: anywhere; }
 h1 { font-size: 24px; line-height: 1.3; margin: 0 0 14px; } a { color: #2563c9; }
 li { margin: 8px 0; } ul { padding-left: 20px; } .note { color: #667085; font-size: 13px; }
+h2 { font-size: 17px; margin: 30px 0 6px; } svg { display: block; width: 100%; height: auto; margin: 8px 0; }
+.wide { overflow-x: auto; } table { border-collapse: collapse; font-size: 14px; font-variant-numeric: tabular-nums; }
+th { text-align: left; font-weight: 500; color: #667085; } th, td { padding: 4px 18px 4px 0; }
+tr + tr th, tr + tr td { border-top: 1px solid #dfe3ea; }
 </style></head><body><main>
 {{ nav }}
 <h1>{{ title }}</h1>
 {% for line in lines %}
 <p>{{ line }}</p>
 {% endfor %}
+{{ body }}
 <ul>
 {% for file, name, tells in pages %}
 <li><a href="{{ file }}">{{ name }}</a>: {{ tells }}.</li>
@@ -65,18 +70,19 @@ def nav(here: str, files: Collection[str]) -> Markup:
     return Markup(_environment().from_string(_NAV).render(pages=pages, here=here))  # escaped by Jinja
 
 
-def index_page(title: str, lines: Collection[str], files: Collection[str]) -> str:
+def index_page(title: str, lines: Collection[str], files: Collection[str], body: Markup | None = None) -> str:
     """The page that leads: what came of it, and what each other page tells.
 
     Args:
         title: of it.
         lines: sentences.
         files: of the folder.
+        body: between the sentences and the links.
     """
     pages = [(file, TITLES[file], tells) for file, tells in TELLS.items() if file in files]
     others = [file for file in files if file not in TITLES]
     return _environment().from_string(_PAGE).render(
-        title=title, lines=lines, pages=pages, files=others, nav=nav(INDEX, files)
+        title=title, lines=lines, pages=pages, files=others, nav=nav(INDEX, files), body=body or ""
     ) + "\n"  # fmt: skip
 
 

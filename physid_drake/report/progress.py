@@ -24,45 +24,52 @@ SOON: Final = 2.0
 LATE: Final = 0.1
 """Of a stage that lasts longer than it usually does, so much is left."""
 
-IDENTIFICATION_STAGES: Final[Mapping[str, float]] = {"theta": 1.0, "in the Drake cell": 0.8}
+IDENTIFICATION_STAGES: Final[Mapping[str, float]] = {"theta": 5.0, "in the Drake cell": 4.0}
 DIAGNOSIS_STAGES: Final[Mapping[str, float]] = {
-    **IDENTIFICATION_STAGES, "is anything missing?": 0.5, "effects, one at a time": 3.0, "pairs of effects": 5.0,
-    "physics without a name": 1.1, "what was found, in the Drake cell": 0.8, "the missing wrench": 0.05,
-    "the next push": 0.1,
+    **IDENTIFICATION_STAGES, "is anything missing?": 2.5, "effects, one at a time": 15.0, "pairs of effects": 25.0,
+    "physics without a name": 5.5, "what was found, in the Drake cell": 4.0, "the missing wrench": 0.3,
+    "the next push": 0.5,
 }  # fmt: skip
-"""How long a diagnosis' stages last beside its first, about; `benchmarks/diagnosis_time.py` prints those of one."""
+HINDSIGHT: Final = "planning with the baseline model"
+PLANNING_STAGES: Final[Mapping[str, float]] = {"search over the policy": 6.0, "sweep": 19.0, HINDSIGHT: 24.0}
+JOB_STAGES: Final[Mapping[str, float]] = {"search for theta": 4.0, **DIAGNOSIS_STAGES, **PLANNING_STAGES}
+"""How long the stages last beside one another; `benchmarks/diagnosis_time.py` prints those of a diagnosis."""
 
 
 class Forecast:
-    """How much of a job is left."""
+    """How much of a job is left, by how long those of its stages that are over have lasted."""
 
     def __init__(self, stages: Mapping[str, float]) -> None:
-        """``stages``: in their order, how long each lasts beside the first; those that are left out take no time."""
-        self._names, self._lasts = list(stages), list(stages.values())
+        """``stages``: in their order, how long each lasts beside the others; those that are left out take no time."""
+        self._lasts = dict(stages)
+        self._over: dict[str, float] = {}  # how long they have lasted [s]
         self._stage, self._began = "", time.monotonic()
-        self._unit: float | None = None
         self._done, self._total = 0, 0
 
     def tell(self, stage: str, done: int, total: int) -> None:
         """A stage has begun, or gone on."""
         if stage != self._stage:
-            if self._unit is None and self._names and self._stage == self._names[0]:
-                self._unit = time.monotonic() - self._began
-            self._stage, self._began = stage, time.monotonic()
+            now = time.monotonic()
+            if self._stage in self._lasts:
+                self._over[self._stage] = self._over.get(self._stage, 0.0) + now - self._began
+            self._stage, self._began = stage, now
         self._done, self._total = done, total
 
     def left(self) -> float | None:
         """Seconds until all stages are done, at most: some may be left out; None where nobody knows."""
         here = time.monotonic() - self._began
-        if self._stage not in self._names:
+        if self._stage not in self._lasts:
             # A stage that says how far it is knows its own end.
             told = 0 < self._done <= self._total and here >= SOON
             return here * (self._total - self._done) / self._done if told else None
-        if self._unit is None:
+        over = [name for name in self._over if name != self._stage]
+        if not over:
             return None
-        k = self._names.index(self._stage)
-        usual = self._unit * self._lasts[k]
-        return max(usual - here, LATE * usual) + self._unit * sum(self._lasts[k + 1 :])
+        unit = sum(self._over[name] for name in over) / sum(self._lasts[name] for name in over)
+        names = list(self._lasts)
+        usual = unit * self._lasts[self._stage]
+        after = names[names.index(self._stage) + 1 :]
+        return max(usual - here, LATE * usual) + unit * sum(self._lasts[name] for name in after)
 
     def words(self) -> str:
         """What is left, for a person."""
@@ -71,7 +78,7 @@ class Forecast:
             return ""
         rounded = _rounded(left)
         about = f"{rounded} s" if rounded < 120 else f"{round(rounded / 60)} min"
-        return f"at most {about} left" if self._stage in self._names else f"{about} left"
+        return f"at most {about} left" if self._stage in self._lasts else f"{about} left"
 
 
 def _rounded(seconds: float) -> int:

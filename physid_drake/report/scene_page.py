@@ -1,52 +1,96 @@
-"""``scene.html``: Meshcat's static page of a diagnosis, with what its colours mean."""
+"""``scene.html``: Meshcat's static page with its pushes, what its colours mean, and what can be switched."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from pathlib import Path
 
 from jinja2 import Environment, StrictUndefined
 
-from physid_drake.diagnose.localise import MissingWrench
-from physid_drake.diagnose.values import Diagnosis
 from physid_drake.report.pages import SCENE, nav
-from physid_drake.report.panel import with_panel
-from physid_drake.report.stage import ARROW, MISSING, NOTHING, RECORDED, SIMULATED
+from physid_drake.report.stage import (
+    ARROW,
+    BASELINE,
+    CAMERA,
+    COLOURS,
+    CORRECTED,
+    LOUDEST,
+    MISSING,
+    PLAIN_TABLE,
+    RECORDED,
+    Act,
+    Setting,
+    Stage,
+)
 
-_PANEL = """
-<div id="physid">{{ nav }}<details open><summary><b>{{ name }}</b></summary>
-  <p>{{ sentence }}</p>
-  {% for colour, what in legend %}<div><span class="dot" style="background: rgb({{ colour }})"></span>{{ what }}</div>
-  {% endfor %}
-  {% if unit_force %}<p>An arrow of {{ "%.0f" % (1e3 * arrow) }} mm is {{ "%.2g" % unit_force }} N.</p>{% endif %}
-</details></div>
-"""
+_TEMPLATE = Path(__file__).with_name("scene_page.html")
 
 
 def scene_page(
-    html: str, diagnosis: Diagnosis, wrenches: Sequence[MissingWrench], unit_force: float, pages: Collection[str] = ()
+    setting: Setting,
+    acts: Sequence[Act],
+    *,
+    name: str,
+    lines: Sequence[str] = (),
+    corrected: str = "corrected",
+    unit_force: float | None = None,
+    pages: Collection[str] = (),
 ) -> str:
-    """Meshcat's static page with a legend.
+    """The page, which opens without a network.
 
     Args:
-        html: what Meshcat wrote.
-        diagnosis: whose scene it is.
-        wrenches: those drawn.
-        unit_force: that is drawn as long as ``ARROW`` [N].
+        setting: what stands on the stage.
+        acts: what is played, at least one.
+        name: of the recording.
+        lines: sentences on what was found.
+        corrected: what the corrected model is called.
+        unit_force: that is drawn as long as ``ARROW`` [N]; None where no arrow is drawn.
         pages: that lie beside this one.
     """
-    legend = [
-        (_css(RECORDED), "object as recorded, and its paths"),
-        (_css(SIMULATED), "as simulated with model.yaml"),
-    ]
-    if any(w.stands_out for w in wrenches):
-        legend.append((_css(MISSING), "force that the plain cell lacks"))
-    if any(not w.stands_out for w in wrenches):
-        legend.append((_css(NOTHING), "force that is within two standard deviations of nothing"))
-    panel = Environment(undefined=StrictUndefined, autoescape=True).from_string(_PANEL).render(
-        name=diagnosis.recording, sentence=diagnosis.sentence, legend=legend, arrow=ARROW,
-        unit_force=unit_force if wrenches else None, nav=nav(SCENE, pages),
+    stage = Stage(setting)
+    marks = stage.play(acts, unit_force or 1.0)
+    environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    kinds = [kind for kind in (BASELINE, CORRECTED) if kind in setting.shapes]
+    words = {BASELINE: "baseline model", CORRECTED: corrected}
+    panel = environment.from_string(_TEMPLATE.read_text("utf-8")).render(
+        name=name, title=f"{name}: in 3D", lines=lines, marks=marks, starts=[start for _, start in marks],
+        both=len(kinds) == 2, camera=CAMERA, switches=_switches(setting, acts), notes=_notes(acts, unit_force),
+        models=[(kind, _css(COLOURS[kind]), words[kind]) for kind in kinds], nav=nav(SCENE, pages),
+        place=next(iter(acts[0].bodies.values())).poses[0, 4:6].tolist(),
     )  # fmt: skip
-    return with_panel(html, panel)
+    html: str = stage.meshcat.StaticHtml()
+    body_end = html.rindex("</body>")
+    return html[:body_end] + panel + html[body_end:]
+
+
+def _switches(setting: Setting, acts: Sequence[Act]) -> list[tuple[str, str, str, bool]]:
+    """What can be shown and hidden: key, colour, words, whether it is shown at first."""
+    (x0, y0), (x1, y1) = setting.table
+    shipped = abs(x1 - x0 - PLAIN_TABLE[0]) + abs(y1 - y0 - PLAIN_TABLE[1]) < 1e-6
+    found = []
+    if RECORDED in setting.shapes:
+        found.append((RECORDED, _css(COLOURS[RECORDED]), "object as recorded", True))
+    found.append(("paths", "", "paths", True))
+    if any(act.missing for act in acts):
+        found += [
+            ("missing", _css(MISSING), "force that the baseline model lacks", True),
+            ("mismatch", _css(MISSING), "where on the table it lacks something", True),
+        ]
+    if setting.hand is not None:
+        found.append(("hand", "", "hand", True))
+    return [*found, ("reach", "", "where the robots reach: Motoman blue, Baxter red", shipped)]
+
+
+def _notes(acts: Sequence[Act], unit_force: float | None) -> list[str]:
+    lines = []
+    if unit_force is not None and any(act.missing for act in acts):
+        lines.append(
+            f"An arrow of {1e3 * ARROW:.0f} mm is {unit_force:.2g} N; grey ones are within two standard deviations of"
+            f" nothing. The darkest spots on the table are {LOUDEST:.0f} standard deviations from nothing."
+        )
+    if any(act.goal is not None for act in acts):
+        lines.append("Green: the goal of the planned push, as large as the tolerance.")
+    return lines
 
 
 def _css(colour: Iterable[float]) -> str:

@@ -27,7 +27,6 @@ from physid_drake.recording import Box, Cylinder, Hand, ObjectModel, PoseStream,
 from physid_drake.report import effect_laws
 from physid_drake.report.diagnosis_page import ShownPush, diagnosis_page
 from physid_drake.report.numbers import digits_between, number
-from physid_drake.report.scene_page import scene_page
 
 NAMES = ("pushes/<b>1</b>.csv", "pushes/$2$ & co.csv")
 VOID = {"meta", "br", "link", "img", "hr", "input"}
@@ -323,15 +322,3 @@ def test_where_it_is_has_no_empty_lines():
     endless = Location(statement="at the end", phase=(), dof=(), frame="world", windows=())
     text = diagnosis_page(diagnosis_with(location=endless), recording_of(), shown_pushes(), WRENCHES)
     assert "<dt>frame</dt>" in text and "<dt>when</dt>" not in text and "<dt>in what</dt>" not in text
-
-
-def test_a_scene_says_what_its_colours_mean():
-    def scene(*wrenches):
-        return scene_page("<html><body>scene</body></html>", diagnosis_with(), wrenches, 0.12)
-
-    sure = next(w for w in WRENCHES if w.stands_out)
-    faint = dc.replace(sure, wrench=np.zeros(3))
-    for words, drawn in (("force that the plain cell lacks", sure), ("two standard deviations of nothing", faint)):
-        assert words in scene(drawn) and words not in scene()
-    assert "An arrow of 50 mm is 0.12 N." in scene(sure) and "arrow" not in scene()
-    assert "eraser &lt;u&gt;" in scene() and scene(sure, faint).endswith("</div></body></html>")

@@ -10,13 +10,9 @@ from pydrake.geometry import Box as DrakeBox
 from pydrake.geometry import Role, SceneGraph, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
-from pydrake.multibody.tree import SpatialInertia, UnitInertia
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.multibody.plant import MultibodyPlant
 
-import physid_drake.cell.diagram as cell_diagram
-from physid_drake.cell import Body, Cell, HandPath, Start
-from physid_drake.cell.hand_model import Preshape, add_hand_visual, hand_model_sdf
+from physid_drake.cell.hand_model import Preshape, hand_looks, hand_model_sdf
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import CellError
 from physid_drake.recording import Box, Cylinder, Prism
@@ -244,30 +240,15 @@ def test_spread_turns_fingers_one_and_two_apart_and_leaves_the_third():
     np.testing.assert_allclose(directions(0.5), [[c, -s, 0], [c, s, 0], [-1, 0, 0]], atol=1e-12)
 
 
-def seen_on_a_link(tip, length=None, preshape=None, **more):
-    builder = DiagramBuilder()
-    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
-    link = plant.AddRigidBody("hand_z", SpatialInertia(1.0, np.zeros(3), UnitInertia.SolidSphere(0.01)))
-    add_hand_visual(plant, link, tip, 0.01, length, preshape, **more)
-    plant.Finalize()
-    inspector = scene_graph.model_inspector()
-    gids = plant.GetVisualGeometriesForBody(link)
-    return plant, inspector, {inspector.GetName(gid).rpartition("::")[2]: gid for gid in gids}
-
-
 @pytest.mark.parametrize(("tip", "length", "preshape"), list(hands()))
-def test_a_hands_looks_add_nothing_but_looks(tip, length, preshape):
-    plant, inspector, looks = seen_on_a_link(tip, length, preshape)
-    assert plant.num_bodies() == 2
-    assert plant.num_collision_geometries() == 0
-    assert plant.CalcTotalMass(plant.CreateDefaultContext()) == 1.0
-    np.testing.assert_allclose(inspector.GetPoseInFrame(looks["hand_tip"]).translation(), np.zeros(3), atol=1e-12)
-    rgba = inspector.GetIllustrationProperties(looks["hand_tip"]).GetProperty("phong", "diffuse")
-    assert (rgba.r(), rgba.g(), rgba.b()) == pytest.approx((0.9, 0.5, 0.2))
+def test_a_hands_looks_have_their_tip_at_p(tip, length, preshape):
+    looks = {one.name: one for one in hand_looks(tip, 0.01, length, preshape)}
+    np.testing.assert_allclose(looks["tip"].X_PG.translation(), np.zeros(3), atol=1e-12)
+    assert (looks["tip"].rgba.r(), looks["tip"].rgba.g(), looks["tip"].rgba.b()) == pytest.approx((0.9, 0.5, 0.2))
 
 
 def test_the_looks_stand_as_in_the_parsed_model():
-    _, inspector, looks = seen_on_a_link("reflex_sf", preshape=PRESHAPES["bent"], height=0.02)
+    looks = {one.name: one for one in hand_looks("reflex_sf", 0.01, preshape=PRESHAPES["bent"])}
     other, other_inspector, model = parsed(text=hand_model_sdf("reflex_sf", 0.01, preshape=PRESHAPES["bent"]))
     context = other.CreateDefaultContext()
     count = 0
@@ -275,37 +256,11 @@ def test_the_looks_stand_as_in_the_parsed_model():
         body = other.get_body(index)
         for gid in other.GetVisualGeometriesForBody(body):
             X_WG = other.EvalBodyPoseInWorld(context, body) @ other_inspector.GetPoseInFrame(gid)
-            name = "hand_" + other_inspector.GetName(gid).rpartition("::")[2]
-            X_LG = RigidTransform([0.0, 0.0, 0.02]) @ X_WG
-            assert inspector.GetPoseInFrame(looks[name]).IsNearlyEqualTo(X_LG, 1e-12)
+            name = other_inspector.GetName(gid).rpartition("::")[2]
+            assert looks[name].X_PG.IsNearlyEqualTo(X_WG, 1e-12)
             count += 1
     assert count == len(looks) > 20
-    assert isinstance(inspector.GetShape(looks["hand_tip"]), Sphere)
-
-
-def test_a_hands_looks_do_not_change_a_bit_of_a_rollout(monkeypatch):
-    path = HandPath(
-        times=np.array([0.0, 0.05, 0.3, 0.35]), velocities=np.outer([0.0, 0.3, 0.3, 0.0], [1.0, 0.0]),
-        start=np.array([-0.05, 0.01]),
-    )  # fmt: skip
-    body = Body(mass=0.2, p_BBcm=np.zeros(2), inertia_ratio=1.0, hand_friction=0.3, support_friction=np.array([0.3]))
-    bare = cell_diagram._add_hand
-
-    def dressed(plant, radius, *rest):
-        found = bare(plant, radius, *rest)
-        add_hand_visual(plant, plant.GetBodyByName("hand_z"), "reflex_sf", radius)
-        return found
-
-    def push():
-        cell = Cell(Box(size=(0.051, 0.127, 0.030)), hand_radius=0.01)
-        return cell.rollout(body, start=Start(pose=(0.0, 0.0, 0.0)), path=path, begin=0.0, end=0.5)
-
-    plain = push()
-    monkeypatch.setattr(cell_diagram, "_add_hand", dressed)
-    seen = push()
-    np.testing.assert_array_equal(plain.poses, seen.poses)
-    np.testing.assert_array_equal(plain.forces, seen.forces)
-    assert plain.poses[-1, 4] > 0.03  # it was pushed
+    assert isinstance(looks["tip"].shape, Sphere)
 
 
 @pytest.mark.parametrize(
@@ -340,10 +295,9 @@ def test_a_pre_shape_beyond_the_joints_is_refused(angles, message):
 
 
 def test_a_yaw_turns_the_hand_about_its_tip():
-    _, inspector, looks = seen_on_a_link("reflex_sf")
-    _, turned_inspector, turned = seen_on_a_link("reflex_sf", preshape=Preshape(yaw=1.0))
-    X_LL = RigidTransform(RollPitchYaw(0.0, 0.0, 1.0), np.zeros(3))
-    for name, gid in looks.items():
-        expected = X_LL @ inspector.GetPoseInFrame(gid)
-        assert turned_inspector.GetPoseInFrame(turned[name]).IsNearlyEqualTo(expected, 1e-12)
-    assert inspector.GetPoseInFrame(looks["hand_palm"]).translation()[0] < -0.02  # the palm is behind a push along x
+    looks = {one.name: one.X_PG for one in hand_looks("reflex_sf", 0.01)}
+    turned = {one.name: one.X_PG for one in hand_looks("reflex_sf", 0.01, preshape=Preshape(yaw=1.0))}
+    X_PP = RigidTransform(RollPitchYaw(0.0, 0.0, 1.0), np.zeros(3))
+    for name, X_PG in looks.items():
+        assert turned[name].IsNearlyEqualTo(X_PP @ X_PG, 1e-12)
+    assert looks["palm"].translation()[0] < -0.02  # the palm is behind a push along x

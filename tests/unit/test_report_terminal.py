@@ -67,7 +67,7 @@ def test_a_log_says_once_a_minute_how_far_a_long_stage_is(capsys, monkeypatch):
 STAGES = {"first": 1.0, "second": 4.0, "third": 2.0}
 
 
-def test_what_is_left_of_all_stages_by_how_long_the_first_lasted(monkeypatch):
+def test_what_is_left_of_all_stages_by_how_long_those_before_have_lasted(monkeypatch):
     clock = Clock(monkeypatch)
     forecast = Forecast(STAGES)
     forecast.tell("first", 0, 0)
@@ -80,7 +80,7 @@ def test_what_is_left_of_all_stages_by_how_long_the_first_lasted(monkeypatch):
     clock.now += 30.0  # longer than usual
     assert forecast.left() == 24.0 and forecast.words() == "at most 25 s left"
     forecast.tell("third", 0, 0)
-    assert forecast.left() == 20.0
+    assert forecast.left() == 28.0  # 70 s for 5 of 7 parts
 
 
 def test_a_stage_may_be_left_out_or_unknown(monkeypatch):

@@ -39,6 +39,7 @@ def test_a_run_leaves_its_configuration_its_result_and_its_page(done):
         "config.yaml",
         "result.json",
         "index.html",
+        "scene.html",
         "model.yaml",
     }
     assert {oct(path.stat().st_mode & 0o777) for path in done.iterdir()} == {"0o644"}
@@ -96,7 +97,7 @@ def page(done):
 
 
 def test_the_page_loads_nothing_from_elsewhere(page):
-    assert [value[:80] for value in page.loads if not value.startswith(("data:", "#"))] == []
+    assert {value[:80] for value in page.loads if not value.startswith(("data:", "#"))} == {"scene.html"}
 
 
 def test_the_page_shows_the_numbers_of_the_result(page, done):
@@ -111,11 +112,13 @@ def test_the_page_shows_the_numbers_of_the_result(page, done):
     assert "Seed 3" in text
 
 
-def test_the_page_lets_a_person_choose_every_push(page, done):
-    result = result_of(done)
-    assert page.tags.count("option") == 3
-    for name in result["training"]["pushes"]:
-        assert name in "".join(page.text)
+def test_the_scene_lets_a_person_choose_every_push_and_loads_nothing(done):
+    scene = Page()
+    scene.feed((done / "scene.html").read_text())
+    assert scene.tags.count("option") == 3
+    for name in result_of(done)["training"]["pushes"]:
+        assert name in "".join(scene.text)
+    assert {value[:80] for value in scene.loads if not value.startswith(("data:", "#"))} == {"index.html"}
 
 
 @pytest.mark.slow

@@ -57,6 +57,7 @@ def test_the_command_writes_the_plan_and_the_same_seed_the_same_bytes(folder, tm
         "plan.png",
         "plan.html",
         "index.html",
+        "scene.html",
         "settings.json",
         "manifest.json",
     }

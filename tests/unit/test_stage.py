@@ -1,5 +1,6 @@
-"""What is put on Meshcat's stage."""
+"""What is put on Meshcat's stage, and the page that it plays on."""
 
+import re
 import socket
 import subprocess
 import sys
@@ -8,17 +9,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from physid_drake.cell.solid import solid_of
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.errors import ConfigError
-from physid_drake.recording import read_recording
-from physid_drake.report.stage import Stage, _listening, served
+from physid_drake.plan.reach import reaches
+from physid_drake.recording import Box, Hand, read_recording
+from physid_drake.report.acts import first_act, setting_of_recording, unit_force_of
+from physid_drake.report.live import STOP, Live
+from physid_drake.report.meshcat_server import served
+from physid_drake.report.scene_page import scene_page
+from physid_drake.report.stage import BASELINE, CORRECTED, RECORDED, Act, Setting, Stage, Track, _tiles
 from physid_drake.resources import shipped
-from physid_drake.run_diagnose import unit_force_of
 
-
-@pytest.fixture(scope="module")
-def stage():
-    return Stage(read_recording(shipped("recordings") / "eraser_reference"))
+TABLE = ((-0.6, -0.4), (0.6, 0.4))
+BOX = Box(size=(0.06, 0.12, 0.03))
 
 
 def missing(along, across, std):
@@ -28,12 +32,65 @@ def missing(along, across, std):
     )  # fmt: skip
 
 
-def test_every_missing_wrench_is_an_arrow(stage):
-    stage.show_missing([missing(0.2, 0.0, 0.01), missing(0.0, -0.1, 0.5)], unit_force=0.1)
-    paths = [f"missing/{k}/{part}" for k in (0, 1) for part in ("shaft", "head")]
-    assert all(stage.meshcat.HasPath(path) for path in paths)
-    stage.show_missing([missing(0.2, 0.0, 0.01)], unit_force=0.1)
-    assert stage.meshcat.HasPath(paths[0]) and not stage.meshcat.HasPath(paths[2])
+def track(*places):
+    poses = [[1.0, 0.0, 0.0, 0.0, x, 0.0, 0.015] for x in places]
+    return Track(times=np.linspace(0.0, 1.0, len(places)), poses=np.array(poses))
+
+
+def act(name="pushes/001.csv", wrenches=(), **bodies):
+    return Act(name=name, begin=0.0, end=1.0, bodies=bodies, hand=track(-0.1, 0.1), missing=wrenches)
+
+
+def setting(*kinds, **more):
+    return Setting(
+        table=TABLE, shapes=dict.fromkeys(kinds, BOX), hand=Hand(tip="sphere", radius=0.01), **more
+    )  # fmt: skip
+
+
+SETTING = setting(RECORDED, BASELINE, CORRECTED)
+BODIES = {RECORDED: track(0.0, 0.2), BASELINE: track(0.0, 0.1), CORRECTED: track(0.0, 0.19)}
+
+
+@pytest.fixture(scope="module")
+def played():
+    stage = Stage(SETTING)
+    wrenches = (missing(0.2, 0.0, 0.01), missing(0.0, -0.1, 0.5))
+    acts = [act("one", wrenches, **BODIES), act("planned", **{CORRECTED: track(0.0, 0.3)})]
+    return stage, stage.play(acts, unit_force=0.1), stage.meshcat.StaticHtml()
+
+
+def test_every_act_begins_where_the_last_one_has_paused(played):
+    _, marks, _ = played
+    assert [name for name, _ in marks] == ["one", "planned"] and [time for _, time in marks] == [0.0, 1.4]
+
+
+def test_every_missing_wrench_is_an_arrow_of_its_push_and_a_spot_on_the_table(played):
+    stage, _, _ = played
+    paths = [f"acts/0/missing/{k}/{part}" for k in (0, 1) for part in ("shaft", "head")]
+    assert all(stage.meshcat.HasPath(path) for path in [*paths, "mismatch/0", "mismatch/1"])
+    assert not stage.meshcat.HasPath("acts/1/missing") and not stage.meshcat.HasPath("mismatch/2")
+
+
+def test_whoever_is_in_an_act_has_a_path_and_stands_where_it_began(played):
+    stage, _, _ = played
+    assert all(stage.meshcat.HasPath(f"acts/0/paths/{kind}") for kind in BODIES)
+    assert stage.meshcat.HasPath(f"acts/1/paths/{CORRECTED}") and not stage.meshcat.HasPath("acts/1/paths/baseline")
+    assert all(stage.meshcat.HasPath(f"bodies/{kind}/here/shape/0") for kind in BODIES)
+
+
+def test_a_track_is_at_its_last_sample():
+    moving = track(0.0, 0.1, 0.2)
+    assert [moving.at(t).translation()[0] for t in (-1.0, 0.0, 0.49, 0.5, 9.0)] == [0.0, 0.0, 0.0, 0.1, 0.2]
+
+
+def test_friction_of_cells_is_painted_underneath_from_dark_to_bright():
+    tiles = _tiles(solid_of(BOX).underside, np.array([[0.1, 0.2], [0.3, 0.4]]))
+    places = [tuple(np.round(centre, 6)) for _, centre, _ in tiles]
+    assert places == [(-0.015, -0.03), (-0.015, 0.03), (0.015, -0.03), (0.015, 0.03)]
+    brightness = [shade.r() + shade.g() + shade.b() for _, _, shade in tiles]
+    assert brightness == sorted(brightness) and brightness[0] < brightness[-1]
+    painted = Stage(setting(BASELINE, undersides={BASELINE: np.array([[0.1, 0.2], [0.3, 0.4]])}))
+    assert painted.meshcat.HasPath("bodies/baseline/here/underside/3")
 
 
 @pytest.mark.parametrize(("forces", "unit"), [((0.2,), 0.1), ((0.2, 6.0), 2.0), ((), 0.1)])
@@ -49,11 +106,103 @@ def test_a_wrench_stands_out_beyond_two_standard_deviations():
     assert not missing(0.19, 0.19, 0.1).stands_out
 
 
-def test_nobody_can_connect_to_a_stage_without_a_view(stage):
-    assert _listening() == set()
-    with pytest.raises(ConnectionRefusedError):
+# The page.
+
+
+def page(**more):
+    acts = [act("one <b>", (missing(0.2, 0.0, 0.01),), **BODIES), act("two", **BODIES)]
+    return scene_page(SETTING, acts, name="eraser <u>", unit_force=0.12, corrected="with a grain", **more)
+
+
+def test_a_scene_says_what_its_colours_mean_and_switches_each():
+    text = page(lines=["What is missing: <i>."], pages=("index.html", "scene.html"))
+    assert "eraser &lt;u&gt;" in text and "one &lt;b&gt;" in text and "&lt;i&gt;" in text and "<u>" not in text
+    assert "An arrow of 50 mm is 0.12 N" in text and '<a href="index.html"' in text
+    for switch in ("recorded", "paths", "missing", "mismatch", "hand", "reach"):
+        assert f'<input type="checkbox" value="{switch}"' in text
+    assert re.findall(r'name="model" value="(\w+)"', text) == ["both", "baseline", "corrected"]
+    assert text.endswith("</script>\n</body>\n\n</html>\n") or text.rstrip().endswith("</html>")
+
+
+def test_a_scene_of_one_model_without_a_mismatch_offers_no_choice():
+    lone = setting(RECORDED, BASELINE)
+    text = scene_page(lone, [act(**{RECORDED: track(0.0), BASELINE: track(0.0)})], name="eraser")
+    assert 'name="model"' not in text and "arrow" not in text and 'value="missing"' not in text
+    assert "baseline model" in text
+
+
+# Where the robots reach.
+
+
+def test_the_reach_on_the_shipped_table_is_that_of_its_model():
+    discs = reaches(TABLE)
+    assert discs["motoman"].base == pytest.approx((-0.9, 0.0)) and discs["motoman"].radius == 0.72
+    assert discs["baxter"].base == pytest.approx((1.15, 0.0)) and discs["baxter"].radius == 1.041
+
+
+def test_the_robots_stand_behind_the_edges_of_any_table():
+    discs = reaches(((1.0, 2.0), (2.0, 4.0)))
+    assert discs["motoman"].base == pytest.approx((0.7, 3.0)) and discs["baxter"].base == pytest.approx((2.55, 3.0))
+    place = np.array([[1.0, 3.0], [0.7, 3.82]])
+    assert discs["motoman"].beyond(place) == pytest.approx([0.0, 0.1])
+
+
+def test_chords_are_on_the_table_and_within_the_reach():
+    disc = reaches(TABLE)["motoman"]
+    rows = disc.chords(TABLE)
+    assert len(rows) > 10
+    for x, low, high in rows:
+        assert -0.6 <= x <= 0.6 and -0.4 <= low < high <= 0.4
+        assert disc.beyond(np.array([[x, low], [x, high]])) == pytest.approx([0.0, 0.0], abs=1e-9)
+    assert not len(reaches(TABLE)["motoman"].chords(((5.0, 5.0), (6.0, 6.0))))
+
+
+def test_nobody_can_connect_to_a_stage_without_a_view(played):
+    stage, _, html = played
+    with pytest.raises(ConnectionRefusedError):  # before a test takes this port for a view
         socket.create_connection(("127.0.0.1", stage.meshcat.port()), timeout=5.0)
-    assert len(stage.meshcat.StaticHtml()) > 100_000
+    assert len(html) > 100_000
+
+
+# The live view.
+
+
+@pytest.fixture
+def eraser():
+    return read_recording(shipped("recordings") / "eraser_reference")
+
+
+def buttons(live):
+    return [name for name in live._meshcat.GetButtonNames() if not name.startswith("Meshcat")]
+
+
+def test_a_live_view_says_what_goes_on_and_then_plays(eraser):
+    live = Live(eraser, "127.0.0.1")
+    assert buttons(live) == [STOP, "now: starting"]
+    told = []
+    tell = live.watching(lambda *how_far: told.append(how_far))
+    tell("theta", 0, 0)
+    tell("theta", 1, 2)
+    assert told == [("theta", 0, 0), ("theta", 1, 2)] and buttons(live) == [STOP, "now: theta"]
+    for _ in range(2):
+        live.found("consistent: nothing is missing")
+    assert buttons(live) == [STOP, "consistent: nothing is missing"]
+    live.play(setting_of_recording(eraser), [first_act(eraser)], 1.0)
+    assert buttons(live) == ["consistent: nothing is missing"]
+    assert live._meshcat.HasPath(f"acts/0/paths/{RECORDED}")
+
+
+def test_the_stop_button_ends_a_job_as_ctrl_c_does(eraser):
+    live = Live(eraser, "127.0.0.1")
+    tell = live.watching(lambda *_: None)
+    tell("theta", 0, 0)
+    # As a browser says that it was pressed: a map of two texts, packed by MessagePack.
+    pressed = b"\x82" + b"".join(
+        bytes([0xA0 + len(word)]) + word for word in (b"type", b"button", b"name", STOP.encode())
+    )
+    live._meshcat._InjectWebsocketMessage(message=pressed)
+    with pytest.raises(KeyboardInterrupt):
+        tell("theta", 0, 0)
 
 
 def test_a_view_listens_on_this_machine_alone():
@@ -70,10 +219,12 @@ def test_a_stage_that_another_thread_collects_does_not_end_the_process():
     code = """
 import gc, threading
 from physid_drake.recording import read_recording
-from physid_drake.errors import ConfigError
-from physid_drake.report.stage import Stage, _listening, served
+from physid_drake.report.acts import setting_of_recording
+from physid_drake.report.meshcat_server import _listening
+from physid_drake.report.stage import Stage
 from physid_drake.resources import shipped
-Stage(read_recording(shipped("recordings") / "eraser_reference"))
+Stage(setting_of_recording(read_recording(shipped("recordings") / "eraser_reference")))
+assert _listening() == set()
 thread = threading.Thread(target=gc.collect)
 thread.start()
 thread.join()

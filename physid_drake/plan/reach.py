@@ -1,0 +1,75 @@
+"""Where the robots reach on a table: discs about their bases, as they stand behind the shipped table's edges."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+from functools import cache
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from physid_drake.plan.costs import Corners
+from physid_drake.resources import shipped
+
+Array = NDArray[np.float64]
+
+NAMES = {"motoman_sda10f": "motoman", "baxter": "baxter"}
+CHORDS = 80  # of a drawing
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Reach:
+    """A disc on the table.
+
+    Attributes:
+        base: x, y of its centre [m].
+        radius: m. Seen from above and at the table's height, so that it is an upper bound.
+    """
+
+    base: tuple[float, float]
+    radius: float
+
+    def beyond(self, places: Array) -> Array:
+        """How far places (n, 2) lie outside [m]; 0 within."""
+        away = np.atleast_2d(places) - np.array(self.base)
+        distance: Array = np.hypot(away[:, 0], away[:, 1])
+        return np.asarray(np.maximum(0.0, distance - self.radius), dtype=np.float64)
+
+    def chords(self, table: Corners) -> Array:
+        """Rows (n, 3) of x and of y from and to [m], of what of it lies on a table; none where it is beyond."""
+        (x0, y0), (x1, y1) = table
+        x = np.linspace(max(x0, self.base[0] - self.radius), min(x1, self.base[0] + self.radius), CHORDS)
+        half = np.sqrt(np.maximum(0.0, self.radius**2 - (x - self.base[0]) ** 2))
+        low, high = np.maximum(y0, self.base[1] - half), np.minimum(y1, self.base[1] + half)
+        there = (low < high) & (x[0] < x[-1])
+        return np.column_stack([x, low, high])[there]
+
+
+def reaches(table: Corners) -> dict[str, Reach]:
+    """The robots' reach, by ``motoman`` and ``baxter``.
+
+    Each stands as far behind the middle of its edge of the table (-x, +x) as in the shipped cell.
+
+    Args:
+        table: lower and upper corner of its top [m].
+    """
+    (x0, y0), (x1, y1) = table
+    shift = {"motoman": x0, "baxter": x1}
+    return {
+        name: Reach(base=(shift[name] + behind, 0.5 * (y0 + y1)), radius=radius)
+        for name, (behind, radius) in _shipped().items()
+    }
+
+
+@cache
+def _shipped() -> dict[str, tuple[float, float]]:
+    """Of each robot: x of its base beyond its edge of the table, and its reach [m]."""
+    content = yaml.safe_load((shipped("models") / "robots" / "reach.yaml").read_text("utf-8"))
+    half = 0.5 * content["table"]["size_m"][0]
+    found = {}
+    for key, name in NAMES.items():
+        robot = content["robots"][key]
+        x = robot["base_m"][0]
+        found[name] = (x + half if x < 0.0 else x - half, robot["reach_m"])
+    return found
