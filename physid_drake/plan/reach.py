@@ -43,7 +43,8 @@ class Reach:
         half = np.sqrt(np.maximum(0.0, self.radius**2 - (x - self.base[0]) ** 2))
         low, high = np.maximum(y0, self.base[1] - half), np.minimum(y1, self.base[1] + half)
         there = (low < high) & (x[0] < x[-1])
-        return np.column_stack([x, low, high])[there]
+        rows: Array = np.column_stack([x, low, high])[there]
+        return rows
 
 
 def reaches(table: Corners) -> dict[str, Reach]:

@@ -5,17 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform, RotationMatrix
+
 from physid_drake.progress import Progress
 from physid_drake.recording import Recording
 from physid_drake.report.acts import first_act, setting_of_recording
 from physid_drake.report.meshcat_server import served
-from physid_drake.report.stage import Act, Setting, Stage
+from physid_drake.report.sign import sign
+from physid_drake.report.stage import CAMERA, Act, Setting, Stage
 
 STOP: Final = "STOP the job"
+HINT: Final = "To stop the job: Open Controls, at the upper right."
+BESIDE, ABOVE = 0.22, 0.10  # m: where the sign stands, seen from the object
 
 
 class Live:
-    """Meshcat's controls, which are buttons, say what goes on: Drake's Meshcat has no text of its own."""
+    """A sign beside the object says what goes on, and a button among Meshcat's controls stops the job."""
 
     def __init__(self, recording: Recording, host: str) -> None:
         """Show a recording's first push, before anything is known.
@@ -28,12 +35,16 @@ class Live:
             ConfigError: if there is no such address here.
         """
         self._meshcat = served(host)
-        self._labels: list[str] = []
-        self._now = ""
-        stage = Stage(setting_of_recording(recording), self._meshcat)
-        stage.show_start(first_act(recording))
+        self._title = recording.name
+        self.lines: list[str] = []
+        """What was found."""
+        self.now = ""
+        """What goes on."""
+        act = first_act(recording)
+        Stage(setting_of_recording(recording), self._meshcat).show_start(act)
+        self._meshcat.SetTransform("sign", _facing(next(iter(act.bodies.values())).poses[0, 4:6]))
         self._meshcat.AddButton(STOP)
-        self._label("starting")
+        self._say("starting")
 
     @property
     def url(self) -> str:
@@ -47,33 +58,34 @@ class Live:
             if self._meshcat.GetButtonClicks(STOP):
                 raise KeyboardInterrupt
             progress(stage, done, total)
-            self._label(stage)
+            self._say(stage)
 
         return tell
 
     def found(self, line: str) -> None:
         """Add a line that stays."""
-        self._label("")
-        self._add(line)
+        self.lines.append(line)
+        self._write()
 
     def play(self, setting: Setting, acts: Sequence[Act], unit_force: float) -> None:
         """Play what came of it; there is nothing to stop any more."""
-        self._label("")
         self._meshcat.DeleteButton(STOP)
+        self._say("")
         Stage(setting, self._meshcat).play(acts, unit_force)
 
-    def _label(self, stage: str) -> None:
-        """The line of what goes on: "now: ..."."""
-        line = f"now: {stage}" if stage else ""
-        if line == self._now:
-            return
-        if self._now:
-            self._meshcat.DeleteButton(self._now)
-        self._now = line
-        if line:
-            self._meshcat.AddButton(line)
+    def _say(self, stage: str) -> None:
+        if stage != self.now:
+            self.now = stage
+            self._write()
 
-    def _add(self, line: str) -> None:
-        if line not in self._labels:  # buttons of one name are one
-            self._labels.append(line)
-            self._meshcat.AddButton(line)
+    def _write(self) -> None:
+        doing = [f"now: {self.now}", HINT] if self.now else []
+        self._meshcat.SetObject("sign", sign([self._title, *self.lines, *doing]))
+
+
+def _facing(place: NDArray[np.float64]) -> RigidTransform:
+    """The sign's pose to the right of a place (2,), turned to who looks at that from where the camera is."""
+    x, y, z = CAMERA
+    yaw = RotationMatrix.MakeZRotation(np.arctan2(-y, -x) - 0.5 * np.pi)
+    back = RotationMatrix.MakeXRotation(-np.arctan2(z, np.hypot(x, y)))
+    return RigidTransform(yaw @ back, np.array([*place, ABOVE]) + yaw.multiply(np.array([BESIDE, 0.0, 0.0])))

@@ -1,11 +1,15 @@
 """What is put on Meshcat's stage, and the page that it plays on."""
 
+import base64
+import io
+import json
 import re
 import socket
 import subprocess
 import sys
 from types import SimpleNamespace
 
+import matplotlib.image as mpimg
 import numpy as np
 import pytest
 
@@ -18,6 +22,7 @@ from physid_drake.report.acts import first_act, setting_of_recording, unit_force
 from physid_drake.report.live import STOP, Live
 from physid_drake.report.meshcat_server import served
 from physid_drake.report.scene_page import scene_page
+from physid_drake.report.sign import sign
 from physid_drake.report.stage import BASELINE, CORRECTED, RECORDED, Act, Setting, Stage, Track, _tiles
 from physid_drake.resources import shipped
 
@@ -172,24 +177,29 @@ def eraser():
     return read_recording(shipped("recordings") / "eraser_reference")
 
 
-def buttons(live):
-    return [name for name in live._meshcat.GetButtonNames() if not name.startswith("Meshcat")]
-
-
 def test_a_live_view_says_what_goes_on_and_then_plays(eraser):
     live = Live(eraser, "127.0.0.1")
-    assert buttons(live) == [STOP, "now: starting"]
+    assert STOP in live._meshcat.GetButtonNames() and live._meshcat.HasPath("sign")
     told = []
     tell = live.watching(lambda *how_far: told.append(how_far))
     tell("theta", 0, 0)
     tell("theta", 1, 2)
-    assert told == [("theta", 0, 0), ("theta", 1, 2)] and buttons(live) == [STOP, "now: theta"]
-    for _ in range(2):
-        live.found("consistent: nothing is missing")
-    assert buttons(live) == [STOP, "consistent: nothing is missing"]
+    assert told == [("theta", 0, 0), ("theta", 1, 2)] and live.now == "theta" and live.lines == []
+    live.found("consistent: nothing is missing")
     live.play(setting_of_recording(eraser), [first_act(eraser)], 1.0)
-    assert buttons(live) == ["consistent: nothing is missing"]
-    assert live._meshcat.HasPath(f"acts/0/paths/{RECORDED}")
+    assert live.now == "" and live.lines == ["consistent: nothing is missing"]
+    assert STOP not in live._meshcat.GetButtonNames()
+    assert live._meshcat.HasPath(f"acts/0/paths/{RECORDED}") and live._meshcat.HasPath("sign")
+
+
+def ink_of(lines):
+    content = json.loads(sign(lines).source().in_memory().mesh_file.contents())
+    picture = base64.b64decode(content["images"][0]["uri"].partition(",")[2])
+    return int((mpimg.imread(io.BytesIO(picture), format="png")[..., 0] < 0.5).sum())
+
+
+def test_a_sign_has_its_text_as_ink_and_takes_any():
+    assert ink_of([]) == 0 < ink_of(["a"]) < ink_of(["a", "$x^2 and <b> and " + 200 * "long "])
 
 
 def test_the_stop_button_ends_a_job_as_ctrl_c_does(eraser):
