@@ -17,6 +17,7 @@ from scipy import stats
 
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.diagnose.values import Location, Window
+from physid_drake.diagnose.whereabouts import whereabouts
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.push import LinearPush
 from physid_drake.pushes.case import Case
@@ -297,13 +298,20 @@ def _location(case: Case, wrenches: Sequence[MissingWrench], seen: Sequence[_See
         frame, detail = "none", "in too few pushes to say where" if few else "in no one direction that stands out"
     in_question = [k for k, w in enumerate(wrenches) if w.phase in phase]
     much = np.sqrt((values[in_question] ** 2) @ [name in dof for name in DOFS])
-    windows = tuple(
-        Window(push=case.problems[wrenches[k].push].name, start=wrenches[k].start, end=wrenches[k].end)
-        for k in (in_question[i] for i in np.argsort(-much)[:WINDOWS])
-    )
+    windows = tuple(_window(case, wrenches[k]) for k in (in_question[i] for i in np.argsort(-much)[:WINDOWS]))
     where = " and ".join(SAID[p] for p in phase)
     statement = f"{where}{_amount([w for w in wrenches if w.phase in phase], dof)}, {detail}"
+    if windows:
+        statement += f"; {whereabouts(windows)}"
     return Location(statement=statement, phase=phase, dof=dof, frame=frame, windows=windows)
+
+
+def _window(case: Case, wrench: MissingWrench) -> Window:
+    x, y = wrench.place.tolist()
+    return Window(
+        push=case.problems[wrench.push].name, start=wrench.start, end=wrench.end, place=(x, y),
+        heading=wrench.heading, speed=wrench.speed, phase=wrench.phase,
+    )  # fmt: skip
 
 
 def _phases(best: _Seen, seen: Sequence[_Seen]) -> tuple[str, ...]:

@@ -54,11 +54,24 @@ class Partly:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Window:
-    """A part of a push: file, start and end [s]."""
+    """A part of a push.
+
+    Attributes:
+        push: file.
+        start, end: [s].
+        place: of the object, x, y [m].
+        heading: of its motion in W [rad].
+        speed: of the object [m/s].
+        phase: ``contact`` or ``free_slide``.
+    """
 
     push: str
     start: float
     end: float
+    place: tuple[float, float]
+    heading: float
+    speed: float
+    phase: str
 
 
 @dc.dataclass(frozen=True, kw_only=True)

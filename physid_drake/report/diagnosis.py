@@ -104,7 +104,19 @@ def _location(location: Location) -> dict[str, Any]:
         "phase": list(location.phase),
         "dof": list(location.dof),
         "frame": location.frame,
-        "windows": [{"push": w.push, "start_s": w.start, "end_s": w.end} for w in location.windows],
+        "windows": [
+            {
+                "push": w.push,
+                "start_s": w.start,
+                "end_s": w.end,
+                "x_m": w.place[0],
+                "y_m": w.place[1],
+                "heading_rad": w.heading,
+                "speed_mps": w.speed,
+                "phase": w.phase,
+            }
+            for w in location.windows
+        ],
     }
 
 

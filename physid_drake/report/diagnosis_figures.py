@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 
 from physid_drake.diagnose.localise import MissingWrench
-from physid_drake.diagnose.values import Diagnosis, NextPush
+from physid_drake.diagnose.values import Diagnosis, NextPush, Window
 from physid_drake.recording import Recording
 from physid_drake.report.numbers import number
 from physid_drake.report.svg import AFTER, BEFORE, CONTACT, FREE, INK, MUTED, PAPER, svg_of
@@ -148,8 +148,13 @@ def _draw_strip(axes: Axes, windows: Sequence[MissingWrench], row: int, scale: f
     axes.yaxis.set_label_coords(-0.215, 0.5)
 
 
-def arrow_figure(view: TableView) -> Markup | None:
-    """The missing force as arrows on the table; faint where it is within two standard deviations."""
+def arrow_figure(view: TableView, most: Sequence[Window] = ()) -> Markup | None:
+    """The missing force as arrows on the table; faint where it is within two standard deviations.
+
+    Args:
+        view: the table.
+        most: windows that are numbered, from 1.
+    """
     places = [w for w in view.wrenches if np.isfinite(w.wrench).all()]
     forces = np.array([_turned(w.wrench[:2], w.heading) for w in places])
     largest = float(np.hypot(*forces.T).max()) if places else 0.0
@@ -168,6 +173,12 @@ def arrow_figure(view: TableView) -> Markup | None:
                     at[:, 0], at[:, 1], forces[chosen, 0], forces[chosen, 1], angles="xy", scale_units="xy",
                     scale=scale, width=0.0055, color=colour, alpha=0.95 if sure else 0.28, zorder=3,
                 )  # fmt: skip
+    for number_, window in enumerate(most, start=1):
+        axes.annotate(
+            f"{number_}", (MM * window.place[0], MM * window.place[1]), (0, 9), textcoords="offset points",
+            ha="center", va="center", fontsize=8.5, fontweight="bold", color=INK, zorder=6,
+            bbox={"boxstyle": "circle,pad=0.18", "facecolor": "white", "edgecolor": INK, "linewidth": 0.8},
+        )  # fmt: skip
     _draw_key(axes, _round_number(0.4 * largest), scale)
     return svg_of(figure, "arrows", "Missing force on the table from above")
 

@@ -27,6 +27,7 @@ from physid_drake.diagnose.values import (
 from physid_drake.effects import effect_named
 from physid_drake.pushes.tracker_noise import UNKNOWN
 from physid_drake.recording import Recording
+from physid_drake.report.answers import answers
 from physid_drake.report.diagnosis import held_out_figures
 from physid_drake.report.diagnosis_figures import (
     arrow_figure,
@@ -120,6 +121,7 @@ def diagnosis_page(
         scene = SCENE if SCENE in pages else None
         content = {"scene": scene, "nav": nav(DIAGNOSIS, pages), **_content(diagnosis, recording, view)}
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["in_degrees"] = lambda angle: math.degrees(angle) % 360.0
     environment.filters["degrees"] = lambda angle: fixed(math.degrees(angle))
     environment.filters.update(number=number, fixed=fixed, quantity=quantity, chance=chance, tiny=tiny)
     return environment.from_string(_TEMPLATE.read_text("utf-8")).render(content) + "\n"
@@ -147,7 +149,9 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "views": views_from_above(view),
         "errors": [error_figure(view, k, diagnosis.noise) for k in order[:MOST_ERRORS]],
         "lets_go": any(view.shown[k].released is not None for k in order[:MOST_ERRORS]),
-        "arrows": arrow_figure(view),
+        "arrows": arrow_figure(view, () if diagnosis.location is None else diagnosis.location.windows),
+        "said": SAID,
+        "answers": answers(diagnosis),
         "strips": strips[:MOST_STRIPS],
         "more_strips": strips[MOST_STRIPS:],
         "left_out": len({w.push for w in view.wrenches}) - len(strips),

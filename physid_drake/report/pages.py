@@ -40,6 +40,7 @@ h2 { font-size: 17px; margin: 30px 0 6px; } svg { display: block; width: 100%; h
 .wide { overflow-x: auto; } table { border-collapse: collapse; font-size: 14px; font-variant-numeric: tabular-nums; }
 th { text-align: left; font-weight: 500; color: #667085; } th, td { padding: 4px 18px 4px 0; }
 tr + tr th, tr + tr td { border-top: 1px solid #dfe3ea; }
+@media print { * { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
 </style></head><body><main>
 {{ nav }}
 <h1>{{ title }}</h1>

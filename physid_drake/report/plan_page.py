@@ -131,7 +131,7 @@ def _draw_table(axes: Axes, plan: Plan, other: Outcome | None = None) -> None:
     )
     for path in plan.predicted.paths:
         hand = MM * path.positions(np.linspace(0.0, float(path.times[-1]), 100))
-        axes.plot(hand[:, 0], hand[:, 1], color=HAND, linewidth=1.4)
+        axes.plot(hand[:, 0], hand[:, 1], color=HAND, linewidth=1.4, linestyle=(0, (6, 2)))
         axes.add_patch(
             Circle(tuple(hand[-1]), MM * (plan.model.hand_radius or 0.0), facecolor="none", edgecolor=HAND)
         )
@@ -193,13 +193,14 @@ th { text-align: left; font-weight: 500; color: #667085; } th, td { padding: 5px
 tr + tr th, tr + tr td { border-top: 1px solid #dfe3ea; }
 i { display: inline-block; width: 18px; height: 4px; border-radius: 2px; vertical-align: middle;
   margin: 0 6px 0 12px; }
+@media print { * { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
 @media (max-width: 800px) { .columns { grid-template-columns: minmax(0, 1fr); } main { padding: 18px 14px; } }
 </style></head><body><main>
 {{ nav }}
 <h1>{{ title }}</h1>
 <div class="columns">
 <figure>{{ above }}<figcaption><i style="background:#2563c9; margin-left:0"></i>object
-<i style="background:#b4540a"></i>hand
+<i style="background:repeating-linear-gradient(90deg, #b4540a 0 7px, transparent 7px 10px)"></i>hand
 <i style="background:#1d7a46"></i>goal and tolerance. Faint: where the object ends under draws from the belief.
 {% if other %}Dashed red: where it ends with the effects found.{% endif %}
 

@@ -46,7 +46,7 @@ Colour = tuple[float, float, float, float]
 RECORDED, BASELINE, CORRECTED = "recorded", "baseline", "corrected"
 COLOURS: Final[Mapping[str, Colour]] = {
     RECORDED: (0.93, 0.47, 0.05, 0.2),  # a ghost with edges
-    BASELINE: (0.60, 0.63, 0.69, 0.6),
+    BASELINE: (0.72, 0.75, 0.80, 0.6),
     CORRECTED: (0.15, 0.39, 0.79, 1.0),
 }
 """Of the object, as on the other pages; light, middle and dark in print."""

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 INK, MUTED, RULE, PAPER = "#1c2330", "#667085", "#dfe3ea", "#f6f7f9"
 BEFORE, AFTER = "#98a1b0", "#2563c9"
-CONTACT, FREE = "#b4540a", "#0f766e"
+CONTACT, FREE = "#b4540a", "#45b8a8"
 
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",

@@ -14,13 +14,24 @@ def written(**changes):
 
 
 def test_six_digits_of_what_was_estimated_and_all_of_a_clock():
-    location = dc.replace(
-        diagnosis_with().location, windows=(Window(push="pushes/001.csv", start=1763637000.12345, end=1763637000.5),)
-    )
+    window = Window(
+        push="pushes/001.csv", start=1763637000.12345, end=1763637000.5, place=(0.1, -0.02), heading=1.5, speed=0.04,
+        phase="contact",
+    )  # fmt: skip
+    location = dc.replace(diagnosis_with().location, windows=(window,))
     content = written(location=location, p_value=0.123456789)
     assert content["p_value"] == 0.123457
     assert content["location"]["windows"] == [
-        {"push": "pushes/001.csv", "start_s": 1763637000.1235, "end_s": 1763637000.5}
+        {
+            "push": "pushes/001.csv",
+            "start_s": 1763637000.1235,
+            "end_s": 1763637000.5,
+            "x_m": 0.1,
+            "y_m": -0.02,
+            "heading_rad": 1.5,
+            "speed_mps": 0.04,
+            "phase": "contact",
+        }
     ]
 
 

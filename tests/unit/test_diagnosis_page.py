@@ -67,6 +67,11 @@ LAWS = {
 }  # fmt: skip
 
 
+WINDOW = Window(
+    push=NAMES[0], start=0.5, end=1.0, place=(0.031, -0.012), heading=-0.5, speed=0.0412, phase="free_slide"
+)  # fmt: skip
+
+
 def diagnosis_with(**changes):
     d = Diagnosis(
         recording="eraser <u>",
@@ -77,7 +82,7 @@ def diagnosis_with(**changes):
         effects=(effect("stribeck_friction", **LAWS["stribeck_friction"]),),
         location=Location(
             statement="in its free slide: about 0.1 N", phase=("free_slide",), dof=("along_motion",),
-            frame="object_velocity", windows=(Window(push=NAMES[0], start=0.5, end=1.0),),
+            frame="object_velocity", windows=(WINDOW,),
         ),
         fit=FitQuality(
             rms_before=3.0, rms_after=1.0, position_before=2e-3, position_after=5e-4, rotation_before=0.02,
@@ -322,3 +327,18 @@ def test_where_it_is_has_no_empty_lines():
     endless = Location(statement="at the end", phase=(), dof=(), frame="world", windows=())
     text = diagnosis_page(diagnosis_with(location=endless), recording_of(), shown_pushes(), WRENCHES)
     assert "<dt>frame</dt>" in text and "<dt>when</dt>" not in text and "<dt>in what</dt>" not in text
+
+
+def test_where_most_is_missing_is_a_table_and_numbers_in_the_picture():
+    text = " ".join(diagnosis_page(diagnosis_with(), recording_of(), shown_pushes(), WRENCHES).split())
+    for cell in ("0.50 to 1.00", "31, -12", "331", "41.2", "in its free slide"):
+        assert f">{cell}</td>" in text
+    assert "Numbers: the windows of the table." in text
+
+
+@pytest.mark.parametrize("verdict", ["consistent", "underpowered"])
+def test_where_nothing_is_missing_nothing_is_placed(verdict):
+    text = diagnosis_page(
+        diagnosis_with(verdict=verdict, location=None, effects=()), recording_of(), shown_pushes(), ()
+    )
+    assert "Where it is" not in text and "What is missing over time" not in text
