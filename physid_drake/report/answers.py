@@ -21,9 +21,7 @@ def answers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
 def _how_sure(d: Diagnosis) -> str:
     p_value = f"p {'< 1e-300' if d.p_value <= 0.0 else '= ' + tiny(d.p_value)}"
     if d.verdict == "consistent":
-        return (
-            f"The baseline model leaves as much as noise does ({p_value}; below {number(d.alpha)} would be too much)."
-        )
+        return f"The baseline model leaves as much as noise does ({p_value}; a mismatch is below {number(d.alpha)})."
     if d.verdict == "underpowered":
         return f"These pushes show too little to tell ({p_value})."
     said = f"That the baseline model is not enough: {p_value}."
@@ -37,14 +35,12 @@ def _how_sure(d: Diagnosis) -> str:
 
 
 def _what_now(d: Diagnosis) -> str:
-    use = (
-        "model.yaml holds the model with it: load_model(folder) builds it in Drake, physid_drake plan pushes with it."
-    )
+    use = "model.yaml has it: load_model(folder) builds that in Drake, and physid_drake plan pushes with it."
     match d.verdict:
         case "explained":
-            return use[0].upper() + use[1:]
+            return use
         case "ambiguous":
-            return f"{_next(d.next_push)} Until then m{use[1:]}"
+            return f"{_next(d.next_push)} Until then, {use}"
         case "consistent":
             return "Use the baseline model of model.yaml. What these pushes would have shown is listed below."
         case "underpowered":

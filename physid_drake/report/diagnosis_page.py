@@ -24,6 +24,7 @@ from physid_drake.diagnose.values import (
     Ranked,
     ThetaEstimate,
 )
+from physid_drake.diagnose.whereabouts import number_of
 from physid_drake.effects import effect_named
 from physid_drake.pushes.tracker_noise import UNKNOWN
 from physid_drake.recording import Recording
@@ -121,6 +122,7 @@ def diagnosis_page(
         scene = SCENE if SCENE in pages else None
         content = {"scene": scene, "nav": nav(DIAGNOSIS, pages), **_content(diagnosis, recording, view)}
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["number_of"] = number_of
     environment.filters["in_degrees"] = lambda angle: math.degrees(angle) % 360.0
     environment.filters["degrees"] = lambda angle: fixed(math.degrees(angle))
     environment.filters.update(number=number, fixed=fixed, quantity=quantity, chance=chance, tiny=tiny)
@@ -150,7 +152,6 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "errors": [error_figure(view, k, diagnosis.noise) for k in order[:MOST_ERRORS]],
         "lets_go": any(view.shown[k].released is not None for k in order[:MOST_ERRORS]),
         "arrows": arrow_figure(view, () if diagnosis.location is None else diagnosis.location.windows),
-        "said": SAID,
         "answers": answers(diagnosis),
         "strips": strips[:MOST_STRIPS],
         "more_strips": strips[MOST_STRIPS:],
