@@ -270,7 +270,9 @@ def _register_plan(subparsers: Subparsers) -> None:
     parser.add_argument(
         "run_folder", nargs="?", type=path, metavar="RUN", help="folder of a run_cell run or diagnosis"
     )
-    parser.add_argument("--goal", nargs=2, type=float, required=True, metavar=("X", "Y"), help="on the table, in m")
+    wanted = parser.add_mutually_exclusive_group(required=True)
+    wanted.add_argument("--goal", nargs=2, type=float, metavar=("X", "Y"), help="on the table, in m")
+    wanted.add_argument("--reach", metavar="ROBOT", help="baxter or motoman: any place that this robot reaches")
     parser.add_argument("--start", nargs=3, type=float, metavar=("X", "Y", "DEG"),
                         help="of the object, in m and degrees (default: the middle of the table)")  # fmt: skip
     parser.add_argument("--policy", default="push_speed", metavar="NAME",

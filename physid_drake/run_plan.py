@@ -17,7 +17,9 @@ from physid_drake.files import FileError, read_json
 from physid_drake.model import Model
 from physid_drake.model_reading import load_model
 from physid_drake.plan import DistanceToGoal, Ending, Hindsight, Outcome, Plan, Situation, caveat_of, plan
+from physid_drake.plan.costs import Cost
 from physid_drake.plan.draws import scatter_freedom, uncertain_names
+from physid_drake.plan.reach import goal_within
 from physid_drake.plan.story import outcome_under
 from physid_drake.plan.task import Choices, policy_for
 from physid_drake.plan.trajectory import tip_height_of
@@ -69,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
     full = model
     if arguments.plain:
         model = model.plain()
-    start, goal = _places(arguments, model)
+    start, goal, cost = _places(arguments, model)
     choices = Choices(
         speed=arguments.speed, travel=arguments.travel,
         direction=None if arguments.direction is None else _radians("--direction", arguments.direction),
@@ -80,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
     console = terminal()
     with progress_bar(console) as tick:
         made = plan(
-            model, policy, DistanceToGoal(goal=goal), situation=Situation(start=start, order=learnt.pushes),
+            model, policy, cost, situation=Situation(start=start, order=learnt.pushes),
             rng=np.random.default_rng(_seed(arguments.seed)),
             budget=_trials(arguments, policy),
             search=arguments.search, draws=arguments.draws, risk=arguments.risk, tolerance=arguments.tolerance,
@@ -276,15 +278,20 @@ def _value(content: Any, path: str, *kinds: type) -> Any:
 _WORDS = {int: "a whole number", float: "a number", str: "text", list: "a list", dict: "a mapping"}
 
 
-def _places(arguments: argparse.Namespace, model: Model) -> tuple[tuple[float, float, float], tuple[float, float]]:
-    """The object's start, the middle of the table unless it is given, and the goal."""
+def _places(
+    arguments: argparse.Namespace, model: Model
+) -> tuple[tuple[float, float, float], tuple[float, float], Cost]:
+    """The object's start, the middle of the table unless it is given, the goal, and what it costs to miss it."""
     (x0, y0), (x1, y1) = model.table
-    goal = (float(arguments.goal[0]), float(arguments.goal[1]))
     if arguments.start is None:
         start = (0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.0)
     else:
         start = (*arguments.start[:2], _radians("--start", arguments.start[2]))
-    return start, goal
+    if arguments.goal is None:
+        cost, goal = goal_within(arguments.reach, model.table, start[:2])
+        return start, goal, cost
+    goal = (float(arguments.goal[0]), float(arguments.goal[1]))
+    return start, goal, DistanceToGoal(goal=goal)
 
 
 def _radians(flag: str, degrees: float) -> float:

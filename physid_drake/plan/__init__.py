@@ -4,6 +4,7 @@ from physid_drake.plan.config import PlanConfig as PlanConfig
 from physid_drake.plan.costs import Cost as Cost
 from physid_drake.plan.costs import DistanceToGoal as DistanceToGoal
 from physid_drake.plan.costs import InsideRegion as InsideRegion
+from physid_drake.plan.costs import WithinDisc as WithinDisc
 from physid_drake.plan.robot import Robot as Robot
 from physid_drake.plan.robot import SimulatedRobot as SimulatedRobot
 from physid_drake.plan.story import Hindsight as Hindsight

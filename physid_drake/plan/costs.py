@@ -63,6 +63,26 @@ class InsideRegion:
         return math.hypot(*outside, self.softness) - self.softness
 
 
+@dc.dataclass(frozen=True, kw_only=True)
+class WithinDisc:
+    """Zero in a disc, such as where a robot reaches; outside, about the distance from it, without a kink at its edge.
+
+    Attributes:
+        centre: x, y [m].
+        radius: m.
+        softness: distance over which the cost bends from level to slope 1 [m].
+    """
+
+    centre: tuple[float, float]
+    radius: float
+    softness: float = 0.01
+
+    def at(self, place: Array) -> float:
+        """The softened distance [m]."""
+        away = math.hypot(float(place[0]) - self.centre[0], float(place[1]) - self.centre[1])
+        return math.hypot(max(0.0, away - self.radius), self.softness) - self.softness
+
+
 def loss_of(cost: Cost, table: Corners) -> float:
     """The cost of an object that fell, toppled or does not stop [m]: more than that of any place on the table.
 

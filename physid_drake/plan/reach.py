@@ -9,17 +9,21 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from physid_drake.plan.costs import Corners
+from physid_drake.errors import ConfigError
+from physid_drake.plan.costs import Corners, WithinDisc
 from physid_drake.resources import shipped
+from physid_drake.wording import shown
 
 Array = NDArray[np.float64]
 
 NAMES = {"motoman_sda10f": "motoman", "baxter": "baxter"}
 CHORDS = 80  # of a drawing
+SHIPPED_TABLE = (1.20, 0.80)  # m
+INSIDE = 0.05  # m: so far within a robot's reach an object is to stop
 
 
 @dc.dataclass(frozen=True, kw_only=True)
-class Reach:
+class RobotReach:
     """A disc on the table.
 
     Attributes:
@@ -47,7 +51,7 @@ class Reach:
         return rows
 
 
-def reaches(table: Corners) -> dict[str, Reach]:
+def reaches(table: Corners) -> dict[str, RobotReach]:
     """The robots' reach, by ``motoman`` and ``baxter``.
 
     Each stands as far behind the middle of its edge of the table (-x, +x) as in the shipped cell.
@@ -58,9 +62,55 @@ def reaches(table: Corners) -> dict[str, Reach]:
     (x0, y0), (x1, y1) = table
     shift = {"motoman": x0, "baxter": x1}
     return {
-        name: Reach(base=(shift[name] + behind, 0.5 * (y0 + y1)), radius=radius)
+        name: RobotReach(base=(shift[name] + behind, 0.5 * (y0 + y1)), radius=radius)
         for name, (behind, radius) in _shipped().items()
     }
+
+
+def goal_within(name: str, table: Corners, start: tuple[float, float]) -> tuple[WithinDisc, tuple[float, float]]:
+    """The cost of an object that is to stop where a robot reaches it, and the nearest place [m] that is well inside.
+
+    Args:
+        name: of the robot.
+        table: lower and upper corner of its top [m].
+        start: of the object [m].
+
+    Raises:
+        ConfigError: if there is no such robot, or it reaches no place on the table, or the object already.
+    """
+    robots = reaches(table)
+    if name not in robots:
+        raise ConfigError(f"reach: the robots are {' and '.join(sorted(robots))}, but got {shown(name)}.")
+    reach = robots[name]
+    if not len(reach.chords(table)):
+        raise ConfigError(f"reach: the {name} does not reach this table.")
+    way = np.subtract(start, reach.base)
+    distance = float(np.hypot(*way))
+    if distance <= reach.radius:
+        raise ConfigError(f"reach: the {name} reaches the object already; choose another start or goal.")
+    x, y = (np.array(reach.base) + (reach.radius - INSIDE) / distance * way).tolist()
+    return WithinDisc(centre=reach.base, radius=reach.radius - INSIDE), (x, y)
+
+
+def beyond_reach(table: Corners, hand: Array, end: Array) -> list[str]:
+    """What of a plan the robots of the shipped cell do not reach, a line each; of another cell nobody knows.
+
+    Args:
+        table: lower and upper corner of its top [m].
+        hand: (n, 2) the hand's way [m].
+        end: (2,) where the object stops [m].
+    """
+    low, high = np.array(table)
+    if not (np.allclose(high - low, SHIPPED_TABLE) and np.allclose(low + high, 0.0)):
+        return []
+    robots, lines = reaches(table), []
+    far = float(robots["motoman"].beyond(hand).max())
+    if far > 0.0:
+        lines.append(f"the hand would go {1e3 * far:.0f} mm beyond where the Motoman reaches")
+    far = float(robots["baxter"].beyond(end)[0])
+    if far > 0.0:
+        lines.append(f"the object stops {1e3 * far:.0f} mm beyond where the Baxter reaches")
+    return lines
 
 
 @cache

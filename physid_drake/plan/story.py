@@ -15,6 +15,7 @@ from physid_drake.errors import ConfigError
 from physid_drake.model import Model
 from physid_drake.plan.costs import Cost, cost_of, loss_of
 from physid_drake.plan.draws import Draw, draws_of, uncertain_names
+from physid_drake.plan.reach import beyond_reach
 from physid_drake.plan.trajectory import Ending, Situation, Trajectory, hand_radius_of, path_of, trajectory_of
 from physid_drake.policies import PlannedPush, Policy
 from physid_drake.progress import Progress
@@ -269,7 +270,8 @@ def caveats_of(made: Plan, hindsight: Hindsight | None = None) -> list[str]:
             f"it goes at {speed:.2f} m/s and the fastest recorded push at {known:.2f} m/s: what depends on speed may"
             " be otherwise there"
         )
-    return caveats
+    ways = np.vstack([path.positions(np.linspace(0.0, float(path.times[-1]), 100)) for path in made.predicted.paths])
+    return [*caveats, *beyond_reach(made.model.table, ways, made.predicted.end[:2])]
 
 
 def outcome_under(made: Plan, model: Model) -> Outcome:

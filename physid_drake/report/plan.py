@@ -13,11 +13,13 @@ from physid_drake.plan import (
     DistanceToGoal,
     Ending,
     Hindsight,
+    InsideRegion,
     Outcome,
     Plan,
     Spread,
     SweepRow,
     Trajectory,
+    WithinDisc,
     caveats_of,
 )
 from physid_drake.plan.trajectory import tip_height_of
@@ -51,6 +53,7 @@ def plan_json(
         "effects": [e.name for e in plan.model.effects],
         "policy": plan.policy.name,
         "goal_m": list(plan.cost_function.goal) if isinstance(plan.cost_function, DistanceToGoal) else None,
+        "goal_within": _disc(plan.cost_function) if isinstance(plan.cost_function, WithinDisc) else None,
         "tolerance_m": plan.tolerance,
         "start": _pose(plan.situation.start),
         "settings": _settings(plan),
@@ -101,9 +104,14 @@ def plan_rows(
     if isinstance(plan.cost_function, DistanceToGoal):
         gx, gy = plan.cost_function.goal
         rows.append(("goal", f"{1e3 * gx:.0f}, {1e3 * gy:.0f} mm"))
+    if isinstance(plan.cost_function, WithinDisc):
+        (gx, gy), radius = plan.cost_function.centre, plan.cost_function.radius
+        rows.append(
+            ("goal", f"within {1e3 * radius:.0f} mm of {1e3 * gx:.0f}, {1e3 * gy:.0f} mm, where a robot reaches")
+        )
     rows += _settings_rows(plan)
     rows.append(("predicted end", _said(plan.predicted, plan.cost)))
-    if isinstance(plan.cost_function, DistanceToGoal) and plan.tolerance < plan.cost < plan.loss:
+    if not isinstance(plan.cost_function, InsideRegion) and plan.tolerance < plan.cost < plan.loss:
         rows.append(("misses the goal", f"by {1e3 * plan.cost:.1f} mm; {1e3 * plan.tolerance:g} mm were allowed"))
     if with_effects is not None:
         rows.append(("with the effects found", _said(*with_effects)))
@@ -199,6 +207,10 @@ def _belief(spread: Spread, tolerance: float) -> dict[str, Any]:
         "success_rate_ci90": list(interval),
         "ends": [_pose(end) for end in spread.ends],
     }
+
+
+def _disc(cost: WithinDisc) -> dict[str, float]:
+    return {"x_m": cost.centre[0], "y_m": cost.centre[1], "radius_m": cost.radius}
 
 
 def _row(row: SweepRow) -> dict[str, Any]:

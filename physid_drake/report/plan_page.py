@@ -15,7 +15,7 @@ from matplotlib.patches import Circle, Polygon, Rectangle
 from numpy.typing import NDArray
 
 from physid_drake.effects.rollout import Geometry, geometry_with
-from physid_drake.plan import DistanceToGoal, Ending, Hindsight, InsideRegion, Outcome, Plan, SweepRow
+from physid_drake.plan import DistanceToGoal, Ending, Hindsight, InsideRegion, Outcome, Plan, SweepRow, WithinDisc
 from physid_drake.report.outline import outline_of
 from physid_drake.report.pages import PLAN, nav
 from physid_drake.report.plan import plan_rows, push_files, title_of
@@ -157,6 +157,9 @@ def _draw_goal(axes: Axes, plan: Plan) -> None:
         x, y = MM * cost.goal[0], MM * cost.goal[1]
         axes.add_patch(Circle((x, y), MM * plan.tolerance, facecolor=GOAL, edgecolor=GOAL, alpha=0.25))
         axes.plot([x], [y], "+", color=GOAL, markersize=9, zorder=5)
+    elif isinstance(cost, WithinDisc):
+        centre = (MM * cost.centre[0], MM * cost.centre[1])
+        axes.add_patch(Circle(centre, MM * cost.radius, facecolor=GOAL, edgecolor=GOAL, alpha=0.2))
     elif isinstance(cost, InsideRegion):
         (x0, y0), (x1, y1) = cost.lower, cost.upper
         axes.add_patch(

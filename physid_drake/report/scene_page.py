@@ -7,6 +7,7 @@ from pathlib import Path
 
 from jinja2 import Environment, StrictUndefined
 
+from physid_drake.plan.reach import SHIPPED_TABLE
 from physid_drake.report.pages import SCENE, nav
 from physid_drake.report.stage import (
     ARROW,
@@ -16,7 +17,6 @@ from physid_drake.report.stage import (
     CORRECTED,
     LOUDEST,
     MISSING,
-    PLAIN_TABLE,
     RECORDED,
     Act,
     Setting,
@@ -66,7 +66,7 @@ def scene_page(
 def _switches(setting: Setting, acts: Sequence[Act]) -> list[tuple[str, str, str, bool]]:
     """What can be shown and hidden: key, colour, words, whether it is shown at first."""
     (x0, y0), (x1, y1) = setting.table
-    shipped = abs(x1 - x0 - PLAIN_TABLE[0]) + abs(y1 - y0 - PLAIN_TABLE[1]) < 1e-6
+    shipped = abs(x1 - x0 - SHIPPED_TABLE[0]) + abs(y1 - y0 - SHIPPED_TABLE[1]) < 1e-6
     found = []
     if RECORDED in setting.shapes:
         found.append((RECORDED, _css(COLOURS[RECORDED]), "object as recorded", True))

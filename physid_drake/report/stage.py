@@ -33,7 +33,7 @@ from physid_drake.cell.hand_model import hand_looks
 from physid_drake.cell.outline import Outline
 from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.diagnose.localise import MissingWrench
-from physid_drake.plan.reach import reaches
+from physid_drake.plan.reach import SHIPPED_TABLE, reaches
 from physid_drake.recording import Hand, Shape
 from physid_drake.report.meshcat_server import silent
 from physid_drake.report.outline import outline_of
@@ -66,7 +66,6 @@ FRAMES_PER_SECOND = 32.0
 CAMERA = (-0.12, -0.34, 0.25)  # m beside what it looks at
 PAUSE = 0.4  # s between two pushes
 LONGEST = 60.0  # s of the whole animation; longer recordings are shown faster
-PLAIN_TABLE = (1.20, 0.80)  # m: the shipped model with its legs and robots
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -300,7 +299,7 @@ def _add_table(meshcat: Meshcat, table: Corners) -> None:
     """The shipped table with the two robots where it is that table; else a plain top of the recorded size."""
     low, high = np.array(table)
     size, centre = high - low, 0.5 * (low + high)
-    if not (np.allclose(size, PLAIN_TABLE) and np.allclose(centre, 0.0)):
+    if not (np.allclose(size, SHIPPED_TABLE) and np.allclose(centre, 0.0)):
         meshcat.SetObject("table", Box(size[0], size[1], 0.02), Rgba(0.75, 0.68, 0.58, 1.0))
         meshcat.SetTransform("table", RigidTransform([*centre, -0.0101]))
         return

@@ -16,7 +16,6 @@ import pytest
 from physid_drake.cell.solid import solid_of
 from physid_drake.diagnose.localise import MissingWrench
 from physid_drake.errors import ConfigError
-from physid_drake.plan.reach import reaches
 from physid_drake.recording import Box, Hand, read_recording
 from physid_drake.report.acts import first_act, setting_of_recording, unit_force_of
 from physid_drake.report.live import STOP, Live
@@ -134,32 +133,6 @@ def test_a_scene_of_one_model_without_a_mismatch_offers_no_choice():
     text = scene_page(lone, [act(**{RECORDED: track(0.0), BASELINE: track(0.0)})], name="eraser")
     assert 'name="model"' not in text and "arrow" not in text and 'value="missing"' not in text
     assert "baseline model" in text
-
-
-# Where the robots reach.
-
-
-def test_the_reach_on_the_shipped_table_is_that_of_its_model():
-    discs = reaches(TABLE)
-    assert discs["motoman"].base == pytest.approx((-0.9, 0.0)) and discs["motoman"].radius == 0.72
-    assert discs["baxter"].base == pytest.approx((1.15, 0.0)) and discs["baxter"].radius == 1.041
-
-
-def test_the_robots_stand_behind_the_edges_of_any_table():
-    discs = reaches(((1.0, 2.0), (2.0, 4.0)))
-    assert discs["motoman"].base == pytest.approx((0.7, 3.0)) and discs["baxter"].base == pytest.approx((2.55, 3.0))
-    place = np.array([[1.0, 3.0], [0.7, 3.82]])
-    assert discs["motoman"].beyond(place) == pytest.approx([0.0, 0.1])
-
-
-def test_chords_are_on_the_table_and_within_the_reach():
-    disc = reaches(TABLE)["motoman"]
-    rows = disc.chords(TABLE)
-    assert len(rows) > 10
-    for x, low, high in rows:
-        assert -0.6 <= x <= 0.6 and -0.4 <= low < high <= 0.4
-        assert disc.beyond(np.array([[x, low], [x, high]])) == pytest.approx([0.0, 0.0], abs=1e-9)
-    assert not len(reaches(TABLE)["motoman"].chords(((5.0, 5.0), (6.0, 6.0))))
 
 
 def test_nobody_can_connect_to_a_stage_without_a_view(played):
