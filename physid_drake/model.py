@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Diagram
 
 from physid_drake.cell import Body, Cell, CellConfig, HandPath, Motion, Start
-from physid_drake.cell.cell import holding_body
 from physid_drake.cell.diagram import Scene
-from physid_drake.cell.plant_state import PlantState
 from physid_drake.effects import Effect
+from physid_drake.effects.diagram import augmented_diagram
 from physid_drake.effects.rollout import (
     Geometry,
     Rollout,
@@ -28,7 +28,6 @@ from physid_drake.effects.rollout import (
     roll,
     tracked,
 )
-from physid_drake.effects.system import add_effect_forces
 from physid_drake.errors import ConfigError
 from physid_drake.recording import Box, Cylinder, MeshShape, Prism, Shape
 
@@ -136,9 +135,14 @@ class Model:
         axes = np.array(self.hand_axes)
         return axes if path is None or not self.hand_turns else turned(path.heading) @ axes
 
-    def build(self) -> ModelCell:
-        """The Drake cell with theta in its Context and the effects at their seams."""
-        return ModelCell(self)
+    def build(self, *, time_step: float | None = None) -> ModelCell:
+        """The Drake cell with theta in its Context and the effects at their seams.
+
+        Args:
+            time_step: of the diagram's plant [s]; None for the cell's tick, of a millisecond as a rule. Rollouts keep
+                the cell's.
+        """
+        return ModelCell(self, time_step=time_step)
 
     def plain(self) -> Model:
         """The same without its effects: what is lost without them is what they are worth."""
@@ -178,51 +182,38 @@ class Model:
 class ModelCell:
     """A model, built: its diagram, and rollouts with all its physics.
 
-    The diagram's table does not end, and its physics are those of the first push; rollouts lose the object at the
-    edge, and take the number of the push.
+    The diagram is for a simulation, or a larger diagram, of one's own: a ``Simulator`` of it begins with the
+    identified theta, the object at rest on the table and the hand clear of it. Its table has no end, and its physics
+    are those of the first push; rollouts lose the object at the edge and take the push's number.
 
     Attributes:
         model: what it was built from.
         cell: the cell, in the effects' geometry, which rollouts take.
+        diagram: the Drake diagram, with the effects' forces as a system; ``effects.diagram.PORTS`` has its ports.
         scene: the diagram's plant and bodies.
-        simulator: of the diagram, theta in its Context.
-        diagram: the Drake diagram, with the effects' forces as a system.
+        simulator: of the diagram.
     """
 
-    def __init__(self, model: Model) -> None:
+    diagram: Diagram
+    scene: Scene
+
+    def __init__(self, model: Model, *, time_step: float | None = None) -> None:
         self.model = model
-        self.cell = self._cell_in()
+        geometry = geometry_with(model.effects, Geometry(shape=model.shape))
+        self.cell = Cell(
+            geometry.shape, hand_radius=model.hand_radius, config=model.config, table=np.array(model.table),
+            pressure=geometry.pressure, gravity=geometry.gravity,
+        )  # fmt: skip
+        self.cell.set_body(model.body)
         effects = [e for e in model.effects if not e.is_null]
         facts = facts_of(self.cell, model.body, np.array(model.table), order=0)
-        body = body_with(effects, model.body, facts)
-        laws, frictions = [law for e in effects for law in e.laws(facts)], frictions_of(effects, facts)
-        tick = model.config.solver.time_step_s
-        augmented = self._cell_in(
-            lambda builder, scene: (
-                add_effect_forces(builder, scene, body, tick, laws, frictions) if laws or frictions else None
-            )
-        )
-        augmented.set_body(holding_body(body, frictions))
-        self.scene: Scene = augmented.scene
-        self.simulator = augmented.simulator
-        self.diagram: Diagram = augmented.diagram
-        self.cell.set_body(model.body)
-        self._stand(augmented, body)
-
-    def _stand(self, augmented: Cell, body: Body) -> None:
-        """Place the diagram's object on the table, and its hand far away."""
-        state = PlantState(augmented.scene, self.simulator.get_mutable_context())
-        state.begin(body, Start(pose=(0.0, 0.0, 0.0)), augmented.rest_pose(body))
-        state.send()
-
-    def _cell_in(self, attach: Callable[[DiagramBuilder, Scene], object] | None = None) -> Cell:
-        """The cell in the effects' geometry."""
-        model = self.model
-        geometry = geometry_with(model.effects, Geometry(shape=model.shape))
-        return Cell(
-            geometry.shape, hand_radius=model.hand_radius, config=model.config, table=np.array(model.table),
-            pressure=geometry.pressure, gravity=geometry.gravity, attach=attach,
+        height = 0.5 * self.cell.solid.height if model.contact_height is None else model.contact_height
+        self.diagram, self.scene = augmented_diagram(
+            geometry, self.cell, body_with(effects, model.body, facts), model.config, model.hand_radius,
+            laws=[law for e in effects for law in e.laws(facts)], frictions=frictions_of(effects, facts),
+            hand_height=height, time_step=model.config.solver.time_step_s if time_step is None else time_step,
         )  # fmt: skip
+        self.simulator = Simulator(self.diagram)
 
     def rollout(
         self,

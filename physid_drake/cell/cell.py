@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,6 @@ class Cell:
         with_edge: bool = False,
         pressure: PressureGrid | None = None,
         gravity: float = GRAVITY,
-        attach: Callable[[DiagramBuilder, Scene], object] | None = None,
     ) -> None:
         """Build the diagram.
 
@@ -66,7 +65,6 @@ class Cell:
             with_edge: model the edge from the start: point contact on a box, slower than the endless table.
             pressure: under the object, where it is not even.
             gravity: m/s^2; more than the earth's where a body stands for a part of what it carries.
-            attach: adds further systems to the diagram; a cell that has some is for a Simulator, not for rollouts.
 
         Raises:
             CellError: if the shape cannot be built.
@@ -83,15 +81,9 @@ class Cell:
         )
         cells = self.config.friction_cells[0] * self.config.friction_cells[1]
         self._cells = cells
-        self.setters: tuple[ParameterSetter, ...] = (
-            InertiaSetter(self.scene),
-            SupportSetter(self.scene, self.config, cells),
-            HandContactSetter(self.scene, self.config),
-        )
+        self.setters = setters_of(self.scene, self.config)
         for setter in self.setters:
             builder.AddSystem(setter.system)
-        if attach is not None:
-            attach(builder, self.scene)
         self.diagram: Diagram = builder.Build()
         self.simulator = Simulator(self.diagram)
         self._take_integrator()
@@ -208,6 +200,16 @@ class Cell:
         quaternion = np.array([1.0, 0.5 * roll, 0.5 * pitch, 0.0])
         z = 0.5 * self.solid.height - float(plane[0])
         return np.array([*(quaternion / np.linalg.norm(quaternion)), 0.0, 0.0, z])
+
+
+def setters_of(scene: Scene, config: CellConfig) -> tuple[ParameterSetter, ...]:
+    """The parameter setters of a scene: inertia, support, contact of the hand."""
+    cells = config.friction_cells[0] * config.friction_cells[1]
+    return (
+        InertiaSetter(scene),
+        SupportSetter(scene, config, cells),
+        HandContactSetter(scene, config),
+    )
 
 
 def holding_body(body: Body, frictions: Sequence[FrictionLaw]) -> Body:

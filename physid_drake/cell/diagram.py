@@ -26,7 +26,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlant, MultibodyPlantConfig
-from pydrake.multibody.tree import PrismaticJoint, RigidBody, SpatialInertia, UnitInertia
+from pydrake.multibody.tree import PdControllerGains, PrismaticJoint, RigidBody, SpatialInertia, UnitInertia
 from pydrake.systems.framework import DiagramBuilder
 
 from physid_drake.cell.config import CellConfig
@@ -41,6 +41,9 @@ TABLE_FRICTION = 1e6  # so rough that each pair's friction is set by the other s
 SLENDER = 2.5  # height over radius above which an object leans notably under load transfer
 FOOT_RADIUS = 3e-3  # m, of a support sphere; only its lowest point matters
 HAND_MASS = 1e5  # kg, at most: see ``Stepper``, which chooses it for each push
+DRIVEN_MASS = 1.0  # kg of each link of a hand that actuators move
+DRIVEN_FREQUENCY = 1000.0  # rad/s at which it follows what is wanted: 10 N move it by 3 to 10 micrometres
+DRIVEN_DISSIPATION = 30.0  # s/m (Hunt and Crossley) of its contact: at 0.1 m/s, as good as no bounce
 SLAB_THICKNESS = 0.01  # m of the compliant table; only modulus / thickness matters
 FACET_SHARE = 0.2  # of its cell's width: a facet's side, so small that its pressure is that of one point
 
@@ -72,6 +75,7 @@ class Scene:
         rest_depth: how deep an evenly loaded underside is in the table [m].
         lifts: whether friction follows depths that are larger than the loads (`ObjectState.lifts`): hydroelastic
             contact under CENIC's lagged approximation.
+        driven: whether actuators move the hand, and not the rollout.
         edge: lower and upper corner of a table that ends, x + iy [m]; None where it does not.
     """
 
@@ -89,6 +93,7 @@ class Scene:
     gravity: float
     rest_depth: float
     lifts: bool
+    driven: bool = False
     edge: tuple[complex, complex] | None = None
 
 
@@ -113,6 +118,8 @@ def add_scene(
     edge: Array | None,
     pressure: PressureGrid | None = None,
     gravity: float = GRAVITY,
+    inertia: SpatialInertia | None = None,
+    driven: bool = False,
 ) -> Scene:
     """Add plant and scene graph of a cell to a diagram builder.
 
@@ -125,6 +132,8 @@ def add_scene(
             None for an endless one, which is faster.
         pressure: under the object, where it is not even.
         gravity: m/s^2.
+        inertia: M_BBo_B of the object in every Context; None for one that a setter replaces.
+        driven: whether actuators move the hand; they take discrete steps.
     """
     discrete = config.solver.scheme != "cenic"
     hydroelastic = config.contact.model == "hydroelastic" and edge is None and solid.rolling_radius is None
@@ -145,7 +154,7 @@ def add_scene(
         support = axis_support(support, grid, solid.underside)
 
     table = _add_table(plant, edge, hydroelastic)
-    body, feet, foot_cells = _add_object(plant, solid, support, hydroelastic)
+    body, feet, foot_cells = _add_object(plant, solid, support, hydroelastic, inertia)
     rough = contact_properties(friction=TABLE_FRICTION, stiffness=1e3)
     faces = tuple(
         plant.RegisterCollisionGeometry(body, X_BG, shape, f"face_{i}", rough)
@@ -153,13 +162,14 @@ def add_scene(
     )  # fmt: skip
     for i, (shape, X_BG) in enumerate(solid.visual):
         plant.RegisterVisualGeometry(body, X_BG, shape, f"look_{i}", np.array([0.35, 0.55, 0.8, 1.0]))
-    joints, hand = _add_hand(plant, hand_radius) if hand_radius is not None else ((), None)
+    joints, hand = _add_hand(plant, hand_radius, driven) if hand_radius is not None else ((), None)
     plant.Finalize()
     _filter_collisions(scene_graph, table, [gid for gid, _ in feet], faces, hand)
     return Scene(
         plant=plant, scene_graph=scene_graph, object=body, table_geometry=table, feet=feet, foot_cells=foot_cells,
         hand_geometry=hand, face_geometries=faces, support=support, solid=solid, joints=joints, gravity=gravity,
         rest_depth=config.contact.rest_depth_m * _stiffer(solid), lifts=hydroelastic and not discrete,
+        driven=driven,
         edge=None if edge is None else (complex(*edge[0]), complex(*edge[1])),
     )  # fmt: skip
 
@@ -188,10 +198,9 @@ def _add_table(plant: MultibodyPlant, edge: Array | None, hydroelastic: bool) ->
 
 
 def _add_object(
-    plant: MultibodyPlant, solid: Solid, support: Support, hydroelastic: bool
+    plant: MultibodyPlant, solid: Solid, support: Support, hydroelastic: bool, inertia: SpatialInertia | None
 ) -> tuple[RigidBody, tuple[tuple[GeometryId, tuple[int, ...]], ...], tuple[int, ...]]:
-    inertia = SpatialInertia(1.0, np.zeros(3), UnitInertia(*solid.gyration))
-    body = plant.AddRigidBody("object", inertia)
+    body = plant.AddRigidBody("object", inertia or spatial_inertia(solid, 1.0, (0.0, 0.0), 1.0))
     bottom = -0.5 * solid.height
     feet, foot_cells = [], []
     if hydroelastic:
@@ -215,6 +224,20 @@ def _add_object(
         feet.append((gid, (i,)))
         foot_cells.append(int(support.cells[i]))
     return body, tuple(feet), tuple(foot_cells)
+
+
+def spatial_inertia(solid: Solid, mass: float, com: tuple[float, float], ratio: float) -> SpatialInertia:
+    """M_BBo_B of a solid.
+
+    Args:
+        solid: its shape.
+        mass: kg.
+        com: centre of mass in B, at half height [m].
+        ratio: inertia over that of uniform density [-].
+    """
+    p_BBcm = np.array([*com, 0.0])
+    central = UnitInertia(*(ratio * np.array(solid.gyration)))
+    return SpatialInertia(mass, p_BBcm, central.ShiftFromCenterOfMass(p_BBcm))
 
 
 def _extent_area(outline: Outline) -> float:
@@ -251,17 +274,23 @@ def _facets(support: Support, members: tuple[int, ...], outline: Outline) -> Mes
     return Mesh(mesh_data=InMemoryMesh(mesh_file=MemoryFile(text, ".obj", "facets")))
 
 
-def _add_hand(plant: MultibodyPlant, radius: float) -> tuple[tuple[PrismaticJoint, ...], GeometryId]:
+def _add_hand(plant: MultibodyPlant, radius: float, driven: bool) -> tuple[tuple[PrismaticJoint, ...], GeometryId]:
     """A sphere at the contact height: against vertical faces it is an upright cylinder without its ambiguity."""
     hand = plant.AddModelInstance("hand")
     plant.set_gravity_enabled(hand, False)
-    inertia = SpatialInertia(HAND_MASS, np.zeros(3), UnitInertia.SolidSphere(radius))
+    mass = DRIVEN_MASS if driven else HAND_MASS
+    inertia = SpatialInertia(mass, np.zeros(3), UnitInertia.SolidSphere(radius))
     parent = plant.world_frame()
     joints = []
     for name, axis in (("hand_x", [1, 0, 0]), ("hand_y", [0, 1, 0]), ("hand_z", [0, 0, 1])):
         link = plant.AddRigidBody(name, hand, inertia)
         joints.append(plant.AddJoint(PrismaticJoint(name, parent, link.body_frame(), axis)))
         parent = link.body_frame()
+        if driven:
+            actuator = plant.AddJointActuator(name, joints[-1])
+            carried = (3 - len(joints) + 1) * mass
+            gains = PdControllerGains(p=carried * DRIVEN_FREQUENCY**2, d=2.0 * carried * DRIVEN_FREQUENCY)
+            actuator.set_controller_gains(gains)
     properties = contact_properties(friction=paired_friction(0.3), stiffness=1e12)
     geometry = plant.RegisterCollisionGeometry(link, RigidTransform(), Sphere(radius), "tip", properties)
     plant.RegisterVisualGeometry(link, RigidTransform(), Sphere(radius), "tip_look", np.array([0.9, 0.5, 0.2, 1.0]))

@@ -13,18 +13,19 @@ from pydrake.geometry import (
     ProximityProperties,
     RoleAssign,
 )
-from pydrake.multibody.tree import SpatialInertia, UnitInertia
 from pydrake.systems.framework import Context
 from pydrake.systems.primitives import ConstantVectorSource
 
 from physid_drake.cell.config import CellConfig
 from physid_drake.cell.diagram import (
+    DRIVEN_DISSIPATION,
     SLAB_THICKNESS,
     TABLE_FRICTION,
     Scene,
     contact_properties,
     facet_areas,
     paired_friction,
+    spatial_inertia,
 )
 from physid_drake.errors import ParameterError
 
@@ -68,6 +69,7 @@ class ParameterSetter:
     """
 
     def __init__(self, name: str, scene: Scene, size: int) -> None:
+        self._name = name
         self.system = ConstantVectorSource(np.zeros(size))
         self.system.set_name(f"{name}_setter")
         self.scene = scene
@@ -91,24 +93,29 @@ class ParameterSetter:
         self.system.get_mutable_source_value(context).SetFromVector(part)
         self.write(root, part)
 
+    def make_default(self, body: Body) -> None:
+        """Make this setter's part of ``body`` that of every Context that is made from now on; but for the inertia."""
+        part = self.part_of(body)
+        self.system = ConstantVectorSource(part)
+        self.system.set_name(f"{self._name}_setter")
+        self.write(None, part)
+
     def part_of(self, body: Body) -> Array:
         """This setter's numbers (size,)."""
         raise NotImplementedError
 
-    def write(self, root: Context, value: Array) -> None:
-        """Write the numbers into the plant's or the scene graph's Context."""
+    def write(self, root: Context | None, value: Array) -> None:
+        """Write the numbers into the plant's or the scene graph's Context; None: into what Contexts are made from."""
         raise NotImplementedError
 
-    def replace(self, root: Context, geometry: GeometryId, properties: ProximityProperties) -> None:
-        """Replace a geometry's proximity properties in this Context only."""
-        scene_graph = self.scene.scene_graph
-        scene_graph.AssignRole(
-            scene_graph.GetMyMutableContextFromRoot(root),
-            self.scene.plant.get_source_id(),
-            geometry,
-            properties,
-            RoleAssign.kReplace,
-        )
+    def replace(self, root: Context | None, geometry: GeometryId, properties: ProximityProperties) -> None:
+        """Replace a geometry's proximity properties in this Context only, or in what Contexts are made from."""
+        scene_graph, source = self.scene.scene_graph, self.scene.plant.get_source_id()
+        if root is None:
+            scene_graph.AssignRole(source, geometry, properties, RoleAssign.kReplace)
+            return
+        context = scene_graph.GetMyMutableContextFromRoot(root)
+        scene_graph.AssignRole(context, source, geometry, properties, RoleAssign.kReplace)
 
 
 class InertiaSetter(ParameterSetter):
@@ -121,12 +128,12 @@ class InertiaSetter(ParameterSetter):
         """Mass, centre of mass, inertia ratio."""
         return np.array([body.mass, *body.p_BBcm, body.inertia_ratio])
 
-    def write(self, root: Context, value: Array) -> None:
-        """Write the object's spatial inertia M_BBo_B."""
-        mass, ratio = value[0], value[3]
-        p_BBcm = np.array([value[1], value[2], 0.0])
-        central = UnitInertia(*(ratio * np.array(self.scene.solid.gyration)))
-        spatial = SpatialInertia(mass, p_BBcm, central.ShiftFromCenterOfMass(p_BBcm))
+    def write(self, root: Context | None, value: Array) -> None:
+        """Write the object's spatial inertia M_BBo_B; that of every Context is given where the body is added."""
+        if root is None:
+            return
+        mass, com_x, com_y, ratio = value.tolist()
+        spatial = spatial_inertia(self.scene.solid, mass, (com_x, com_y), ratio)
         self.scene.object.SetSpatialInertiaInBodyFrame(self.scene.plant.GetMyMutableContextFromRoot(root), spatial)
 
 
@@ -142,7 +149,7 @@ class SupportSetter(ParameterSetter):
         """Static ratio, mass, frictions."""
         return np.array([body.static_ratio, body.mass, *body.support_friction])
 
-    def write(self, root: Context, value: Array) -> None:
+    def write(self, root: Context | None, value: Array) -> None:
         """Write friction per foot, and the stiffness that gives the chosen rest depth."""
         ratio, mass, friction = value[0], value[1], value[2:]
         stiffness = mass * self.scene.gravity / self.scene.rest_depth
@@ -164,7 +171,7 @@ class SupportSetter(ParameterSetter):
                 )
             self.replace(root, geometry, properties)
 
-    def _write_modulus(self, root: Context, stiffness: float) -> None:
+    def _write_modulus(self, root: Context | None, stiffness: float) -> None:
         """The table's modulus [Pa]: stiffness = modulus / thickness * area of the facets."""
         area = float(facet_areas(self.scene.support, self.scene.solid.underside).sum())
         properties = contact_properties(friction=TABLE_FRICTION, dissipation=self._dissipation)
@@ -183,15 +190,18 @@ class HandContactSetter(ParameterSetter):
         """Friction and mass."""
         return np.array([body.hand_friction, body.mass])
 
-    def write(self, root: Context, value: Array) -> None:
+    def write(self, root: Context | None, value: Array) -> None:
         """Write the tip's friction and the faces' stiffness."""
         if self.scene.hand_geometry is None:
             return
         stiffness = float(value[1]) * self._frequency**2
+        # A hand that Drake's contact moves touches without the cell's law of impact: it would bounce.
+        dissipation = DRIVEN_DISSIPATION if self.scene.driven else 0.0
         tip = contact_properties(friction=paired_friction(float(value[0])), stiffness=1e6 * stiffness)
         self.replace(root, self.scene.hand_geometry, tip)
         for face in self.scene.face_geometries:
-            self.replace(root, face, contact_properties(friction=TABLE_FRICTION, stiffness=stiffness))
+            rough = contact_properties(friction=TABLE_FRICTION, stiffness=stiffness, dissipation=dissipation)
+            self.replace(root, face, rough)
 
 
 def check_body(body: Body, cells: int) -> None:

@@ -1,7 +1,7 @@
 """The effects' forces as a system of the cell's diagram, for users who simulate the diagram themselves.
 
-It calls the same laws as ``Cell.rollout``, and like it samples them at every tick and holds them: a Python law that
-the solver evaluated and linearised within its steps would cost many times as much.
+It calls the same laws as ``Cell.rollout``, and like it once for every tick, with the state that the tick begins with:
+a Python law that the solver evaluated and linearised within its steps would cost many times as much.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ NAME = "effect_forces"
 
 
 class EffectForces(LeafSystem):
-    """Forces of laws on the object, held over a tick.
+    """Forces of laws on the object, as they are when a step of the plant begins.
 
     Ports: ``object.state_estimated`` (13,) in, the object's positions and velocities;
     ``object.force_commanded`` out, for the plant's applied spatial forces.
@@ -56,13 +56,13 @@ class EffectForces(LeafSystem):
         self.DeclareInitializationUnrestrictedUpdateEvent(self._begin)
         self._body = scene.object.index()
         self.DeclareVectorInputPort("object.state_estimated", 13)
-        self.DeclareDiscreteState(5)  # the sum of the laws' wrenches
-        self.DeclarePeriodicUnrestrictedUpdateEvent(tick, 0.0, self._sample)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(tick, 0.0, self._advance)
+        # Of the state when the plant's step begins: held from the step before, a spring would gain energy.
         self.DeclareAbstractOutputPort(
             "object.force_commanded",
             lambda: AbstractValue.Make([ExternallyAppliedSpatialForce()]),
             self._forces,
-            {self.xd_ticket()},
+            {self.input_port_ticket(self.get_input_port().get_index()), self.all_state_ticket(), self.time_ticket()},
         )
 
     def _fresh(self) -> list[ForceLaw]:
@@ -72,16 +72,20 @@ class EffectForces(LeafSystem):
         del context
         state.get_mutable_abstract_state(0).set_value(self._fresh())
 
-    def _sample(self, context: Context, state: State) -> None:
+    def _advance(self, context: Context, state: State) -> None:
+        """Let what moves with the laws move on by a tick."""
+        self._total(context, state.get_mutable_abstract_state(0).get_mutable_value())
+
+    def _total(self, context: Context, laws: list[ForceLaw]) -> list[float]:
+        """Sum of the laws' wrenches over the next tick, of which laws with a motion of their own take a step."""
         x = self.get_input_port().Eval(context).tolist()
         seen = self._reader.at(context.get_time(), self._tick, x[:7], x[7:])
-        laws = state.get_mutable_abstract_state(0).get_mutable_value()
         wrenches = total_wrenches(seen, laws, self._frictions)
-        total = [sum(parts) for parts in zip(*map(dc.astuple, wrenches), strict=True)]
-        state.get_mutable_discrete_state().set_value(total)
+        return [sum(parts) for parts in zip(*map(dc.astuple, wrenches), strict=True)]
 
     def _forces(self, context: Context, output: Value[List[ExternallyAppliedSpatialForce]]) -> None:
-        fx, fy, torque, tip_x, tip_y = context.get_discrete_state_vector().value().tolist()
+        laws = copy.deepcopy(context.get_abstract_state(0).get_value())
+        fx, fy, torque, tip_x, tip_y = self._total(context, laws)
         force = ExternallyAppliedSpatialForce()
         force.body_index = self._body
         force.p_BoBq_B = [self._reader.p_BBcm.real, self._reader.p_BBcm.imag, 0.0]
