@@ -1,4 +1,4 @@
-"""The command line: ``inspect``, ``convert``, ``diagnose``, ``plan``, ``run_cell``, ``prove``, ``experiment``."""
+"""The command line, one function for each command (``COMMANDS``)."""
 
 from __future__ import annotations
 
@@ -336,6 +336,26 @@ def _run_experiment(arguments: argparse.Namespace) -> int:
     return run(arguments)
 
 
+def _register_model(subparsers: Subparsers) -> None:
+    parser = subparsers.add_parser("model", help="take a model to a simulation of your own")
+    actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)
+    export = actions.add_parser(
+        "export", help="SDFormat, model directives and MJCF",
+        description="Write a model as SDFormat with Drake's contact properties, model directives that put object,"
+        " table and hand together, and MJCF; a README.txt says which effects the formats cannot express.",
+    )  # fmt: skip
+    export.add_argument("model", type=path, metavar="MODEL", help="model.yaml, or the folder of a run that holds it")
+    export.add_argument("--out", type=path, metavar="FOLDER", help="where files go (default: exports/RECORDING)")
+    export.set_defaults(run=_run_model_export)
+
+
+def _run_model_export(arguments: argparse.Namespace) -> int:
+    # Drake takes a second to import, which the other commands need not wait for.
+    from physid_drake.run_model import run_export  # noqa: PLC0415
+
+    return run_export(arguments)
+
+
 def _register_run_cell(subparsers: Subparsers) -> None:
     # Its own parser reads its words, once Drake is imported.
     subparsers.add_parser("run_cell", help="all at once: identify, diagnose, plan and show", add_help=False)
@@ -346,6 +366,7 @@ COMMANDS: list[Callable[[Subparsers], None]] = [
     _register_convert,
     _register_diagnose,
     _register_plan,
+    _register_model,
     _register_run_cell,
     _register_prove,
     _register_experiment,

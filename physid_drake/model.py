@@ -191,6 +191,7 @@ class ModelCell:
         cell: the cell, in the effects' geometry, which rollouts take.
         diagram: the Drake diagram, with the effects' forces as a system; ``effects.diagram.PORTS`` has its ports.
         scene: the diagram's plant and bodies.
+        body: theta, with what effects change of it.
         simulator: of the diagram.
     """
 
@@ -208,8 +209,9 @@ class ModelCell:
         effects = [e for e in model.effects if not e.is_null]
         facts = facts_of(self.cell, model.body, np.array(model.table), order=0)
         height = 0.5 * self.cell.solid.height if model.contact_height is None else model.contact_height
+        self.body = body_with(effects, model.body, facts)
         self.diagram, self.scene = augmented_diagram(
-            geometry, self.cell, body_with(effects, model.body, facts), model.config, model.hand_radius,
+            geometry, self.cell, self.body, model.config, model.hand_radius,
             laws=[law for e in effects for law in e.laws(facts)], frictions=frictions_of(effects, facts),
             hand_height=height, time_step=model.config.solver.time_step_s if time_step is None else time_step,
         )  # fmt: skip

@@ -131,7 +131,7 @@ def support_of(
         case _:
             raise TypeError(f"no quadrature for an outline of type {type(outline).__name__}")
     cells = grid.cell_of(places, outline)
-    radii = np.sqrt(weights / weights.sum() * _area(_as_polygon(outline)) / math.pi)
+    radii = np.sqrt(weights / weights.sum() * _area(as_polygon(outline)) / math.pi)
     polar = float(weights @ (places**2).sum(axis=1) / weights.sum())
     if pressure is not None:
         weights = weights * pressure.factors(places, outline)
@@ -265,11 +265,11 @@ def _cell_points(outline: Outline, grid: FrictionGrid, fewest: int, part: Array 
     x0, y0, x1, y1 = outline.extent()
     nx, ny = (n * math.ceil(fewest / n) for n in (grid.nx, grid.ny))
     xs, ys = np.linspace(x0, x1, nx + 1), np.linspace(y0, y1, ny + 1)
-    whole = _as_polygon(outline) if part is None else part
+    whole = as_polygon(outline) if part is None else part
     points, weights = [], []
     for i in range(nx):
         for j in range(ny):
-            piece = _clipped(whole, (xs[i], ys[j], xs[i + 1], ys[j + 1]))
+            piece = clipped(whole, (xs[i], ys[j], xs[i + 1], ys[j + 1]))
             if len(piece) >= 3 and _area(piece) > 1e-6 * _area(whole):
                 points.append(_moment_points(piece))
                 weights.append(np.full(4, 0.25 * _area(piece)))
@@ -297,7 +297,7 @@ def second_moments(vertices: Array) -> tuple[float, float, float]:
     return xx, float((cross * mixed).sum() / (2.0 * total)), yy
 
 
-def _as_polygon(outline: Outline) -> Array:
+def as_polygon(outline: Outline) -> Array:
     """Vertices (n, 2); a disc as 64 corners that enclose its area."""
     if isinstance(outline, Polygon):
         return np.array(outline.vertices)
@@ -307,7 +307,7 @@ def _as_polygon(outline: Outline) -> Array:
     return radius * np.column_stack([np.cos(phi), np.sin(phi)])
 
 
-def _clipped(vertices: Array, window: tuple[float, float, float, float]) -> Array:
+def clipped(vertices: Array, window: tuple[float, float, float, float]) -> Array:
     """A convex polygon cut to a window x0, y0, x1, y1 (Sutherland and Hodgman, 1974)."""
     x0, y0, x1, y1 = window
     for axis, limit, sign in ((0, x0, 1.0), (0, x1, -1.0), (1, y0, 1.0), (1, y1, -1.0)):
