@@ -63,9 +63,9 @@ EFFECTS = "the effects"
 class _WithEffects(argparse.HelpFormatter):
     def add_text(self, text: str | None) -> None:
         if text == EFFECTS:
-            from physid_drake.effects import CATALOGUE  # noqa: PLC0415
+            from physid_drake.effects import known_effects  # noqa: PLC0415
 
-            names = ", ".join(sorted(kind.name for kind in CATALOGUE))
+            names = ", ".join(sorted(kind.name for kind in known_effects()))
             text = f"effects: {names}. What each one is: docs/effects.md"
         super().add_text(text)
 

@@ -16,7 +16,7 @@ from physid_drake.cell import Body, CellConfig
 from physid_drake.cell.checks import MOST_CELLS, check_config
 from physid_drake.cell.config import ContactConfig, SolverConfig
 from physid_drake.cell.solid import solid_of
-from physid_drake.effects import OF_MODELS, Effect, effect_named
+from physid_drake.effects import Effect, effect_named, of_models
 from physid_drake.effects.unnamed import FRICTIONS, OVER_PLACES, UnnamedForce
 from physid_drake.errors import CellError, ConfigError, PhysidError, RecordingError
 from physid_drake.model import AS_W, COMPLETE, FORMAT, SHAPES, Correlation, Model
@@ -210,7 +210,7 @@ def _effects(found: Any) -> tuple[Effect, ...]:
 
 
 def _effect(content: Mapping[str, Any]) -> Effect:
-    kind = effect_named(_text("effects.name", _given(content, "name", "effects.")), OF_MODELS)
+    kind = effect_named(_text("effects.name", _given(content, "name", "effects.")), of_models())
     nulls, ranges = {f.name: f.default for f in dc.fields(kind)}, kind.ranges()
     place = f"effects.{kind.name}"
     parameters: dict[str, Any] = {}

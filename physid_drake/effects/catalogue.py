@@ -1,8 +1,15 @@
-"""The catalogue: every effect that a diagnosis knows. A new effect is one class and one line here."""
+"""The catalogue: every effect that a diagnosis knows, those of this package and of others that are installed.
+
+A new effect here is one class and one line; a package of one's own names its effects in the entry point group
+``physid_drake.effects``.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Final
 
 from physid_drake.effects.body import ComOffset, Restitution, RotationalInertia, SizeError, UnevenSupport
 from physid_drake.effects.drag import QuadraticDrag, RollingResistance, ViscousDrag
@@ -21,26 +28,68 @@ from physid_drake.effects.liquid import Sloshing
 from physid_drake.effects.tracker import TrackerBias, TrackerLatency, TrackerScale
 from physid_drake.effects.unnamed import UnnamedForce
 from physid_drake.errors import ConfigError
-from physid_drake.wording import named
+from physid_drake.wording import named, one_line, shown
 
-CATALOGUE: tuple[type[Effect], ...] = (
+SHIPPED: tuple[type[Effect], ...] = (
     StribeckFriction, ViscousDrag, QuadraticDrag, AnisotropicTable, AnisotropicObject, FrictionPatch,
     FrictionGradient, FrictionDrift, TableTilt, UnevenSupport, ComOffset, RotationalInertia, Sloshing,
     RollingResistance, Tether, Magnet, Restitution, HandCompliance, ActuatorLag, HandOffset, TrackerLatency,
     TrackerBias, TrackerScale, SizeError,
 )  # fmt: skip
+"""The effects of this package."""
+GROUP: Final = "physid_drake.effects"
+"""Of entry points, each of which is an effect or an iterable of effects."""
 
 
-OF_MODELS = (*CATALOGUE, UnnamedForce)
-"""What a model may hold."""
+@cache
+def known_effects() -> tuple[type[Effect], ...]:
+    """The effects that ship, and then those of installed packages, by the names of their entry points.
+
+    Raises:
+        ConfigError: if an entry point cannot be imported, is no effect, or has the name of another one.
+    """
+    known = list(SHIPPED)
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: (entry.name, entry.value)):
+        for kind in _effects_of(entry):
+            if any(other.name == kind.name for other in known):
+                raise ConfigError(f"effect '{named(kind.name)}' of {entry.value}: there is one of this name already.")
+            known.append(kind)
+    return tuple(known)
 
 
-def effect_named(name: str, among: Sequence[type[Effect]] = CATALOGUE) -> type[Effect]:
+def of_models() -> tuple[type[Effect], ...]:
+    """What a model may hold."""
+    return (*known_effects(), UnnamedForce)
+
+
+def _effects_of(entry: EntryPoint) -> tuple[type[Effect], ...]:
+    """What an entry point names.
+
+    Raises:
+        ConfigError: if that is no effect.
+    """
+    try:
+        found = entry.load()
+        kinds = (found,) if isinstance(found, type) else tuple(found)
+    except Exception as error:  # whatever a package of somebody else raises
+        raise ConfigError(f"effects of {entry.value}: {type(error).__name__}: {one_line(error)}.") from error
+    for kind in kinds:
+        if not (isinstance(kind, type) and issubclass(kind, Effect) and hasattr(kind, "name")):
+            raise ConfigError(f"effects of {entry.value}: {shown(kind)} is no class of physid_drake.effects.Effect.")
+    return kinds
+
+
+def effect_named(name: str, among: Sequence[type[Effect]] | None = None) -> type[Effect]:
     """The effect of a name.
+
+    Args:
+        name: of the effect.
+        among: which; None for the catalogue.
 
     Raises:
         ConfigError: if there is none.
     """
+    among = known_effects() if among is None else among
     for kind in among:
         if kind.name == name:
             return kind
@@ -54,7 +103,7 @@ def applicable(around: Surroundings, names: Sequence[str] | None = None) -> tupl
         ConfigError: if a name is unknown, or none of those named can be in it.
     """
     kinds: Iterable[type[Effect]] = (
-        CATALOGUE if names is None else [effect_named(name) for name in dict.fromkeys(names)]
+        known_effects() if names is None else [effect_named(name) for name in dict.fromkeys(names)]
     )
     found = tuple(kind for kind in kinds if kind.applies(around))
     if names and not found:

@@ -15,7 +15,7 @@ from physid_drake.cell.forces import FrictionLaw, Frictions
 from physid_drake.cell.soft_tip import Mount
 from physid_drake.cell.solid import Solid
 from physid_drake.cell.support import PressureGrid
-from physid_drake.effects.catalogue import CATALOGUE
+from physid_drake.effects.catalogue import known_effects
 from physid_drake.effects.effect import Effect, Pose, PushFacts
 from physid_drake.recording import Cylinder, Shape
 
@@ -138,7 +138,7 @@ def true_pose(effects: Sequence[Effect], pose: Pose) -> Pose:
 
 def _as_listed(effects: Sequence[Effect]) -> list[Effect]:
     """Effects in the order of the catalogue: a frame is beside the centre before its place is measured wrongly."""
-    order = {kind: k for k, kind in enumerate(CATALOGUE)}
+    order = {kind: k for k, kind in enumerate(known_effects())}
     return sorted(effects, key=lambda effect: order.get(type(effect), len(order)))
 
 

@@ -10,7 +10,7 @@ from twin import SIGMA, body_of, rms
 
 from physid_drake.cell import Cell, CellConfig, ContactConfig, SolverConfig
 from physid_drake.cell.solid import solid_of
-from physid_drake.effects import CATALOGUE
+from physid_drake.effects import SHIPPED
 from physid_drake.effects.pulse import Pulse
 from physid_drake.effects.rollout import geometry_with, roll, tracked
 from physid_drake.errors import CellError
@@ -30,7 +30,7 @@ FURTHEST = {
     "tether": 0.2, "restitution": 0.2, "actuator_lag": 0.2, "hand_compliance": 0.15, "friction_patch": 0.15,
 }  # fmt: skip
 
-planar = [kind for kind in CATALOGUE if not rolls_for(kind)]
+planar = [kind for kind in SHIPPED if not rolls_for(kind)]
 
 
 @cache

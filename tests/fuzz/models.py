@@ -13,7 +13,7 @@ from fuzz import seeds
 from fuzz.case import Case, WrongError
 from fuzz.damage import damaged, replaced
 from fuzz.trees import mutated, yaml_text
-from physid_drake.effects.catalogue import CATALOGUE
+from physid_drake.effects.catalogue import SHIPPED
 from physid_drake.model_reading import load_model
 from physid_drake.run_plan import _read
 
@@ -43,7 +43,7 @@ def make(rng: Random, folder: Path) -> Case:
 
     tree = {**seeds.model(), "object": dict(rng.choice(SHAPES))}
     if rng.random() < 0.5:
-        tree["effects"] = [_effect(kind) for kind in rng.sample(CATALOGUE, rng.choice((1, 2)))]
+        tree["effects"] = [_effect(kind) for kind in rng.sample(SHIPPED, rng.choice((1, 2)))]
         tree["intervals"] = {}
     if rng.random() < 0.3:
         names = ["theta.support_friction", "theta.hand_friction"]
