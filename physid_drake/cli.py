@@ -311,10 +311,13 @@ def _register_experiment(subparsers: Subparsers) -> None:
         description="Repeat an experiment of the paper, with MuJoCo worlds in the place of its robot.",
         epilog="motion_prediction: how well identified frictions predict pushes. mit_pushes: the same on MIT's "
         "recorded pushes. push_direction: directions that bring an object to a goal. push_speed: speeds that let it "
-        "slide there. next_push: whether the push that is offered tells rivals apart.",
+        "slide there. next_push: whether the push that is offered tells rivals apart. corrected_plan: what a plan "
+        "gains by the effects that a diagnosis found.",
     )  # fmt: skip
     parser.add_argument(
-        "name", metavar="NAME", help="motion_prediction, mit_pushes, push_direction, push_speed or next_push"
+        "name",
+        metavar="NAME",
+        help="motion_prediction, mit_pushes, push_direction, push_speed, next_push or corrected_plan",
     )
     parser.add_argument("--quick", action="store_true", help="small sizes: two or three minutes")
     parser.add_argument("--data", type=path, metavar="FOLDER", help="of mit_pushes: the published end points")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from physid_drake.errors import ConfigError
+from physid_drake.experiments.corrected_plan import CorrectedPlans
 from physid_drake.experiments.mit_pushes import OTHERS, WHERE, MitPushes
 from physid_drake.experiments.motion_prediction import MotionPrediction
 from physid_drake.experiments.next_push import NextPush
@@ -62,12 +63,19 @@ def _next_push(wish: Wish) -> Experiment:
     return NextPush(seed=wish.seed)
 
 
+def _corrected_plan(wish: Wish) -> Experiment:
+    if wish.quick:
+        return CorrectedPlans(seed=wish.seed, repetitions=3, budget=24)
+    return CorrectedPlans(seed=wish.seed)
+
+
 EXPERIMENTS: Final[Mapping[str, Callable[[Wish], Experiment]]] = {
     "motion_prediction": _motion_prediction,
     "mit_pushes": _mit_pushes,
     "push_direction": _push_direction,
     "push_speed": _push_speed,
     "next_push": _next_push,
+    "corrected_plan": _corrected_plan,
 }
 
 

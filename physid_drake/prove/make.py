@@ -75,6 +75,16 @@ class Assignment:
     notched: bool = False
 
 
+@dataclass(frozen=True, kw_only=True)
+class DrawnWorld:
+    """What a world is made of: what it was to be, its scene, its effects, and the size of each [sigmas]."""
+
+    chosen: Assignment
+    scene: Scene
+    effects: tuple[Effect, ...]
+    sizes: tuple[float, ...]
+
+
 def assign(index: int, seed: int, kind: Kind | None = None, effect: str | None = None) -> Assignment:
     """The mix: a quarter nothing, half one effect of the catalogue in turn, the rest others and pairs.
 
@@ -123,6 +133,19 @@ def make_world(
         effect: name of the effect; None: in turn.
         name: of the world, on which nothing else depends; None: by its seed.
     """
+    drawn, rng = draw_world(index, seed, kind, effect)
+    scene, effects = drawn.scene, drawn.effects
+    motions = simulate(scene, effects)
+    size = _difference(scene, motions, simulate(scene, ())) if effects else 0.0
+    name = name_by_seed(index, seed) if name is None else name
+    pushes = [record(rng, scene, k, motion) for k, motion in enumerate(motions)]
+    recording = recording_of(name, scene, [push for push, _ in pushes], _lags(effects))
+    truth = _truth(drawn, seed, size, motions, [poses for _, poses in pushes])
+    return recording, {"id": name, "held_out_floor": _floor(scene, effects, recording)} | truth
+
+
+def draw_world(index: int, seed: int, kind: Kind | None = None, effect: str | None = None) -> tuple[DrawnWorld, Rng]:
+    """The world that ``make_world`` records, and what draws the noise of its recording; arguments as of that."""
     chosen = assign(index, seed, kind, effect)
     for attempt in range(_ATTEMPTS):
         rng = np.random.default_rng([seed, index, 4, attempt])
@@ -130,13 +153,7 @@ def make_world(
         effects, sizes = _draw_effects(rng, scene, chosen.effects)
         if all(size >= SMALLEST_SIZE for size in sizes) and _loaded(scene, effects) and stands(scene, effects):
             break
-    motions = simulate(scene, effects)
-    size = _difference(scene, motions, simulate(scene, ())) if effects else 0.0
-    name = name_by_seed(index, seed) if name is None else name
-    pushes = [record(rng, scene, k, motion) for k, motion in enumerate(motions)]
-    recording = recording_of(name, scene, [push for push, _ in pushes], _lags(effects))
-    truth = _truth(chosen, seed, scene, effects, sizes, size, motions, [poses for _, poses in pushes])
-    return recording, {"id": name, "held_out_floor": _floor(scene, effects, recording)} | truth
+    return DrawnWorld(chosen=chosen, scene=scene, effects=tuple(effects), sizes=tuple(sizes)), rng
 
 
 def _floor(scene: Scene, effects: Sequence[Effect], recording: Recording) -> dict[str, float]:
@@ -246,23 +263,16 @@ def _padded(poses: Array, length: int) -> Array:
 
 
 def _truth(
-    chosen: Assignment,
-    seed: int,
-    scene: Scene,
-    effects: Sequence[Effect],
-    sizes: Sequence[float],
-    size: float,
-    motions: Sequence[Motion],
-    poses: Sequence[Array],
+    drawn: DrawnWorld, seed: int, size: float, motions: Sequence[Motion], poses: Sequence[Array]
 ) -> dict[str, object]:
-    plan, noise = scene.plan, scene.noise
+    scene, plan, noise = drawn.scene, drawn.scene.plan, drawn.scene.noise
     return {
         "seed": seed,
-        "index": chosen.index,
-        "kind": chosen.kind,
+        "index": drawn.chosen.index,
+        "kind": drawn.chosen.kind,
         "effects": [
             {"name": effect.name, "parameters": parameters_of(effect), "calibrated_size_sigma": part}
-            for effect, part in zip(effects, sizes, strict=True)
+            for effect, part in zip(drawn.effects, drawn.sizes, strict=True)
         ],
         "size_sigma": size,
         "theta": {
