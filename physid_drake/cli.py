@@ -312,7 +312,7 @@ def _register_experiment(subparsers: Subparsers) -> None:
         epilog="motion_prediction: how well identified frictions predict pushes. mit_pushes: the same on MIT's "
         "recorded pushes. push_direction: directions that bring an object to a goal. push_speed: speeds that let it "
         "slide there. next_push: whether the push that is offered tells rivals apart. corrected_plan: what a plan "
-        "gains by the effects that a diagnosis found.",
+        "gains by the effects that a diagnosis found. closed_loop: several pushes to a goal, seen and learned from.",
     )  # fmt: skip
     parser.add_argument(
         "name",

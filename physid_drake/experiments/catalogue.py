@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from physid_drake.errors import ConfigError
+from physid_drake.experiments.closed_loop import ClosedLoops
 from physid_drake.experiments.corrected_plan import CorrectedPlans
 from physid_drake.experiments.mit_pushes import OTHERS, WHERE, MitPushes
 from physid_drake.experiments.motion_prediction import MotionPrediction
@@ -63,6 +64,12 @@ def _next_push(wish: Wish) -> Experiment:
     return NextPush(seed=wish.seed)
 
 
+def _closed_loop(wish: Wish) -> Experiment:
+    if wish.quick:
+        return ClosedLoops(seed=wish.seed, repetitions=2, budget=24)
+    return ClosedLoops(seed=wish.seed)
+
+
 def _corrected_plan(wish: Wish) -> Experiment:
     if wish.quick:
         return CorrectedPlans(seed=wish.seed, repetitions=3, budget=24)
@@ -76,6 +83,7 @@ EXPERIMENTS: Final[Mapping[str, Callable[[Wish], Experiment]]] = {
     "push_speed": _push_speed,
     "next_push": _next_push,
     "corrected_plan": _corrected_plan,
+    "closed_loop": _closed_loop,
 }
 
 

@@ -94,8 +94,12 @@ class HiddenRobot:
         x, y, yaw = (np.array(self._pose) + self._rng.standard_normal(3) * self._sensors.object_std).tolist()
         return x, y, yaw
 
-    def execute(self, push: PlannedPush) -> Push:
-        """Make a push aimed at where the object is seen, and record it until the object rests.
+    def execute(self, push: PlannedPush, *, aim: Pose | None = None) -> Push:
+        """Make a push, and record it until the object rests.
+
+        Args:
+            push: to make.
+            aim: where the hand takes the object to be; None for where it is seen.
 
         Raises:
             RobotError: if the object is lost.
@@ -103,7 +107,7 @@ class HiddenRobot:
         """
         if self.lost:
             raise RobotError("hidden world: the object was lost in the last push; put it back first.")
-        path = push.path(self.see(), solid_of(self.world.shape).outline, self.world.tip_radius)
+        path = push.path(aim or self.see(), solid_of(self.world.shape).outline, self.world.tip_radius)
         factor = max(0.5, 1.0 + self._scatter * float(self._rng.standard_normal()))
         motion = self._simulation.run(
             self._pose, WorldPath(times=path.times, start=path.start, velocities=path.velocities),

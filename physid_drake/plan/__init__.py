@@ -1,10 +1,16 @@
 """A story: a model and a goal in, the best push out. The same search as the identification's, over a policy."""
 
+from physid_drake.plan.closed_loop import Step as Step
+from physid_drake.plan.closed_loop import Task as Task
+from physid_drake.plan.closed_loop import closed_loop as closed_loop
+from physid_drake.plan.closed_loop import open_loop as open_loop
 from physid_drake.plan.config import PlanConfig as PlanConfig
 from physid_drake.plan.costs import Cost as Cost
 from physid_drake.plan.costs import DistanceToGoal as DistanceToGoal
 from physid_drake.plan.costs import InsideRegion as InsideRegion
 from physid_drake.plan.costs import WithinDisc as WithinDisc
+from physid_drake.plan.learning import MadePush as MadePush
+from physid_drake.plan.learning import learned as learned
 from physid_drake.plan.robot import Robot as Robot
 from physid_drake.plan.robot import SimulatedRobot as SimulatedRobot
 from physid_drake.plan.story import Hindsight as Hindsight

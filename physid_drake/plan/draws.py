@@ -91,20 +91,20 @@ def draws_of(
     sobol = qmc.Sobol(len(names) + 4, scramble=True, seed=rng).random_base2(max(1, math.ceil(math.log2(count))))
     scores = stats.norm.ppf(np.clip(sobol[:count], 1e-6, 1.0 - 1e-6))
     tied = np.eye(len(names)) if model.correlation is None else model.correlation.among(names)
-    estimates = np.clip(scores[:, :-4] @ _root(tied), -FURTHEST, FURTHEST)
+    estimates = np.clip(scores[:, :-4] @ root_of(tied), -FURTHEST, FURTHEST)
     own = np.clip(scores[:, -4:], -FURTHEST, FURTHEST)
     departures = friction_scatter * stats.t.ppf(stats.norm.cdf(own[:, 0]), scatter_freedom)
     starts = np.array(situation.start) + own[:, 1:] * situation.start_std
     return tuple(
         Draw(
-            model=_moved(model, dict(zip(names, row, strict=True)), float(departure)),
+            model=moved(model, dict(zip(names, row, strict=True)), float(departure)),
             situation=dc.replace(situation, start=(float(x), float(y), float(yaw))),
         )
         for row, departure, (x, y, yaw) in zip(estimates, departures, starts, strict=True)
     )
 
 
-def _root(correlation: Array) -> Array:
+def root_of(correlation: Array) -> Array:
     """The symmetric root (n, n) of a correlation, which need not be regular."""
     values, vectors = np.linalg.eigh(correlation)
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
@@ -126,8 +126,36 @@ def _interval(name: str, interval: Any) -> tuple[float, float] | None:
     return low, high
 
 
-def _moved(model: Model, scores: dict[str, float], scatter: float) -> Model:
-    """The model with every uncertain value moved by its score, in standard deviations."""
+def value_of(model: Model, name: str) -> float:
+    """A value that has an interval, by the interval's name.
+
+    Raises:
+        ConfigError: if the model has no such value.
+    """
+    owner, _, parameter = name.partition(".")
+    if owner != "theta":
+        for effect in model.effects:
+            if effect.name == owner and hasattr(effect, parameter):
+                return float(getattr(effect, parameter))
+    elif parameter in ("com_x", "com_y"):
+        return float(model.body.p_BBcm["xy".index(parameter[-1])])
+    else:
+        cells = friction_names((model.config.friction_cells[0], model.config.friction_cells[1]))
+        if parameter in cells:
+            return float(model.body.support_friction[cells.index(parameter)])
+        if parameter in RANGES:
+            return float(getattr(model.body, parameter))
+    raise ConfigError(f"model: the interval '{name}' belongs to no parameter.")
+
+
+def moved(model: Model, scores: dict[str, float], scatter: float) -> Model:
+    """The model with every uncertain value moved by its score, in standard deviations.
+
+    Args:
+        model: with intervals.
+        scores: by the intervals' names.
+        scatter: of this push's support friction, over that of theta [-].
+    """
     body, effects = model.body, {e.name: e for e in model.effects}
     for name, score in scores.items():
         owner, _, parameter = name.partition(".")

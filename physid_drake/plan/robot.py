@@ -28,8 +28,8 @@ class Robot(Protocol):
         """Where the object stands: x, y [m], yaw [rad]."""
         ...
 
-    def execute(self, push: PlannedPush) -> Push:
-        """Make one push and record it."""
+    def execute(self, push: PlannedPush, *, aim: Pose | None = None) -> Push:
+        """Make one push and record it; ``aim``: where the hand takes the object to be, None for where it is seen."""
         ...
 
 
@@ -61,8 +61,12 @@ class SimulatedRobot:
         x, y, yaw = np.array(self._pose) + self._rng.standard_normal(3) * self._sensors.object_std
         return float(x), float(y), float(yaw)
 
-    def execute(self, push: PlannedPush) -> Push:
+    def execute(self, push: PlannedPush, *, aim: Pose | None = None) -> Push:
         """Push, record at 100 Hz until the object has rested for 0.2 s, and leave the object there.
+
+        Args:
+            push: to make.
+            aim: where the hand takes the object to be; None for where it is seen.
 
         Raises:
             RobotError: if the push before lost the object, or the rollout diverges.
@@ -70,7 +74,7 @@ class SimulatedRobot:
         if self.ending not in (Ending.AT_REST, Ending.MOVING):
             raise RobotError(f"robot: the object {self.ending.value} in the last push; put it back first.")
         situation = Situation(start=self._pose, order=self._pushes)
-        path = path_of(self._hidden.plain(), push, self.see())
+        path = path_of(self._hidden.plain(), push, aim or self.see())
         trajectory = trajectory_of(self._hidden, (push,), situation, path=path, rate=RATE)
         if trajectory.ending is Ending.DIVERGED:
             raise RobotError("robot: the hidden world's rollout diverged.")

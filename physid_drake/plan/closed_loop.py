@@ -1,0 +1,123 @@
+"""Several pushes to a goal: after each one the object is seen, the belief updated, and the next push planned."""
+
+from __future__ import annotations
+
+import dataclasses as dc
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from physid_drake.model import Model
+from physid_drake.plan.costs import DistanceToGoal
+from physid_drake.plan.learning import MadePush, learned
+from physid_drake.plan.robot import Robot
+from physid_drake.plan.story import TOLERANCE, Plan, plan
+from physid_drake.plan.task import NEAREST, policy_for
+from physid_drake.plan.trajectory import Situation, path_of
+
+Point = tuple[float, float]
+Pose = tuple[float, float, float]
+
+
+@dc.dataclass(frozen=True, kw_only=True)
+class Task:
+    """What several pushes are for.
+
+    Attributes:
+        goal: x, y [m].
+        pushes: at most.
+        tolerance: within which the object is left where it is [m].
+        policy: a name in ``policies.POLICIES``, of one push.
+        budget: settings that each plan tries.
+        noise: of the tracker, standard deviations of x, y [m] and yaw [rad].
+        friction_scatter: of one push's support friction [-].
+        order: pushes that were made before the first.
+    """
+
+    goal: Point
+    pushes: int = 3
+    tolerance: float = 0.5 * TOLERANCE
+    policy: str = "push"
+    budget: int = 48
+    noise: Pose = (0.0, 0.0, 0.0)
+    friction_scatter: float = 0.0
+    order: int = 0
+
+
+@dc.dataclass(frozen=True, kw_only=True, eq=False)
+class Step:
+    """One push of several.
+
+    Attributes:
+        plan: of it; None where the object was left where it was.
+        seen: where the object was seen after it.
+        miss: of the goal, as seen [m].
+        model: what is known after it.
+    """
+
+    plan: Plan | None
+    seen: Pose
+    miss: float
+    model: Model
+
+
+def closed_loop(model: Model, robot: Robot, task: Task, rng: np.random.Generator) -> Iterator[Step]:
+    """Push, see, learn and plan again, until the object is within the tolerance or all pushes are made.
+
+    Args:
+        model: with its intervals, which are the belief.
+        robot: sees the object and pushes it.
+        task: what for.
+        rng: of the plans.
+
+    Raises:
+        RobotError: if the robot cannot push.
+    """
+    seen = robot.see()
+    for number in range(task.pushes):
+        if _miss(seen, task) <= max(task.tolerance, NEAREST):
+            return
+        made = _planned(model, seen, task, rng, number)
+        push = made.policy.pushes(made.settings)[0]
+        path = path_of(model, push, seen)
+        robot.execute(push, aim=seen)
+        before, seen = seen, robot.see()
+        one = MadePush(
+            planned=push, path=path, situation=Situation(start=before, order=task.order + number), end=seen
+        )
+        model = learned(model, one, noise=task.noise, friction_scatter=task.friction_scatter)
+        yield Step(plan=made, seen=seen, miss=_miss(seen, task), model=model)
+
+
+def open_loop(model: Model, robot: Robot, task: Task, rng: np.random.Generator) -> Iterator[Step]:
+    """The same pushes without looking: each begins where the model thinks that the last one ended.
+
+    Arguments as of ``closed_loop``. The first push is planned to the goal, and so is every other one: of a model that
+    thinks that it is there already, the object is left where it is.
+
+    Raises:
+        RobotError: if the robot cannot push.
+    """
+    thought = robot.see()
+    for number in range(task.pushes):
+        made = None
+        if _miss(thought, task) > max(task.tolerance, NEAREST):
+            made = _planned(model, thought, task, rng, number)
+            robot.execute(made.policy.pushes(made.settings)[0], aim=thought)
+            x, y, yaw = made.predicted.end.tolist()
+            thought = (x, y, yaw)
+        seen = robot.see()
+        yield Step(plan=made, seen=seen, miss=_miss(seen, task), model=model)
+
+
+def _planned(model: Model, pose: Pose, task: Task, rng: np.random.Generator, number: int) -> Plan:
+    return plan(
+        model, policy_for(task.policy, model, pose, task.goal), DistanceToGoal(goal=task.goal),
+        situation=Situation(start=pose, order=task.order + number), rng=rng, budget=task.budget, draws=0, sweep=0,
+        tolerance=task.tolerance,
+    )  # fmt: skip
+
+
+def _miss(pose: Pose, task: Task) -> float:
+    return math.hypot(pose[0] - task.goal[0], pose[1] - task.goal[1])
