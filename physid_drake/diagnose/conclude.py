@@ -47,6 +47,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
             known=case.noise.known,
             quieter=quieter_by(before, plain.degrees),
             fewest=FEWEST_PUSHES if len(case.problems) < FEWEST_PUSHES else None,
+            rare=found.rare,
         ),
         p_value=p_value_of(evidence, alpha),
         alpha=alpha,

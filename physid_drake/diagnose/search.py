@@ -64,7 +64,8 @@ class Found:
         linearly: what each effect gains by these columns, its best push not counted, by its name [nats].
         p_value: that the best gain of the catalogue over the baseline is chance.
         by_chance: (r,) the same in replicates of this recording in which the baseline is true, by name.
-        odd: whether the p-value is below what was asked for, or friction scatters by much.
+        rare: whether the p-value is below what was asked for.
+        odd: whether that is so, or friction scatters by much.
         named: hypotheses of the catalogue, best first; empty where none was looked for.
         left: that the best gain of the catalogue over the first of them is chance; 1 where none was looked for.
         left_gain: that gain, linearly [nats].
@@ -78,6 +79,7 @@ class Found:
     linearly: dict[str, float]
     p_value: float
     by_chance: dict[str, Array]
+    rare: bool
     odd: bool
     named: tuple[Weighed, ...] = ()
     left: float = 1.0
@@ -139,7 +141,7 @@ class _Search:
         p = p_value(seen, by_chance)
         return Found(
             fitter=fitter, plain=plain, alike=_alike(fitter, plain), columns=tuple(found), linearly=seen, p_value=p,
-            by_chance=by_chance, odd=p < self._alpha or plain.scatter > ODD_SCATTER,
+            by_chance=by_chance, rare=p < self._alpha, odd=p < self._alpha or plain.scatter > ODD_SCATTER,
         )  # fmt: skip
 
     def with_singles(self, found: Found) -> Found:

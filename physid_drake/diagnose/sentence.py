@@ -7,9 +7,11 @@ from collections.abc import Sequence
 from physid_drake.diagnose.values import EffectFinding, Partly
 
 
-def _nothing_found(verdict: str, *, fewest: int | None, known: bool, quieter: float | None) -> str:
+def _nothing_found(verdict: str, *, fewest: int | None, known: bool, quieter: float | None, rare: bool) -> str:
     if verdict == "underpowered" and fewest is not None:
         return f"These pushes cannot tell: it takes at least {fewest} to say what is missing."
+    if verdict == "underpowered" and rare:
+        return "These pushes cannot tell: something may be missing, but those that were left out confirm no effect."
     if verdict == "underpowered":
         return "These pushes cannot tell: an effect would have to be large to show in them."
     if not known:
@@ -34,6 +36,7 @@ def sentence(
     fewest: int | None = None,
     known: bool = True,
     quieter: float | None = None,
+    rare: bool = False,
 ) -> str:
     """The verdict in words.
 
@@ -45,10 +48,11 @@ def sentence(
         fewest: pushes that it takes to say anything; None where there are as many.
         known: whether the noise was stated or seen.
         quieter: how many times the noise is larger than what the plain cell leaves, where it is far larger.
+        rare: whether the baseline leaves so much by chance more seldom than was asked for.
     """
     match verdict:
         case "consistent" | "underpowered":
-            return _nothing_found(verdict, fewest=fewest, known=known, quieter=quieter)
+            return _nothing_found(verdict, fewest=fewest, known=known, quieter=quieter, rare=rare)
         case "unexplained" if partly is not None:
             return (
                 "Simulation and recording differ, and nothing in the catalogue accounts for all of it:"

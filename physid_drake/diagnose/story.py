@@ -6,7 +6,7 @@ import dataclasses as dc
 from collections.abc import Sequence
 
 from physid_drake.diagnose.conclude import conclude
-from physid_drake.diagnose.decide import Decision, decided, is_own_error, kinds_of, loudest
+from physid_drake.diagnose.decide import FEWEST_PUSHES, Decision, decided, is_own_error, kinds_of, loudest
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.hypotheses import freed
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
@@ -80,7 +80,7 @@ def gathered(
     decision = decided(found, most=loudest(case.noise))
     tick("what was found, in the Drake cell", 0, 0)
     judge = Judge(known.finder)
-    if decision.verdict != "underpowered" and is_own_error(accuracy_of(case, before)):
+    if len(case.problems) >= FEWEST_PUSHES and is_own_error(accuracy_of(case, before)):
         decision = Decision(verdict="consistent")
     best = None if decision.best is None else judge.judged(freed(found.fitter, decision.best.fit))
     after = before if best is None else judge.left_out(best)

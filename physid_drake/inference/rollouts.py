@@ -22,7 +22,7 @@ from physid_drake.pushes.problem import PushProblem, turned_as_recorded
 from physid_drake.pushes.rollouts import RolloutPool
 from physid_drake.pushes.task import Task
 from physid_drake.twin.twin import STEADY, Trace, Twin, TwinPush, Wander
-from physid_drake.twin.with_effects import as_reported, push_with
+from physid_drake.twin.with_effects import as_reported, knows, push_with
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -86,8 +86,9 @@ class Rollouts:
     def predictions(self, asks: Sequence[Ask]) -> list[Prediction | None]:
         """What each rollout says; None of one that cannot be made."""
         answers: list[Prediction | None] = [None] * len(asks)
-        of_cell = [k for k, ask in enumerate(asks) if ask.push in self.by_cell]
-        of_twin = [k for k, ask in enumerate(asks) if ask.push not in self.by_cell]
+        foreign = {id(p) for p in {id(ask.physics): ask.physics for ask in asks}.values() if not knows(p.effects)}
+        of_cell = [k for k, ask in enumerate(asks) if ask.push in self.by_cell or id(ask.physics) in foreign]
+        of_twin = sorted(set(range(len(asks))) - set(of_cell))
         for first in range(0, len(of_twin), TOGETHER):
             some = of_twin[first : first + TOGETHER]
             for k, answer in zip(some, self._by_twin([asks[k] for k in some]), strict=True):

@@ -52,10 +52,8 @@ def push_with(
     if path is not None:
         for effect in present:
             path = effect.hand(path, facts)
-    asked = [*(law for effect in present for law in effect.laws(facts)), *frictions_of(present, facts)]
-    laws = [law for law in asked if isinstance(law, VOCABULARY)]
-    swings = [law for law in asked if isinstance(law, Swing)]
-    if len(laws) + len(swings) < len(asked) or len(swings) > 1:
+    laws, swings, others = _laws(present, facts)
+    if others or len(swings) > 1:
         return None
     height = contact_height(twin.solid, plain, push.hand_height)
     return TwinPush(
@@ -63,6 +61,20 @@ def push_with(
         times=times - lateness_of(present), hand_height=height, laws=laws,
         swing=swings[0] if swings else None, mount=mount_of(present, facts),
     )  # fmt: skip
+
+
+def knows(effects: Sequence[Effect]) -> bool:
+    """Whether all laws of some effects are of the twin's vocabulary: else it is the cell that rolls them out."""
+    facts = PushFacts(order=0, mass=1.0, polar=1e-3, region=EVERYWHERE, hand_axes=np.eye(2))
+    return not _laws([effect for effect in effects if not effect.is_null], facts)[2]
+
+
+def _laws(effects: Sequence[Effect], facts: PushFacts) -> tuple[list[Law], list[Swing], int]:
+    """Laws of the vocabulary, what swings, and how many are neither."""
+    asked = [*(law for effect in effects for law in effect.laws(facts)), *frictions_of(effects, facts)]
+    laws = [law for law in asked if isinstance(law, VOCABULARY)]
+    swings = [law for law in asked if isinstance(law, Swing)]
+    return laws, swings, len(asked) - len(laws) - len(swings)
 
 
 def as_reported(trace: Trace, effects: Sequence[Effect]) -> Trace:

@@ -28,10 +28,11 @@ def hypothesis(*kinds, gain, loudness=1.0, alike=0.5):
     return Weighed(fit=fit, gains=np.broadcast_to(gain, (PUSHES,)).astype(float), alike=alike)
 
 
-def found(*named, unnamed=(), odd=True, left=0.5, left_gain=20.0, plain=1.0, alike=0.5, pushes=PUSHES):
+def found(*named, unnamed=(), odd=True, left=0.5, left_gain=20.0, plain=1.0, alike=0.5, pushes=PUSHES,
+          rare=False):  # fmt: skip
     return Found(
         fitter=None, plain=SimpleNamespace(pushes=range(pushes), loudness=plain), alike=alike,
-        columns=(), linearly={}, p_value=1e-6, odd=odd,
+        columns=(), linearly={}, p_value=1e-6, odd=odd, rare=rare,
         by_chance=BY_CHANCE, named=tuple(sorted(named, key=lambda one: -one.gain)), left=left,
         left_gain=left_gain, unnamed=tuple(unnamed),
     )  # fmt: skip
@@ -52,6 +53,12 @@ def test_what_one_push_alone_says_is_nothing():
     alone[3] = 1200.0
     assert not surely_better(alone)
     assert said(hypothesis(TableTilt, gain=alone)).verdict == "consistent"
+
+
+def test_what_chance_seldom_leaves_and_no_push_confirms_cannot_be_told():
+    """It was called consistent beside a p-value that says the opposite."""
+    assert said(hypothesis(TableTilt, gain=0.3 * MUCH), rare=True).verdict == "underpowered"
+    assert said(hypothesis(TableTilt, gain=2.0 * MUCH), rare=True).verdict == "explained"
 
 
 @pytest.mark.parametrize(("odd", "gain"), [(False, MUCH), (True, 0.3 * MUCH)])

@@ -8,7 +8,7 @@ from bare_laws import BareLaws
 from runs import coarse_identifier, shipped_pushes
 
 from physid_drake.cell import CellConfig, ContactConfig
-from physid_drake.effects.drag import RollingResistance, ViscousDrag
+from physid_drake.effects.drag import ViscousDrag
 from physid_drake.effects.tracker import TrackerLatency
 from physid_drake.identify import SearchConfig
 from physid_drake.inference.rollouts import Ask, Physics, Rollouts
@@ -65,13 +65,20 @@ def test_turns_are_those_of_the_recording(case):
     assert turned.poses[:, 2] == pytest.approx(seen.poses[:, 2] + 4.0 * np.pi)
 
 
-def test_what_the_twin_does_not_know_is_left_to_the_cell(case):
+def test_what_the_twin_does_not_know_is_the_cells(case):
+    """As of an effect of one's own, whose law is Python: found by nobody where such rollouts failed."""
+    known, unknown = asks_of(case), asks_of(case, UNKNOWN)
+    made = rollouts_of(case)
+    one, other = made.predictions([unknown[0], known[0]])
+    assert np.array_equal(one.poses, made.in_cell(case.pool).predictions(unknown[:1])[0].poses)
+    assert np.array_equal(other.poses, made.predictions(known[:1])[0].poses)
+    assert np.abs(one.poses[-1] - other.poses[-1]).max() > 1e-3
+
+
+def test_what_the_twin_cannot_do_is_said(case):
     spec, known = case.pool.spec, asks_of(case)
-    unknown = asks_of(case, UNKNOWN)
-    assert rollouts_of(case).predictions([unknown[0], known[0]])[0] is None
     rolls = replace(spec, shape=Cylinder(radius=0.03, length=0.1, axis="y"))
-    asks = [known[0], *asks_of(case, RollingResistance(coefficient=1e-3))]
-    assert rollouts_of(case, rolls).predictions(asks) == [None] * 4
+    assert rollouts_of(case, rolls).predictions(known) == [None] * 3
     place = case.problems[0].start.pose
     small = replace(spec, table=((place[0] - 0.1, place[1] - 0.1), (place[0] + 0.1, place[1] + 0.1)))
     assert rollouts_of(case, small).predictions(known[:1]) == [None]  # it comes to the edge
