@@ -340,7 +340,10 @@ def _run_experiment(arguments: argparse.Namespace) -> int:
 
 
 def _register_model(subparsers: Subparsers) -> None:
-    parser = subparsers.add_parser("model", help="take a model to a simulation of your own")
+    parser = subparsers.add_parser(
+        "model", help="take a model to a simulation of your own",
+        description="Take the model that a run or a diagnosis leaves to a simulation of your own.",
+    )  # fmt: skip
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)
     export = actions.add_parser(
         "export", help="SDFormat, model directives and MJCF",
