@@ -127,8 +127,8 @@ class ClosedLoops:
                 f" ({self.budget} settings tried for each). Open loop: each push begins where the model thinks that"
                 " the last one ended. Closed loop: the object is seen, theta's belief is updated and the next push"
                 " planned with it; within 5 mm of the goal it is left there. In the closed loop of the hidden robot"
-                f" the median error of support friction is {before:.1f} % before the first push and {after:.1f} % after"
-                " the last one."
+                f" the median error of support friction is {before:.1f} % before the first push and {after:.1f} %"
+                " after the last one."
             ),
             tables=(
                 Table(

@@ -13,6 +13,8 @@ import pytest
 from physid_drake.cli import main
 from physid_drake.errors import ConfigError, OutputError
 from physid_drake.experiments.catalogue import EXPERIMENTS, Wish, experiment_named
+from physid_drake.experiments.closed_loop import HIDDEN, SIMULATED, ClosedLoops
+from physid_drake.experiments.corrected_plan import CorrectedPlans
 from physid_drake.experiments.learning import GREEDY, LEAST_SQUARES, METHODS, RANDOM, search_trials
 from physid_drake.experiments.mit_pushes import counts, pressed
 from physid_drake.experiments.repetitions import claim, run_all
@@ -212,7 +214,7 @@ def test_every_quick_experiment_is_smaller_than_the_full_one():
     for name in EXPERIMENTS:
         if name != "mit_pushes":
             full, quick = (experiment_named(name, Wish(seed=0, quick=q, pushes=None)) for q in (False, True))
-            assert quick.repetitions < full.repetitions == 10
+            assert quick.repetitions < full.repetitions == (40 if name == "corrected_plan" else 10)
 
 
 def test_the_pressure_family_is_even_at_zero_and_grows_to_the_rim():
@@ -226,3 +228,42 @@ def test_the_pressure_family_is_even_at_zero_and_grows_to_the_rim():
 def test_predictions_are_tested_at_the_whole_budget():
     assert counts(16) == [4, 8, 16]
     assert counts(6) == [4, 6]
+
+
+def missed(effect, named, baseline, corrected):
+    return {
+        "effect": [effect], "named": named, "verdict": "explained" if named else "consistent", "size_sigma": 5.0,
+        "baseline": {"miss_mm": baseline}, "corrected": {"miss_mm": corrected},
+    }  # fmt: skip
+
+
+def test_corrected_plans_are_told_apart_by_what_was_named():
+    records = [
+        missed("magnet", ["magnet"], 20.0, 4.0),
+        missed("tether", [], 9.0, 9.0),
+        missed("sloshing", ["sloshing"], 6.0, 8.0),
+    ]
+    misses, summary = CorrectedPlans(seed=0).result(records).tables
+    assert [row[:2] for row in misses.rows] == [
+        ("magnet", "magnet"),
+        ("sloshing", "sloshing"),
+        ("tether", "consistent"),
+    ]
+    assert [(row[0], row[1], row[-1]) for row in summary.rows] == [
+        ("all worlds", 3, "1 of 3"), ("the effect was named, alone", 2, "1 of 2"), ("another answer", 1, "0 of 1"),
+    ]  # fmt: skip
+    assert summary.rows[1][2:4] == (13.0, 6.0)  # medians
+
+
+def test_closed_loops_are_misses_by_push_for_both_robots():
+    loops = {
+        "open loop": {"mm": [10.0, 8.0, 8.0], "friction": 0.3},
+        "closed loop": {"mm": [10.0, 2.0, 1.0], "friction": 0.22},
+    }
+    record = {"truth": 0.2, "believed": 0.25, SIMULATED: loops, HIDDEN: loops}
+    result = ClosedLoops(seed=0).result([record, record])
+    assert [row[:4] for row in result.tables[0].rows[3:6]] == [
+        (SIMULATED, "closed loop", k + 1, mm) for k, mm in enumerate((10.0, 2.0, 1.0))
+    ]
+    assert "25.0 % before the first push and 10.0 % after" in result.setting
+    assert [panel.title for panel in result.panels] == [SIMULATED, HIDDEN]
