@@ -12,10 +12,15 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
+from runs import shipped_pushes
 
 from physid_drake.cell import CellConfig, Start
 from physid_drake.cli import main
+from physid_drake.export import exported as exported_files
+from physid_drake.model import Model
 from physid_drake.policies import PlannedPush
+from physid_drake.pushes.case import case_of
+from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import Cylinder, Prism
 from physid_drake.recording.outlines import polygon_centroid
 
@@ -57,7 +62,7 @@ def rolled_out(model, cell, push):
     return path, motion.planar_at(np.array([SECONDS]))[0]
 
 
-def in_own_plant(out, path, start=START):
+def in_own_plant(out, path, start=START, *, begin=0.0, seconds=SECONDS, height=HEIGHT):
     """Planar end (3,) of the exported scene in a plant that this test makes."""
     builder = DiagramBuilder()
     plant, _ = AddMultibodyPlant(
@@ -71,8 +76,8 @@ def in_own_plant(out, path, start=START):
     parser.package_map().AddPackageXml(str(out / "package.xml"))
     parser.AddModels(str(out / "scene.dmd.yaml"))
     plant.Finalize()
-    times = np.linspace(0.0, SECONDS, 3000)
-    places = np.column_stack([path.positions(times), np.full(len(times), HEIGHT)])
+    times = np.linspace(0.0, seconds, 3000)
+    places = np.column_stack([path.positions(begin + times), np.full(len(times), height)])
     wanted = builder.AddSystem(TrajectorySource(PiecewisePolynomial.FirstOrderHold(times, places.T), 1))
     hand = plant.GetModelInstanceByName("hand")
     builder.Connect(wanted.get_output_port(), plant.get_desired_state_input_port(hand))
@@ -84,7 +89,7 @@ def in_own_plant(out, path, start=START):
     X_WB = RigidTransform(RotationMatrix.MakeZRotation(start[2]), [*start[:2], rest.translation()[2]])
     plant.SetFreeBodyPose(context, body, X_WB)
     plant.SetPositions(context, hand, places[0])
-    simulator.AdvanceTo(SECONDS)
+    simulator.AdvanceTo(seconds)
     X_WB = plant.GetFreeBodyPose(context, body)
     return np.array([*X_WB.translation()[:2], X_WB.rotation().ToRollPitchYaw().yaw_angle()])
 
@@ -115,6 +120,32 @@ def test_drakes_parser_gives_the_push_of_the_cell(exported, push):
     got = in_own_plant(out, path)
     assert np.hypot(*(want[:2] - START[:2])) > 0.03
     assert np.hypot(*(got - want)[:2]) < 1e-3 and abs(got[2] - want[2]) < 0.03  # measured: 0.5 mm, 1.1 degrees
+
+
+@pytest.mark.slow
+def test_a_recorded_push_ends_where_it_was_recorded(tmp_path):
+    """Of the eraser, whose truth is known: the median of three pushes within a millimetre and a degree."""
+    recording = shipped_pushes(3)
+    case = case_of(recording, CellConfig(), ThetaConfig(nominal={"hand_friction": 0.22, "support_friction": 0.27}))
+    body = case.thetas.body(case.thetas.space.nominal)
+    spec = case.pool.spec
+    model = Model(
+        recording="eraser", shape=spec.shape, hand_radius=spec.hand_radius, table=spec.table, config=spec.config,
+        body=body,
+    )  # fmt: skip
+    for name, text in exported_files(model).items():
+        (tmp_path / name).write_text(text)
+    misses = []
+    for problem in case.problems:
+        begin, end = float(problem.times[0]), problem.poses[-1]
+        got = in_own_plant(
+            tmp_path, problem.path, problem.start.pose, begin=begin, seconds=float(problem.times[-1]) - begin,
+            height=problem.hand_height,
+        )  # fmt: skip
+        misses.append([np.hypot(*(got - end)[:2]), abs(np.angle(np.exp(1j * (got[2] - end[2]))))])
+        assert np.hypot(*(end[:2] - problem.start.pose[:2])) > 0.02
+    position, rotation = np.median(misses, axis=0)
+    assert position < 1e-3 and rotation < np.radians(1.0)
 
 
 @pytest.mark.parametrize("push", PUSHES)
