@@ -2,7 +2,7 @@
 
 Six pushes of a box in the planar integrator of the tests, 0.06 to 0.57 m/s, without an effect, and with a friction
 that does not scatter. They are sampled, rounded, stamped and cut as people's recordings are, written and read back,
-and the plain cell is fitted to them as a diagnosis does it. What costs much more than the plain
+and the baseline model is fitted to them as a diagnosis does it. What costs much more than the plain
 style (0.3 mm, 3 mrad, a hand of 0.1 mm, 100 Hz), also with what the hand's path and the cell itself may be off by,
 would be called missing physics.
 """
@@ -170,7 +170,7 @@ def rounded(values, step):
 
 
 def row(name, style, jobs):
-    """What the plain cell leaves, without and with its guard, its friction, and what is said of the recording."""
+    """What the baseline model leaves, without and with its guard, its friction, and what is said of the recording."""
     with tempfile.TemporaryDirectory() as folder:
         write_recording(recorded(style), Path(folder) / "styles")
         recording = read_recording(Path(folder) / "styles")

@@ -105,7 +105,7 @@ class Model:
         table: (2, 2) lower and upper corner of the table top [m].
         config: of the cell.
         body: theta.
-        effects: physics beyond the plain cell.
+        effects: physics beyond the baseline model.
         intervals: 90 % intervals as they were found, by ``theta.<name>`` and ``<effect>.<parameter>``.
         correlation: of what has an interval of two numbers; None where it is not known.
         hand_axes: (2, 2) the axes of P, as columns, along x and y of W, if all pushes had about the same.

@@ -86,7 +86,7 @@ def _parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     parser.add_argument("--seed", type=int, metavar="N", help="of everything random, instead of the scenario's")
     parser.add_argument("--set", dest="override", metavar="YAML", help="such as '{search: {budget: 20}}'")
-    parser.add_argument("--no-diagnosis", action="store_true", help="identify and plan with the plain cell only")
+    parser.add_argument("--no-diagnosis", action="store_true", help="identify and plan with the baseline model only")
     parser.add_argument("--no-plan", action="store_true", help="plan no push")
     parser.add_argument("--no-view", action="store_true", help="serve no live Meshcat while working")
     parser.add_argument(
@@ -235,7 +235,7 @@ class Work:
         return examined, plan, self._hindsight
 
     def model(self, examined: Examined) -> Model:
-        """What a plan is made with: the plain cell, or what the diagnosis leaves."""
+        """What a plan is made with: the baseline model, or what the diagnosis leaves."""
         if examined.evidence is not None:
             return model_of(examined.evidence)
         case = examined.known.case
@@ -264,7 +264,7 @@ class Work:
         return Examined(known=evidence.known, diagnosis=diagnosis, evidence=evidence)
 
     def _planned(self, planner: Planner, examined: Examined, bar: Progress) -> Plan:
-        """The plan with the model that leaves; what the plain cell's would have been, where that is another."""
+        """The plan with the model that leaves; what the baseline model's would have been, where that is another."""
         model, evidence, diagnosis = self.model(examined), examined.evidence, examined.diagnosis
         fit = examined.known.fit if evidence is None else evidence.leaving
         scatter, pushes = UNIT_SCATTER * fit.scatter, len(fit.pushes)

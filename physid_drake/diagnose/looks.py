@@ -1,8 +1,8 @@
 """Where a missing wrench lives: in which frame it is constant, on what it depends, in which phase it acts.
 
 Every look is a pattern of a wrench over all windows of all pushes, and is judged like an effect: by what it explains
-of what the plain cell leaves, theta and the pushes' own unknowns projected out. Sign flips of whole pushes say how
-much the best of all looks explains by chance.
+of what the baseline model leaves, theta and the pushes' own unknowns projected out. Sign flips of whole pushes say
+how much the best of all looks explains by chance.
 """
 
 from __future__ import annotations

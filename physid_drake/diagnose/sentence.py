@@ -16,15 +16,15 @@ def _nothing_found(verdict: str, *, fewest: int | None, known: bool, quieter: fl
         return "These pushes cannot tell: an effect would have to be large to show in them."
     if not known:
         return (
-            "The plain cell explains these pushes as far as they tell: their noise, which nobody states and no rest"
-            " shows, is taken to be as large as what it leaves."
+            "The baseline model explains these pushes as far as they tell: their noise, which nobody states and no"
+            " rest shows, is taken to be as large as what it leaves."
         )
     if quieter is not None:
         return (
-            "The plain cell explains these pushes as far as they tell: the noise that counts, stated or seen, is"
+            "The baseline model explains these pushes as far as they tell: the noise that counts, stated or seen, is"
             f" {quieter:,.0f} times what is left, and nothing smaller than it can be seen."
         )
-    return "The plain cell explains these pushes: nothing is missing that they could show."
+    return "The baseline model explains these pushes: nothing is missing that they could show."
 
 
 def sentence(
@@ -44,10 +44,10 @@ def sentence(
         verdict: as in ``diagnosis.json``.
         findings: the effects that are named.
         partly: what takes a good part of a mismatch away, if something does.
-        better: whether a model without a name predicts pushes better than the plain cell.
+        better: whether a model without a name predicts pushes better than the baseline model.
         fewest: pushes that it takes to say anything; None where there are as many.
         known: whether the noise was stated or seen.
-        quieter: how many times the noise is larger than what the plain cell leaves, where it is far larger.
+        quieter: how many times the noise is larger than what the baseline model leaves, where it is far larger.
         rare: whether the baseline leaves so much by chance more seldom than was asked for.
     """
     match verdict:

@@ -105,7 +105,7 @@ class RegimeGain:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class FitQuality:
-    """How well pushes are predicted that were left out of the fit, by the plain cell and with what was found.
+    """How well pushes are predicted that were left out of the fit, by the baseline model and with what was found.
 
     Attributes:
         rms_before, rms_after: root mean square errors, in standard deviations of the measurement.
@@ -141,7 +141,7 @@ class ThetaEstimate:
         unit: of the value.
         ci90: 90 % interval; None where there is no value.
         identifiable: whether these pushes tell it.
-        before: the plain cell's estimate; its prior's where these pushes cannot tell it.
+        before: the baseline model's estimate; its prior's where these pushes cannot tell it.
     """
 
     value: float | None
@@ -234,7 +234,7 @@ class Diagnosis:
         recording: its name.
         verdict: ``consistent``, ``explained``, ``ambiguous``, ``unexplained`` or ``underpowered``.
         sentence: the verdict for a person.
-        p_value: of the plain cell: that noise and scatter alone would leave as much; 1 where there is hardly any
+        p_value: of the baseline model: that noise and scatter alone would leave as much; 1 where there is hardly any
             noise, and no more is left than the cell's own error.
         alpha: false-alarm rate that was asked for.
         effects: that were found, in the order in which they were; empty unless explained or ambiguous.
@@ -282,7 +282,7 @@ class Diagnosis:
 
     @property
     def with_it(self) -> str | None:
-        """In words, what the model that leaves has beside the plain cell; None where nothing."""
+        """In words, what the model that leaves has beside the baseline model; None where nothing."""
         if self.effects:
             return "with what is missing"
         return None if self.fit.rms_after == self.fit.rms_before else "with a force without a name"

@@ -1,4 +1,4 @@
-"""The catalogue of effects: physics that the plain cell leaves out, each at the seams of the rollout."""
+"""The catalogue of effects: physics that the baseline model leaves out, each at the seams of the rollout."""
 
 from physid_drake.effects.catalogue import (
     GROUP,

@@ -214,7 +214,7 @@ def _reached(cell: Cell, motion: Motion, region: Array) -> Array:
 def _region(cell: Cell, body: Body, push: Rollout, effects: Sequence[Effect]) -> Array:
     """Lower and upper corner (2, 2) of where the object's points may come [m].
 
-    Several effects carry it further than the plain cell would: beyond a tilt or a bounce there may be a patch.
+    Several effects carry it further than the baseline model would: beyond a tilt or a bounce there may be a patch.
     """
     places = np.array([push.start.pose[:2]])
     speed = float(np.hypot(*push.start.velocity[:2]))

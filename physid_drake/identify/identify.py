@@ -29,7 +29,7 @@ from physid_drake.search import SearchResult
 
 Array = NDArray[np.float64]
 
-EXPLAINED = 1.5  # reduced chi-square below which the plain cell leaves no more than noise and its own error
+EXPLAINED = 1.5  # reduced chi-square below which the baseline model leaves no more than noise and its own error
 MOST_SCATTER = 0.08  # of friction from push to push: pushes that differ by more differ in something that is left out
 
 
@@ -145,12 +145,12 @@ class Identification:
 
     @property
     def explains(self) -> bool:
-        """Whether the plain cell explains the pushes to their noise, with frictions that hardly differ."""
+        """Whether the baseline model explains the pushes to their noise, with frictions that hardly differ."""
         return self.reduced_chi2 < EXPLAINED and not self.by_frictions
 
     @property
     def by_frictions(self) -> bool:
-        """Whether frictions that differ from push to push took up what the plain cell leaves."""
+        """Whether frictions that differ from push to push took up what the baseline model leaves."""
         return self.friction_scatter > MOST_SCATTER
 
     @property

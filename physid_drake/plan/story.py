@@ -257,7 +257,7 @@ def caveat_of(verdict: str, alike: Mapping[str, Sequence[str]]) -> str:
         unsure = "; nor ".join(f"{name} from {' or '.join(others)}" for name, others in rivals.items())
         return f"these pushes cannot tell {unsure}, which may move the object elsewhere"
     if verdict == "unexplained":
-        return "the plain cell does not account for the recorded pushes, and this is its plan: it may not hold"
+        return "the baseline model does not account for the recorded pushes, and this is its plan: it may not hold"
     return ""
 
 

@@ -218,7 +218,7 @@ def planner_of(config: PlanConfig, spec: CellSpec, problems: Sequence[PushProble
 
 
 def identified_model(result: Identification, spec: CellSpec, name: str, *, hand: HandUse = UNKNOWN_HAND) -> Model:
-    """The plain cell with the identified theta, its intervals and how they vary together.
+    """The baseline model with the identified theta, its intervals and how they vary together.
 
     Args:
         result: the identification.

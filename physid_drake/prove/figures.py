@@ -131,7 +131,7 @@ class Figures:
         theta_error, theta_coverage: the same of friction and mass, in worlds of which the right thing was said.
         held_out: per kind of world; ``effect`` where it is clear and named rightly.
         held_out_ratio: each world's error after over that of the true world, which is told the start exactly: of
-            ``none``, the plain cell's where it is not called wrong, and of ``effect`` as above.
+            ``none``, the baseline model's where it is not called wrong, and of ``effect`` as above.
         reliability: stated probabilities against what came true.
         brier: mean square of probability minus what came true; nan without names.
         confusion: counts of (truth, said).

@@ -62,7 +62,7 @@ class RealOutcome:
         skipped: why nothing was diagnosed, or why the diagnosis failed; None where it was.
         verdict: of the diagnosis.
         classes: per finding, its name and those it cannot be told from.
-        chi2: reduced chi-square of the plain cell, and after.
+        chi2: reduced chi-square of the baseline model, and after.
         position: held-out errors [m], before and after.
         rotation: held-out errors [rad], before and after.
         force: held-out errors of the hand's force [N], before and after; NaN where none was compared.

@@ -74,7 +74,7 @@ class Scene:
     """A world without effects, and how it is recorded.
 
     Attributes:
-        plan: the plain cell.
+        plan: the baseline model.
         pushes: in order.
         noise: of the sensors.
         rate: of samples [Hz].

@@ -51,7 +51,7 @@ class SprungTip:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """A world before it is built; its defaults are the plain cell.
+    """A world before it is built; its defaults are the baseline model.
 
     Attributes:
         shape: of the object, standing on the table.

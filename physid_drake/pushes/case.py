@@ -140,7 +140,7 @@ def case_of(
     Args:
         recording: the pushes.
         config: of the cell.
-        theta: the plain cell's unknowns.
+        theta: the baseline model's unknowns.
         jobs: processes; 0 takes the machine's cores.
         most: pushes to look at; of more, so many are taken at equal distances.
 

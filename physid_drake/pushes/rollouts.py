@@ -38,7 +38,7 @@ def cell_of(spec: CellSpec, geometry: Geometry | None = None) -> Cell:
     """This process's cell for a spec, built at the first call.
 
     Args:
-        spec: the plain cell's.
+        spec: the baseline model's.
         geometry: the shape and pressure, where effects change the spec's.
     """
     made = geometry or Geometry(shape=spec.shape)

@@ -53,7 +53,7 @@ class TrackerNoise:
         correlation_time: of first-order autoregressive noise, position and rotation (2,) [s]; 0 is white.
         jitter: standard deviation of the time stamps [s], as far as moving samples show more noise than resting ones.
         stated: whether the recording states the standard deviations, and they are believed.
-        known: whether they were stated or seen; if not, what the plain cell leaves has to serve.
+        known: whether they were stated or seen; if not, what the baseline model leaves has to serve.
         doubt: standard deviation of the logarithm of the variance [-], 0 where it is stated.
         forces: of the hand's force.
         warnings: what was found to contradict the recording.
@@ -78,7 +78,7 @@ class TrackerNoise:
         """The same noise, ``factor`` times as large, and perhaps another one of the forces; it says so."""
         position, rotation = factor * self.position, factor * self.rotation
         said = (
-            f"{UNKNOWN}: the object's noise is taken to be what the plain cell leaves,"
+            f"{UNKNOWN}: the object's noise is taken to be what the baseline model leaves,"
             f" {1e3 * position:.2g} mm and {math.degrees(rotation):.2g} deg"
         )
         return dc.replace(

@@ -187,11 +187,11 @@ def fit_table(diagnosis: Diagnosis) -> Table:
 
 
 def held_out_figures(diagnosis: Diagnosis) -> list[tuple[str, list[float]]]:
-    """Errors of pushes left out, of the plain cell and of what was found: mm, deg, N if known, sigmas, misfit."""
+    """Errors of pushes left out, of the baseline model and of what was found: mm, deg, N if known, sigmas, misfit."""
     d, fit = diagnosis, diagnosis.fit
     rows = [
         (
-            "plain cell",
+            "baseline model",
             fit.position_before,
             fit.rotation_before,
             fit.force_before,

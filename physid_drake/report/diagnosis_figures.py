@@ -42,7 +42,7 @@ def views_from_above(view: TableView) -> list[tuple[str, Markup]]:
     box = box_of(view, view.shown)
     alpha = 0.7 if len(view.shown) > MANY_PUSHES else 0.9
     views = []
-    for kind, colour, title in (("before", BEFORE, "plain cell"), ("after", AFTER, "with what is missing")):
+    for kind, colour, title in (("before", BEFORE, "baseline model"), ("after", AFTER, "with what is missing")):
         motions = [push.before if kind == "before" else push.after for push in view.shown]
         if all(m is None for m in motions):
             continue

@@ -66,8 +66,8 @@ BADGES = {
     "underpowered": "#5d6475",
 }
 MEANING = {
-    "consistent": "There is no evidence against the plain cell.",
-    "explained": "One model accounts for what the plain cell leaves.",
+    "consistent": "There is no evidence against the baseline model.",
+    "explained": "One model accounts for what the baseline model leaves.",
     "ambiguous": "More than one effect accounts for these pushes: they are named together, not guessed at.",
     "unexplained": "The mismatch is real, and no effect of the catalogue brings it down to noise.",
     "underpowered": "These pushes are too few, or move too little, to show an effect of ordinary size.",
@@ -108,7 +108,7 @@ def diagnosis_page(
         diagnosis: what to show.
         recording: what it was made from.
         shown: its pushes, in the recording's order.
-        wrenches: what is missing from the plain cell, window by window.
+        wrenches: what is missing from the baseline model, window by window.
         pages: that lie beside this one.
     """
     friction = diagnosis.theta.get("support_friction")

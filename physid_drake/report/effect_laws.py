@@ -55,7 +55,7 @@ def _ticks(view: TableView) -> str:
 
 def _stribeck(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
     mu = view.friction or 1.0
-    up = "friction with the table" if view.friction else "friction over the plain cell's"
+    up = "friction with the table" if view.friction else "friction over the baseline model's"
     figure, axes, speeds = _curve(view, 3.0 * p["speed"], "slip [m/s]", up)
     axes.plot(speeds, mu * (1.0 + p["excess"] * np.exp(-((speeds / p["speed"]) ** 2))), color=AFTER, linewidth=1.8)
     axes.axhline(mu, color=BEFORE, linewidth=1.0, linestyle="--")
@@ -76,7 +76,7 @@ def _drag(power: int) -> _Law:
 
 
 def _ellipse(frame: str) -> _Law:
-    """The limit curve of friction: an ellipse about that of the plain cell, a circle."""
+    """The limit curve of friction: an ellipse about that of the baseline model, a circle."""
 
     def draw(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
         mu = view.friction or 1.0

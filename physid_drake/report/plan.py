@@ -92,7 +92,7 @@ def plan_table(plan: Plan, *, with_effects: Outcome | None = None, hindsight: Hi
 def title_of(plan: Plan) -> str:
     """One line that says what was planned."""
     effects = ", ".join(e.name for e in plan.model.effects)
-    return f"{plan.model.recording}: {plan.policy.name}, {'with ' + effects if effects else 'plain cell'}"
+    return f"{plan.model.recording}: {plan.policy.name}, {'with ' + effects if effects else 'baseline model'}"
 
 
 def plan_rows(
@@ -116,7 +116,7 @@ def plan_rows(
     if with_effects is not None:
         rows.append(("with the effects found", _said(*with_effects)))
     if plan.spread is not None:
-        whose = "" if with_effects is None else ", says the plain model"
+        whose = "" if with_effects is None else ", says the baseline model"
         rows += [(what + whose, value) for what, value in _belief_rows(plan.spread, plan.tolerance)]
     if hindsight is not None and hindsight.plain is not None and hindsight.outcome is not None:
         settings = ", ".join(value for _, value in _settings_rows(hindsight.plain))

@@ -51,12 +51,13 @@ def _change(values: Sequence[float]) -> str:
 
 
 NOTES = (
-    "Held out: pushes of the diagnosis, each predicted while left out of the fit, plain cell to model with what was"
-    " found. Fresh: end points of pushes that the diagnosis did not get. Ellipsoid, 4th order: the publishers' models"
+    "Held out: pushes of the diagnosis, each predicted while left out of the fit, baseline model to model with"
+    " what was found. Fresh: end points of pushes that the diagnosis did not get."
+    " Ellipsoid, 4th order: the publishers' models"
     f" on the diagnosed pushes. Weight near the points: share of the pressure found within {1e3 * NEAR:g} mm of the"
     " points that the object stood on. Mean arm of the weight about the centre of mass: what friction feels of it."
-    " All errors are root mean squares. chi2: over noise, which is taken to be as loud as what the plain cell leaves"
-    " (only the cube's recording shows its own), so that 1 or less does not mean that nothing is missing."
+    " All errors are root mean squares. chi2: over noise, which is taken to be as loud as what the baseline model"
+    " leaves (only the cube's recording shows its own), so that 1 or less does not mean that nothing is missing."
 )
 
 

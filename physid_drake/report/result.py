@@ -27,7 +27,7 @@ def result_json(examined: Examined, recording: Recording, seed: int, versions: d
     """The result as JSON text; the same recording, configuration and seed give the same bytes.
 
     Theta is that of the model that leaves, with the effects that were found where some were; ``baseline`` is there
-    then, too, and has what the plain cell had.
+    then, too, and has what the baseline model had.
 
     Args:
         examined: what was identified, and diagnosed if it was.
@@ -78,7 +78,7 @@ def _theta(estimates: Sequence[Estimate]) -> dict[str, Any]:
 
 
 def _baseline(known: Identification) -> dict[str, Any]:
-    """What the plain cell had, where effects were found beside it."""
+    """What the baseline model had, where effects were found beside it."""
     return {
         "theta": _theta(known.estimates), "held_out": _numbers(known.after), "reduced_chi2": known.reduced_chi2,
         "friction_scatter": known.friction_scatter,

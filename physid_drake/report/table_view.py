@@ -30,7 +30,7 @@ class ShownPush:
         name: of the push.
         times: (n,) [s].
         recorded: (n, 3) x, y [m], yaw [rad].
-        before: (n, 3) predicted by the plain cell.
+        before: (n, 3) predicted by the baseline model.
         after: (n, 3) predicted with what is missing, None where nothing was found.
         released: when the hand lets go [s], None where it is not known.
     """

@@ -56,24 +56,24 @@ def accuracy_cells(accuracy: Accuracy) -> list[str]:
 
 
 def verdict(result: Identification) -> str:
-    """In one sentence, how well the plain cell explains the pushes."""
+    """In one sentence, how well the baseline model explains the pushes."""
     chi2 = result.reduced_chi2
     quieter = quieter_by(chi2, result.degrees) if chi2 < FAR_BELOW else None
     if quieter is not None:
         return (
-            f"The plain cell leaves far less than the noise that counts (reduced chi-square {chi2:.2g}, 1 expected):"
-            f" that is {quieter:,.0f} times what is left, and nothing smaller than it can be seen. Is it stated too"
-            " large (sensors of recording.yaml)?"
+            f"The baseline model leaves far less than the noise that counts (reduced chi-square {chi2:.2g}, 1"
+            f" expected): that is {quieter:,.0f} times what is left, and nothing smaller than it can be seen. Is it"
+            " stated too large (sensors of recording.yaml)?"
         )
     if result.explains:
-        return f"The plain cell explains these pushes to their noise (reduced chi-square {chi2:.2f})."
+        return f"The baseline model explains these pushes to their noise (reduced chi-square {chi2:.2f})."
     if result.reduced_chi2 < EXPLAINED:
         scatter = 100.0 * result.friction_scatter
         return (
-            f"The plain cell does not explain these pushes: it leaves no more than their noise (reduced chi-square"
-            f" {chi2:.2f}), but with frictions that differ by {scatter:.0f} % from push to push."
+            f"The baseline model does not explain these pushes: it leaves no more than their noise (reduced"
+            f" chi-square {chi2:.2f}), but with frictions that differ by {scatter:.0f} % from push to push."
         )
     return (
-        f"The plain cell does not explain these pushes to their noise (reduced chi-square {chi2:.2f}, 1 expected): "
-        "the intervals are widened for it, and some physics or a sensor's figure is missing."
+        f"The baseline model does not explain these pushes to their noise (reduced chi-square {chi2:.2f}, 1"
+        " expected): the intervals are widened for it, and some physics or a sensor's figure is missing."
     )

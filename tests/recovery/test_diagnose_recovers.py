@@ -133,7 +133,7 @@ def test_a_noise_that_nothing_tells_is_what_the_plain_cell_leaves():
     assert diagnosis.verdict in ("consistent", "underpowered")
     # Two poses a push tell a noise of 0.3 mm to a few tens of percent.
     assert 0.15e-3 < evidence.case.noise.position < 1.2e-3
-    assert any("what the plain cell leaves" in warning for warning in diagnosis.warnings)
+    assert any("what the baseline model leaves" in warning for warning in diagnosis.warnings)
 
 
 def test_where_no_noise_is_known_an_effect_is_found_by_the_quiet_that_it_leaves():
@@ -149,7 +149,7 @@ def test_where_no_noise_is_known_an_effect_is_found_by_the_quiet_that_it_leaves(
 
 
 def test_a_tracker_far_quieter_than_the_misfit_does_not_spoil_the_plain_cell(monkeypatch):
-    """Slides on a leaning table, seen to 0.02 mm: the plain cell predicts as least squares do."""
+    """Slides on a leaning table, seen to 0.02 mm: the baseline model predicts as least squares do."""
     monkeypatch.setattr(worlds, "POSITION_STD", 2e-5)
     monkeypatch.setattr(worlds, "ROTATION_STD", 2e-4)
     heading = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)

@@ -317,7 +317,9 @@ def test_a_ratio_near_one_is_told_from_one(value, others, said):
 
 @pytest.mark.parametrize("known", [True, False])
 def test_where_nobody_knows_the_noise_the_captions_say_so(known):
-    warnings = () if known else (f"{UNKNOWN}: the object's noise is taken to be what the plain cell leaves, 2 mm",)
+    warnings = (
+        () if known else (f"{UNKNOWN}: the object's noise is taken to be what the baseline model leaves, 2 mm",)
+    )
     text = diagnosis_page(diagnosis_with(warnings=warnings), recording_of(), shown_pushes(), WRENCHES)
     assert ("1 is noise alone" in text) is known
     assert ("as loud as what" in text) is not known

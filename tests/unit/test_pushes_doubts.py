@@ -199,7 +199,7 @@ def test_pushes_that_fit_by_frictions_alone_are_not_said_to_be_explained():
     told = SimpleNamespace(reduced_chi2=1.1, explains=False, friction_scatter=0.14)
     assert "frictions that differ by 14 %" in verdict(told)
     told.explains = True
-    assert verdict(told).startswith("The plain cell explains")
+    assert verdict(told).startswith("The baseline model explains")
 
 
 def _boxes_obj(*boxes):

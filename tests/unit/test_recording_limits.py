@@ -96,7 +96,7 @@ def test_a_force_out_of_all_proportion_is_refused_by_row_and_column(tmp_path):
      ("force_std", 200.0, "N")],
 )  # fmt: skip
 def test_a_noise_that_no_sensor_of_pushes_has_is_refused(sensor, std, unit):
-    """0.3 mm stated as 300 mm made the plain cell explain everything."""
+    """0.3 mm stated as 300 mm made the baseline model explain everything."""
     with pytest.raises(
         RecordingError, match=f"{sensor}.* one standard deviation, but got {std:g} {unit}; is it in {unit}"
     ):

@@ -55,7 +55,7 @@ class Moment:
 
 
 class Effect:
-    """One piece of physics or of the sensors that the plain cell leaves out. What is not overridden does nothing."""
+    """Physics, or a fault of a sensor, that the baseline model leaves out. What is not overridden does nothing."""
 
     name: ClassVar[str]
     strengths: ClassVar[tuple[str, ...]] = ()
