@@ -12,7 +12,6 @@ from physid_drake.report.pages import SCENE, nav
 from physid_drake.report.stage import (
     ARROW,
     BASELINE,
-    CAMERA,
     COLOURS,
     CORRECTED,
     LOUDEST,
@@ -21,6 +20,7 @@ from physid_drake.report.stage import (
     Act,
     Setting,
     Stage,
+    view_of,
 )
 
 _TEMPLATE = Path(__file__).with_name("scene_page.html")
@@ -49,14 +49,16 @@ def scene_page(
     """
     stage = Stage(setting)
     marks = stage.play(acts, unit_force or 1.0)
+    target, offset = view_of(acts)
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     kinds = [kind for kind in (BASELINE, CORRECTED) if kind in setting.shapes]
     words = {BASELINE: "baseline model", CORRECTED: corrected}
     panel = environment.from_string(_TEMPLATE.read_text("utf-8")).render(
         name=name, title=f"{name}: in 3D", lines=lines, marks=marks, starts=[start for _, start in marks],
-        both=len(kinds) == 2, camera=CAMERA, switches=_switches(setting, acts), notes=_notes(acts, unit_force),
+        both=len(kinds) == 2, camera=offset.tolist(), switches=_switches(setting, acts),
+        notes=_notes(acts, unit_force),
         models=[(kind, _css(COLOURS[kind]), words[kind]) for kind in kinds], nav=nav(SCENE, pages),
-        place=next(iter(acts[0].bodies.values())).poses[0, 4:6].tolist(),
+        place=target.tolist(),
     )  # fmt: skip
     html: str = stage.meshcat.StaticHtml()
     body_end = html.rindex("</body>")

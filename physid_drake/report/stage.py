@@ -64,6 +64,7 @@ SCALES: Final[Mapping[str, float]] = {BASELINE: 0.985, CORRECTED: 1.0, RECORDED:
 LIFT = 1.5e-3  # m above the table, of what is painted on it
 FRAMES_PER_SECOND = 32.0
 CAMERA = (-0.12, -0.34, 0.25)  # m beside what it looks at
+NEAR = 0.3  # m: ways that go so far are seen from there
 PAUSE = 0.4  # s between two pushes
 LONGEST = 60.0  # s of the whole animation; longer recordings are shown faster
 
@@ -149,12 +150,11 @@ class Stage:
             self._add_object(kind, solid)
         if setting.hand is not None:
             self._add_hand(setting.hand)
-        self._look(np.zeros(2))
 
     def show_start(self, act: Act) -> None:
         """Show an act's first moment, before anything is known."""
         self._stand(act, act.begin, None)
-        self._look(next(iter(act.bodies.values())).poses[0, 4:6])
+        self._look([act])
 
     def play(self, acts: Sequence[Act], unit_force: float = 1.0) -> list[tuple[str, float]]:
         """Record all acts one after the other as an animation.
@@ -180,7 +180,8 @@ class Stage:
         self.meshcat.StopRecording()
         self.meshcat.PublishRecording()
         self._stain([wrench for act in acts for wrench in act.missing])
-        self.show_start(acts[0])
+        self._stand(acts[0], acts[0].begin, None)
+        self._look(acts)
         return marks
 
     def _play_one(self, act: Act, clock: float, speed: float) -> float:
@@ -214,10 +215,11 @@ class Stage:
         self._visible[path] = visible
         self.meshcat.SetProperty(path, "visible", visible, clock)
 
-    def _look(self, place: Array) -> None:
-        """From where a person would, at a place (2,) on the table."""
-        centre = np.array([*place, 0.0])
-        self.meshcat.SetCameraPose(centre + np.array(CAMERA), centre)
+    def _look(self, acts: Sequence[Act]) -> None:
+        """From where a person would, at the middle of all ways, and so far off that they are seen."""
+        target, offset = view_of(acts)
+        centre = np.array([*target, 0.0])
+        self.meshcat.SetCameraPose(centre + offset, centre)
 
     def _add_object(self, kind: str, solid: Solid) -> None:
         path, colour = f"bodies/{kind}/here", Rgba(*COLOURS[kind])
@@ -293,6 +295,14 @@ class Stage:
         # A cone's tip is at its origin, its base above it.
         back = RotationMatrix.MakeZRotation(heading) @ RotationMatrix.MakeYRotation(-0.5 * np.pi)
         self.meshcat.SetTransform(f"{path}/head", RigidTransform(back, start + length * ahead))
+
+
+def view_of(acts: Sequence[Act]) -> tuple[Array, Array]:
+    """What the camera looks at, x, y (2,) on the table, and where it is beside that (3,) [m]."""
+    ways = np.vstack([track.poses[:, 4:6] for act in acts for track in act.bodies.values()])
+    low, high = ways.min(axis=0), ways.max(axis=0)
+    away = max(1.0, float((high - low).max()) / NEAR)
+    return 0.5 * (low + high), away * np.array(CAMERA)
 
 
 def _add_table(meshcat: Meshcat, table: Corners) -> None:
