@@ -1,5 +1,6 @@
 """What every command shows in a terminal of 80 columns, read from the screen of a tmux session."""
 
+import json
 import os
 import re
 import shlex
@@ -10,8 +11,10 @@ import time
 from pathlib import Path
 
 import pytest
+from runs import QUICK, write_small
 
 from physid_drake.effects import SHIPPED
+from physid_drake.report.progress import JOB_STAGES as STAGES
 
 TMUX = shutil.which("tmux")
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(TMUX is None, reason="no tmux")]
@@ -25,7 +28,7 @@ class Terminal:
     """A tmux session of 80 columns."""
 
     def __init__(self, folder):
-        self._socket, self._folder = folder / "socket", folder
+        self._socket, self.folder = folder / "socket", folder
         self._call("-f", "/dev/null", "new-session", "-d", "-s", "t", "-x", str(COLUMNS), "-y", "50", "sh")
         self._call("set-option", "-g", "history-limit", "5000")
 
@@ -44,8 +47,8 @@ class Terminal:
         self._call("send-keys", "-t", "t", f"clear; tmux -S {shlex.quote(str(self._socket))} clear-history", "Enter")
         time.sleep(0.5)
         command = shlex.join([sys.executable, "-m", "physid_drake", *words])
-        script = self._folder / "command.sh"
-        script.write_text(f"cd {shlex.quote(str(self._folder))}\n{command}\necho ENDED $?\n")
+        script = self.folder / "command.sh"
+        script.write_text(f"cd {shlex.quote(str(self.folder))}\n{command}\necho ENDED $?\n")
         self._call("send-keys", "-t", "t", f"sh {shlex.quote(str(script))}", "Enter")
 
     def seen(self, *words):
@@ -123,6 +126,41 @@ def test_a_plan_and_an_export_of_what_was_found(terminal):
     shown, status, _ = terminal.seen("model", "export", "found", "--out", "exported")
     assert status == 0 and "anisotropic_table: friction that is no one coefficient" in " ".join(shown.split())
     assert_nothing_is_cut(shown)
+
+
+def test_the_main_job_moves_through_its_stages(terminal):
+    write_small(terminal.folder / "small")
+    words = [
+        "run_cell",
+        "--recording",
+        "small",
+        "--out",
+        "job",
+        "--set",
+        json.dumps(QUICK),
+        "--no-view",
+        "--no-diagnosis",
+    ]
+    shown, status, progress = terminal.seen(*words)
+    assert status == 0
+    assert_nothing_is_cut(shown)
+    assert " ".join(shown.split()).endswith("open job/index.html")
+    assert {"theta", "sweep"} <= {stage for stage in STAGES if any(stage in line for line in progress)}
+
+
+def test_a_log_becomes_a_recording(terminal):
+    rows = [f"{0.01 * k:.2f},{max(0.0, k - 40) * 0.5:.2f},0,0,{k * 0.5 - 90:.2f},0,20" for k in range(160)]
+    (terminal.folder / "log.csv").write_text("\n".join(["t,x,y,yaw,tip x,tip y,tip z", *rows]) + "\n")
+    shown, status, _ = terminal.seen("convert", "table", "log.csv", "--guess", "--map", "map.yaml")
+    assert_nothing_is_cut(shown)
+    assert status == 0 and "map.yaml" in shown
+
+
+def test_a_proof_of_one_world(terminal):
+    shown, status, _ = terminal.seen("prove", "--worlds", "1", "--kind", "none", "--seed", "7", "--out", "proof")
+    assert status == 0, shown
+    assert_nothing_is_cut(shown)
+    assert "proof/index.html" in " ".join(shown.split())
 
 
 def test_what_is_wrong_is_said_in_one_line_that_wraps(terminal):
