@@ -24,6 +24,7 @@ import numpy as np
 from fuzz.case import Case
 from fuzz.judge import Verdict, judged
 from fuzz.watch import Watch, lay_out
+from physid_drake.effects import known_effects
 
 MOST_MEMORY: Final = 2_000_000_000
 """Bytes that the process may have, whatever it is given."""
@@ -37,6 +38,7 @@ def main() -> None:
     faulthandler.enable()
     kinds: list[tuple[str, Maker]] = getattr(import_module(asked["module"]), asked["table"])
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_MEMORY, resource.RLIM_INFINITY))
+    known_effects()  # looks at what is installed, once, before anybody watches what is read
     watch = Watch()
     for index in asked["indices"]:
         kind, make = kinds[index % len(kinds)]

@@ -99,7 +99,7 @@ def test_a_full_disk_is_one_line_and_leaves_no_scraps(command, largest, recordin
     done = faulty(command(recording, out), largest=largest)
     errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
     assert done.returncode == 1 and "Traceback" not in done.stderr
-    page = {run_cell: "index.html", diagnose: "diagnosis.html"}[command]
+    page = {run_cell: "plan.png", diagnose: "diagnosis.html"}[command]  # the first that is too large
     assert len(errors) == 1 and f"{page}': cannot be written: File too large." in errors[0]
     assert not {f".{page}.part", page, LOCK} & {path.name for path in out.iterdir()}
     assert faulty(command(recording, out)).returncode == 0
