@@ -30,7 +30,6 @@ def run_export(arguments: argparse.Namespace) -> int:
         for name, text in files.items():
             folder.write(name, text)
     console = terminal()
-    for line in files["README.txt"].partition("\n\n")[2].strip().splitlines()[-1 - len(model.effects) :]:
-        console.print(line, markup=False)
+    console.print(files["README.txt"].strip().rpartition("\n\n")[2], markup=False)  # what is not in the files
     console.print(f"written: {', '.join(name for name in files if not name.endswith('.obj'))} and meshes in {out}")
     return 0

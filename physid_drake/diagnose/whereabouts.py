@@ -45,7 +45,9 @@ def _headings(headings: Sequence[float]) -> str:
     low, high = (round(math.degrees(mean + edge)) for edge in (min(off), max(off)))
     turn = 360 * math.floor(low / 360)
     low, high = low - turn, high - turn
-    return f"heading {low} degrees" if low == high else f"heading {low} to {high} degrees"
+    if low == high:
+        return f"heading {low} degrees"
+    return f"heading {low} to {high} degrees" if high < 360 else f"heading {low} through 0 to {high - 360} degrees"
 
 
 def _speeds(speeds: Sequence[float]) -> str:

@@ -33,7 +33,7 @@ def exported(model: Model) -> dict[str, str]:
     lines = [f"- {line}" for line in left_out]
     said = "\n".join(["Not in these files:", *lines]) if lines else "All of the model is in these files."
     return {
-        **drake_files(parts, model.recording, model.body.static_ratio),
+        **drake_files(parts, model.body.static_ratio),
         "model.xml": mujoco_file(parts, model.recording),
         "README.txt": README.format(name=model.recording, left_out=said),
     }

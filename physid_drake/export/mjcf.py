@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from physid_drake.cell.diagram import DRIVEN_FREQUENCY, DRIVEN_MASS
 from physid_drake.export.parts import Parts, Tile
 from physid_drake.export.templates import filled
 
@@ -14,8 +15,6 @@ Array = NDArray[np.float64]
 
 FEET = 60  # about: so many carry the underside as if it were whole
 FOOT = 1e-3  # m: radius
-RATE = 1000.0  # rad/s at which the tip follows what is wanted
-MASS = 1.0  # kg of the tip
 
 
 def mujoco_file(parts: Parts, name: str) -> str:
@@ -25,7 +24,7 @@ def mujoco_file(parts: Parts, name: str) -> str:
     touched = ["roller"] if parts.rolls else [f"side_{k}" for k in range(len(parts.sides))]
     return filled("model.xml", {
         "p": parts, "name": name, "feet": feet_of(parts.tiles, parts.area), "touched": touched, "foot": FOOT,
-        "mass": MASS, "rate": RATE, "x": 0.5 * (low[0] + high[0]), "y": 0.5 * (low[1] + high[1]),
+        "mass": DRIVEN_MASS, "rate": DRIVEN_FREQUENCY, "x": 0.5 * (low[0] + high[0]), "y": 0.5 * (low[1] + high[1]),
         "wide": high[0] - low[0], "deep": high[1] - low[1], "long": y1 - y0, "clear": x0 - parts.hand_radius - 0.05,
     })  # fmt: skip
 

@@ -118,6 +118,9 @@ def left_out(model: Model) -> list[str]:
             if missing:
                 lines.append(f"{effect.name}: {', '.join(missing)}{'' if whole else '; its shape and body are in'}")
     body = model.body
+    if solid_of(model.shape).rolling_radius is not None:
+        # One collision geometry meets the table and the hand.
+        lines.append(f"friction {body.hand_friction:.3g} with the hand: what rolls has the table's in SDFormat")
     if body.restitution:
         lines.append(f"restitution {body.restitution:.3g} of the hand's touch")
     if body.static_ratio > 1.0:

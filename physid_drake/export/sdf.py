@@ -12,6 +12,7 @@ from physid_drake.cell.diagram import (
     DRIVEN_FREQUENCY,
     DRIVEN_MASS,
     GRAVITY,
+    TABLE_FRICTION,
     paired_friction,
 )
 from physid_drake.export.parts import TILE, Parts, facets_obj, prism_obj
@@ -22,27 +23,25 @@ FACETS: Final = 60  # about, of the underside
 SINKAGE: Final = 1e-5  # m: how deep the object stands in the table
 SLAB: Final = 0.05  # m: thickness of the table
 HAND_RATE: Final = 1000.0  # rad/s: natural frequency of the object on the tip
-TABLE_FRICTION: Final = 1e6  # Drake takes 2ab/(a + b): so rough that the object's side alone says the friction
 
 
-def drake_files(parts: Parts, name: str, ratio: float) -> dict[str, str]:
+def drake_files(parts: Parts, ratio: float) -> dict[str, str]:
     """``object.sdf``, ``table.sdf``, ``hand.sdf``, ``scene.dmd.yaml``, ``package.xml`` and meshes.
 
     Args:
         parts: of the model.
-        name: of the recording.
         ratio: static over kinetic support friction [-].
     """
     bottom, top = -0.5 * parts.solid.height, 0.5 * parts.solid.height
     meshes = {
-        f"underside_{k}.obj": facets_obj(tile.corners, bottom, math.sqrt(parts.area / FACETS) if parts.tiles else 1.0)
+        f"underside_{k}.obj": facets_obj(tile.corners, bottom, math.sqrt(parts.area / FACETS))
         for k, tile in enumerate(parts.tiles)
     } | {f"side_{k}.obj": prism_obj(side, bottom + TILE, top) for k, side in enumerate(parts.sides)}
     low, high = np.array(parts.table)
     x0, y0, _, y1 = parts.solid.outline.extent()
     weight = GRAVITY * parts.mass
     values = {
-        "p": parts, "name": name, "package": PACKAGE, "rough": f"{TABLE_FRICTION:g}", "ratio": ratio, "slab": SLAB,
+        "p": parts, "package": PACKAGE, "rough": f"{TABLE_FRICTION:g}", "ratio": ratio, "slab": SLAB,
         "tiles": [(f"underside_{k}.obj", paired_friction(t.friction)) for k, t in enumerate(parts.tiles)],
         "sides": [f"side_{k}.obj" for k in range(len(parts.sides))],
         "hand": paired_friction(parts.hand_friction), "roll_friction": paired_friction(parts.friction),

@@ -23,7 +23,7 @@ def _how_sure(d: Diagnosis) -> str:
     if d.verdict == "consistent":
         return f"The baseline model leaves as much as noise does ({p_value}; a mismatch is below {number(d.alpha)})."
     if d.verdict == "underpowered":
-        return f"These pushes show too little to tell ({p_value})."
+        return f"These pushes are too few, or show too little, to tell ({p_value})."
     said = f"That the baseline model is not enough: {p_value}."
     if d.effects:
         names = ", ".join(f"{e.name} {chance(e.probability)}" for e in d.effects)

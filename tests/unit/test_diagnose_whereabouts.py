@@ -25,7 +25,7 @@ def window(push, place=(0.0, 0.0), heading=0.0, speed=0.05):
         ),
         (
             [window(7, (0.12, 0.0), 350.0, 0.2), window(3, (0.1, 0.02), 10.0, 0.04), window(7, (0.11, 0.01), 0.0)],
-            "pushes 003 and 007: around (110, 10) mm, heading 350 to 370 degrees, at 40 to 200 mm/s",
+            "pushes 003 and 007: around (110, 10) mm, heading 350 through 0 to 10 degrees, at 40 to 200 mm/s",
         ),
         (
             [window(1, (-0.1, 0.0), 0.0), window(2, (0.1, 0.3), 120.0), window(4, (0.0, 0.1), 240.0)],
