@@ -104,6 +104,24 @@ def test_ctrl_c_is_behind_what_a_compiled_module_makes_of_it():
     assert not is_interruption(ImportError("no"))
 
 
+def test_ctrl_c_in_a_callback_of_an_import_is_not_lost_and_no_traceback():
+    code = """
+import weakref
+from physid_drake.starting import begin
+class Lock: pass
+def callback(_): raise KeyboardInterrupt
+begin()
+lock = Lock()
+kept = weakref.ref(lock, callback)
+del lock
+import time
+time.sleep(5.0)
+print("went on")
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, text=True, timeout=60)
+    assert (done.stderr.strip(), done.stdout) == ("interrupted", "") and done.returncode != 0
+
+
 @pytest.mark.parametrize("argv", [["-m", "physid_drake.run_cell"], ["-m", "physid_drake", "diagnose", ERASER]])
 def test_ctrl_c_while_a_command_starts_is_one_word(argv, tmp_path):
     for wait in (0.25, 0.6):
