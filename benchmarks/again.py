@@ -16,13 +16,13 @@ from rich.table import Table
 
 from physid_drake.diagnose import diagnose
 from physid_drake.errors import PhysidError
-from physid_drake.prove.diagnosing import RESULT
-from physid_drake.prove.seal import SEALED
 from physid_drake.pushes.case import case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.pushes.rollouts import RolloutPool
 from physid_drake.recording import read_recording
 from physid_drake.report.diagnosis import diagnosis_json
+from physid_drake.validation.sealing.diagnosing import RESULT
+from physid_drake.validation.sealing.seal import SEALED
 
 
 class Stages:

@@ -1,9 +1,9 @@
 """How often the data doctor names a convention that is wrong: conventions.py PROOF [...] [--seed N] [--each K].
 
-PROOF is a folder of ``python -m physid_drake.prove.make``. Every world is examined as it is, where nothing may be
-named, with ``--each`` conventions got wrong one at a time, and with two at once, all drawn by the seed. Named is what
-is wrong, alone or among others that fit alike; of two, one of them is half; another name alone is wrong. A world
-whose effect is a convention itself (a tracker's latency) may be named by it.
+PROOF is a folder of ``python -m physid_drake.validation.worlds.make``. Every world is examined as it is, where
+nothing may be named, with ``--each`` conventions got wrong one at a time, and with two at once, all drawn by the
+seed. Named is what is wrong, alone or among others that fit alike; of two, one of them is half; another name alone is
+wrong. A world whose effect is a convention itself (a tracker's latency) may be named by it.
 """
 
 import argparse

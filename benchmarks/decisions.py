@@ -1,10 +1,11 @@
 """What is decided of opened worlds, and what each constant is worth: decisions.py PROOF [...] [--worlds ID ...].
 
-PROOF is a folder of ``python -m physid_drake.prove.make`` whose truth lies open. For each world: the p-value, what is
-said and whether that is right, the best hypotheses with their gain on held-out pushes in nats, their best push's part
-of it and their loudness (1 where noise explains what is left), and CPU seconds. At the end how many answers are not
-right, by kind of world, as it is and with one constant of ``diagnose/decide.py`` left out. ``--chance`` takes only
-worlds without an effect, fits no effect, and says how often p is below some values: as often as they say, at best.
+PROOF is a folder of ``python -m physid_drake.validation.worlds.make`` whose truth lies open. For each world: the
+p-value, what is said and whether that is right, the best hypotheses with their gain on held-out pushes in nats, their
+best push's part of it and their loudness (1 where noise explains what is left), and CPU seconds. At the end how many
+answers are not right, by kind of world, as it is and with one constant of ``diagnose/decide.py`` left out.
+``--chance`` takes only worlds without an effect, fits no effect, and says how often p is below some values: as often
+as they say, at best.
 """
 
 import argparse
@@ -27,10 +28,10 @@ from physid_drake.effects import applicable
 from physid_drake.identify.baseline import baseline, fitter_of, with_tolerances
 from physid_drake.inference.replicates import gains_by_chance, p_value
 from physid_drake.inference.scores import columns
-from physid_drake.prove.score import Outcome
 from physid_drake.pushes.case import case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording.reading import read_recording
+from physid_drake.validation.scoring.score import Outcome
 
 SHOWN = 3
 LEVELS = (0.001, 0.01, 0.05, 0.1, 0.5)

@@ -18,10 +18,10 @@ from rich.console import Console
 from rich.table import Table
 
 from physid_drake.errors import PhysidError
-from physid_drake.prove.figures import figures_of, power_table, table
-from physid_drake.prove.score import read_outcomes
-from physid_drake.prove.seal import SEALED, check_seal, read_seal
-from physid_drake.report.proof import MAIN, POWER, outcomes_in, said_of, truth_of
+from physid_drake.validation.report.proof import MAIN, POWER, outcomes_in, said_of, truth_of
+from physid_drake.validation.scoring.figures import figures_of, power_table, table
+from physid_drake.validation.scoring.score import read_outcomes
+from physid_drake.validation.sealing.seal import SEALED, check_seal, read_seal
 
 FAULTS = ("world", "truth", "sigma", "said")
 LEVELS = (0.001, 0.01, 0.05, 0.1, 0.5)

@@ -1,11 +1,11 @@
 """What the twin is off by beside MuJoCo, from opened worlds without an effect: discrepancy.py PROOF ...
 
-Each PROOF is a folder of ``python -m physid_drake.prove.make`` whose truth lies open; of its worlds those without
-an effect are taken. The baseline is fitted to each, and the numbers of the discrepancy's covariance are those under
-which what it leaves of all pushes is likeliest, each push's own unknowns and theta refitted: an error of the pose
-that wanders along the object's way (standard deviations of place and yaw, the way over which it is the same), a white
-one, and frictions with table and tip that wander along the way. Prints them, the log likelihood without and with each
-kind, and quantiles over pushes of what is left, in squared deviations per number. Ten CPU seconds a world.
+Each PROOF is a folder of ``python -m physid_drake.validation.worlds.make`` whose truth lies open; of its worlds those
+without an effect are taken. The baseline is fitted to each, and the numbers of the discrepancy's covariance are those
+under which what it leaves of all pushes is likeliest, each push's own unknowns and theta refitted: an error of the
+pose that wanders along the object's way (standard deviations of place and yaw, the way over which it is the same), a
+white one, and frictions with table and tip that wander along the way. Prints them, the log likelihood without and
+with each kind, and quantiles over pushes of what is left, in squared deviations per number. Ten CPU seconds a world.
 """
 
 import argparse

@@ -18,14 +18,14 @@ from rich.progress import track
 from rich.table import Table
 
 from physid_drake.effects.catalogue import effect_named
-from physid_drake.prove.effects.catalogue import CATALOGUED, OTHERS
-from physid_drake.prove.floor import floor_of
-from physid_drake.prove.make import simulate
-from physid_drake.prove.scene import draw_scene
 from physid_drake.pushes.case import case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.pushes.task import Task
 from physid_drake.recording import read_recording
+from physid_drake.validation.worlds.effects.catalogue import CATALOGUED, OTHERS
+from physid_drake.validation.worlds.floor import floor_of
+from physid_drake.validation.worlds.make import simulate
+from physid_drake.validation.worlds.scene import draw_scene
 
 STILL = 1e-5  # m, rad
 ATTEMPTS = 4  # in which a world may have been drawn

@@ -19,14 +19,14 @@ from rich.table import Table
 from scipy import signal
 
 from physid_drake.diagnose import diagnose
-from physid_drake.prove.knobs import draw_knob
-from physid_drake.prove.make import simulate
-from physid_drake.prove.scene import DrawnPush, Rng, Scene, draw_scene
-from physid_drake.prove.sensing import record, recording_of
-from physid_drake.prove.world_plan import HandPath
 from physid_drake.pushes.case import case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import PoseStream, Push, Recording
+from physid_drake.validation.worlds.knobs import draw_knob
+from physid_drake.validation.worlds.make import simulate
+from physid_drake.validation.worlds.scene import DrawnPush, Rng, Scene, draw_scene
+from physid_drake.validation.worlds.sensing import record, recording_of
+from physid_drake.validation.worlds.world_plan import HandPath
 
 SPEEDS = (0.01, 0.06)  # m/s, of slow hands
 BRAKE = 0.1  # s

@@ -1,11 +1,11 @@
 """The diagnosis beside two peers on opened worlds: peers.py PROOF [...] [--worlds ID ...].
 
-PROOF is a folder of ``python -m physid_drake.prove.make`` whose truth lies open. Every push is predicted by what all
-others say: (1) least squares on the baseline model; (2) that, and a Gaussian process of what it leaves at the end of
-a push, over where the object stood, from where, how fast and how far off its middle it was pushed (scikit-learn, its
-kernel's lengths by likelihood); (3) what the diagnosis leaves. Errors of the last window, in mm and degrees, root
-mean square over pushes and then the median over worlds; the CPU seconds that each took; and whether it says what is
-missing.
+PROOF is a folder of ``python -m physid_drake.validation.worlds.make`` whose truth lies open. Every push is predicted
+by what all others say: (1) least squares on the baseline model; (2) that, and a Gaussian process of what it leaves at
+the end of a push, over where the object stood, from where, how fast and how far off its middle it was pushed
+(scikit-learn, its kernel's lengths by likelihood); (3) what the diagnosis leaves. Errors of the last window, in mm
+and degrees, root mean square over pushes and then the median over worlds; the CPU seconds that each took; and whether
+it says what is missing.
 """
 
 import argparse

@@ -27,10 +27,10 @@ from rich.table import Table
 from runs import COARSE, shipped_pushes
 
 from physid_drake.belief import Belief
-from physid_drake.experiments.learning import Learner
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.search import SEARCHES, Search, search_minimum, search_named
 from physid_drake.space import Parameter, ParameterSpace
+from physid_drake.validation.experiments.learning import Learner
 
 Array = np.ndarray
 FAVOURITE = 1.0 / np.e

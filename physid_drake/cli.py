@@ -252,13 +252,13 @@ def _run_prove(arguments: argparse.Namespace) -> int:
                  "--kind": arguments.kind is not None}  # fmt: skip
         for flag in (flag for flag, is_given in given.items() if is_given):
             raise ConfigError(f"{flag} is of sealed worlds: leave it out with --real.")
-        from physid_drake.run_prove_real import run_real  # noqa: PLC0415
+        from physid_drake.validation.run_prove_real import run_real  # noqa: PLC0415
 
         return run_real(arguments)
     for flag, given in (("--only", arguments.only), ("--pushes", arguments.pushes)):
         if given is not None:
             raise ConfigError(f"{flag} chooses among real recordings: give --real too.")
-    from physid_drake.run_prove import run  # noqa: PLC0415
+    from physid_drake.validation.run_prove import run  # noqa: PLC0415
 
     return run(arguments)
 
@@ -334,7 +334,7 @@ def _register_experiment(subparsers: Subparsers) -> None:
 
 def _run_experiment(arguments: argparse.Namespace) -> int:
     # Drake takes a second to import, which the other commands need not wait for.
-    from physid_drake.run_experiment import run  # noqa: PLC0415
+    from physid_drake.validation.run_experiment import run  # noqa: PLC0415
 
     return run(arguments)
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from physid_drake.prove.mujoco_world import PushWorld
-from physid_drake.prove.shapes import gyration_squared, height_of
-from physid_drake.prove.world_plan import GRAVITY, HandPath, Plan
 from physid_drake.recording import Box, Cylinder, Prism
+from physid_drake.validation.worlds.mujoco_world import PushWorld
+from physid_drake.validation.worlds.shapes import gyration_squared, height_of
+from physid_drake.validation.worlds.world_plan import GRAVITY, HandPath, Plan
 
 MASS, MU = 0.2, 0.3
 ERASER = Box(size=(0.127, 0.051, 0.030))

@@ -89,15 +89,15 @@ SHAPES_DRAWN = {8: "tee", 6: "ell", 12: "plus"}
 
 
 def drawn(seed):
-    from physid_drake.prove.scene import draw_scene
+    from physid_drake.validation.worlds.scene import draw_scene
 
     return draw_scene(np.random.default_rng([seed, 7]), notched=True)
 
 
 @pytest.mark.parametrize("seed", range(1, 7))
 def test_the_feet_of_a_drawn_world_have_its_undersides_moments(seed):
-    from physid_drake.prove.feet import feet_of
-    from physid_drake.prove.shapes import plan_moments
+    from physid_drake.validation.worlds.feet import feet_of
+    from physid_drake.validation.worlds.shapes import plan_moments
 
     shape = drawn(seed).plan.shape
     feet, weights = feet_of(shape)
@@ -112,7 +112,7 @@ def test_the_feet_of_a_drawn_world_have_its_undersides_moments(seed):
 def test_another_simulator_pushes_it_alike(seed):
     """MuJoCo's world of the proof, with two contacts where the tip has two, beside the twin's one."""
     pytest.importorskip("mujoco")
-    from physid_drake.prove.make import simulate
+    from physid_drake.validation.worlds.make import simulate
 
     scene = drawn(seed)
     scene = dc.replace(scene, pushes=tuple(dc.replace(push, friction_factor=1.0) for push in scene.pushes[:8]))

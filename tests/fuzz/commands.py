@@ -18,17 +18,9 @@ from fuzz.case import Case, RefusedError, WrongError
 from fuzz.damage import damaged
 from fuzz.judge import FOREIGN
 from fuzz.trees import mutated, yaml_text
-from physid_drake import (
-    cli,
-    run_cell,
-    run_diagnose,
-    run_experiment,
-    run_inspect,
-    run_plan,
-    run_prove,
-    run_prove_real,
-)  # fmt: skip
+from physid_drake import cli, run_cell, run_diagnose, run_inspect, run_plan
 from physid_drake.errors import ConfigError
+from physid_drake.validation import run_experiment, run_prove, run_prove_real
 
 NUMBERS = ("0", "1", "-1", "3", "1.5", "nan", "inf", "-inf", "1e308", "1e400", "9" * 30, "9" * 5000, "x", "",
            "0x1", "1_0", "-1e-1",

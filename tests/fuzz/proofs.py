@@ -11,11 +11,11 @@ from fuzz import seeds
 from fuzz.case import Case
 from fuzz.damage import damaged, replaced
 from fuzz.trees import json_text, mutated
-from physid_drake.prove.score import read_outcomes
-from physid_drake.prove.seal import check_seal, read_seal, seal_of, sealed_names
-from physid_drake.prove.secret import Secret, settled_secret
-from physid_drake.report.proof import proof_json, proof_markdown, proof_tables
-from physid_drake.run_prove import opened
+from physid_drake.validation.report.proof import proof_json, proof_markdown, proof_tables
+from physid_drake.validation.run_prove import opened
+from physid_drake.validation.scoring.score import read_outcomes
+from physid_drake.validation.sealing.seal import check_seal, read_seal, seal_of, sealed_names
+from physid_drake.validation.sealing.secret import Secret, settled_secret
 
 WORLDS = 2
 SECRET = Secret(salt="0" * 64, seed=7)

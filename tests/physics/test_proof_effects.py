@@ -11,13 +11,13 @@ pytest.importorskip("mujoco")
 from proof_pushes import ERASER, MASS, MU, PLAN, central_push, push, slide, spin_angle, straight_path
 from scipy import optimize
 
-from physid_drake.prove.effects import catalogue as fx
-from physid_drake.prove.feet import feet_of, weighted_feet
-from physid_drake.prove.knobs import draw_knob
-from physid_drake.prove.mujoco_world import PushWorld
-from physid_drake.prove.scene import draw_scene
-from physid_drake.prove.shapes import gyration_squared
-from physid_drake.prove.world_plan import GRAVITY, HandPath
+from physid_drake.validation.worlds.effects import catalogue as fx
+from physid_drake.validation.worlds.feet import feet_of, weighted_feet
+from physid_drake.validation.worlds.knobs import draw_knob
+from physid_drake.validation.worlds.mujoco_world import PushWorld
+from physid_drake.validation.worlds.scene import draw_scene
+from physid_drake.validation.worlds.shapes import gyration_squared
+from physid_drake.validation.worlds.world_plan import GRAVITY, HandPath
 
 
 def moves(plain, poses):

@@ -8,10 +8,10 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from physid_drake.prove.effects import catalogue as fx
-from physid_drake.prove.mujoco_world import PushWorld
-from physid_drake.prove.world_plan import HandPath, Plan
 from physid_drake.recording import Box
+from physid_drake.validation.worlds.effects import catalogue as fx
+from physid_drake.validation.worlds.mujoco_world import PushWorld
+from physid_drake.validation.worlds.world_plan import HandPath, Plan
 
 PLAN = Plan(
     shape=Box(size=(0.11, 0.07, 0.03)), mass=0.2, support_friction=0.3, hand_friction=0.3, tip_radius=0.008,

@@ -11,13 +11,13 @@ pytest.importorskip("mujoco")
 from proof_pushes import DISC, MASS, MU, PLAN, SHAPES, central_push, push, slide, spin_angle, with_shape
 from reference import planar
 
-from physid_drake.prove.effects import catalogue as fx
-from physid_drake.prove.feet import feet_of
-from physid_drake.prove.mujoco_world import PushWorld
-from physid_drake.prove.scene import draw_scene
-from physid_drake.prove.shapes import distance_outside, height_of, outline_of, plan_moments
-from physid_drake.prove.world_plan import GRAVITY
 from physid_drake.recording import Cylinder
+from physid_drake.validation.worlds.effects import catalogue as fx
+from physid_drake.validation.worlds.feet import feet_of
+from physid_drake.validation.worlds.mujoco_world import PushWorld
+from physid_drake.validation.worlds.scene import draw_scene
+from physid_drake.validation.worlds.shapes import distance_outside, height_of, outline_of, plan_moments
+from physid_drake.validation.worlds.world_plan import GRAVITY
 
 shapes = pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 

@@ -10,10 +10,10 @@ from twin import body_of
 from physid_drake.cell import Cell, HandPath, Start
 from physid_drake.effects import effect_named
 from physid_drake.effects.rollout import Geometry, Rollout, roll
-from physid_drake.prove import world_plan
-from physid_drake.prove.effects import catalogue as fx
-from physid_drake.prove.mujoco_world import PushWorld
 from physid_drake.recording import Box, Cylinder
+from physid_drake.validation.worlds import world_plan
+from physid_drake.validation.worlds.effects import catalogue as fx
+from physid_drake.validation.worlds.mujoco_world import PushWorld
 
 MASS, MU, HAND, TIP = 0.3, 0.3, 0.2, 0.008
 SLOSH = {"fraction": 0.3, "frequency": 2.5, "damping": 0.1}

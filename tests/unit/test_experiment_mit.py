@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from physid_drake.experiments.mit_pushes import MAIN, MODELS, PublishedPushes
+from physid_drake.validation.experiments.mit_pushes import MAIN, MODELS, PublishedPushes
 
 FOLDER = (
     Path(os.environ.get("PHYSID_SHARED_DATA", Path(__file__).parents[2] / "../shared/data")) / "mit_push_endpoints"

@@ -8,14 +8,10 @@ import pytest
 pytest.importorskip("mujoco")
 
 from physid_drake.errors import RobotError
-from physid_drake.experiments.learning import Learner, plain_task
-from physid_drake.experiments.mit_pushes import PLAYED_SPEED, TICK, played
-from physid_drake.experiments.motion_prediction import MotionPrediction
-from physid_drake.experiments.next_push import most_informative, the_first
-from physid_drake.experiments.push_direction import _share_within
-from physid_drake.experiments.push_speed import FAST, GOAL, LOST, FastPushes, _distance
-from physid_drake.experiments.repetitions import claim, run_all
-from physid_drake.experiments.worlds import (
+from physid_drake.policies import PlannedPush
+from physid_drake.pushes.config import ThetaConfig
+from physid_drake.recording import Box, Hand, ObjectModel, PoseStream, Push, Recording, Sensors, Table
+from physid_drake.validation.experiments.hidden_robot import (
     BOTTLE,
     ERASER,
     FRICTION_SCATTER,
@@ -25,10 +21,14 @@ from physid_drake.experiments.worlds import (
     draw_world,
     record_pushes,
 )
-from physid_drake.policies import PlannedPush
-from physid_drake.pushes.config import ThetaConfig
-from physid_drake.recording import Box, Hand, ObjectModel, PoseStream, Push, Recording, Sensors, Table
-from physid_drake.run_experiment import write
+from physid_drake.validation.experiments.learning import Learner, plain_task
+from physid_drake.validation.experiments.mit_pushes import PLAYED_SPEED, TICK, played
+from physid_drake.validation.experiments.motion_prediction import MotionPrediction
+from physid_drake.validation.experiments.next_push import most_informative, the_first
+from physid_drake.validation.experiments.push_direction import _share_within
+from physid_drake.validation.experiments.push_speed import FAST, GOAL, LOST, FastPushes, _distance
+from physid_drake.validation.experiments.repetitions import claim, run_all
+from physid_drake.validation.run_experiment import write
 
 SPEEDS = (0.1, 0.3)
 

@@ -12,17 +12,17 @@ import pytest
 
 from physid_drake.cli import main
 from physid_drake.errors import ConfigError, OutputError
-from physid_drake.experiments.catalogue import EXPERIMENTS, Wish, experiment_named
-from physid_drake.experiments.closed_loop import HIDDEN, SIMULATED, ClosedLoops
-from physid_drake.experiments.corrected_plan import CorrectedPlans
-from physid_drake.experiments.learning import GREEDY, LEAST_SQUARES, METHODS, RANDOM, search_trials
-from physid_drake.experiments.mit_pushes import counts, pressed
-from physid_drake.experiments.repetitions import claim, run_all
-from physid_drake.experiments.values import Panel, Result, Table, mean_and_deviation, series_of
-from physid_drake.report.experiment import result_figure, result_json, result_markdown, table_csv
-from physid_drake.run_experiment import write
 from physid_drake.run_folder import RunFolder
 from physid_drake.space import Parameter, ParameterSpace
+from physid_drake.validation.experiments.catalogue import EXPERIMENTS, Wish, experiment_named
+from physid_drake.validation.experiments.closed_loop import HIDDEN, SIMULATED, ClosedLoops
+from physid_drake.validation.experiments.corrected_plan import CorrectedPlans
+from physid_drake.validation.experiments.learning import GREEDY, LEAST_SQUARES, METHODS, RANDOM, search_trials
+from physid_drake.validation.experiments.mit_pushes import counts, pressed
+from physid_drake.validation.experiments.repetitions import claim, run_all
+from physid_drake.validation.experiments.values import Panel, Result, Table, mean_and_deviation, series_of
+from physid_drake.validation.report.experiment import result_figure, result_json, result_markdown, table_csv
+from physid_drake.validation.run_experiment import write
 
 SPACE = ParameterSpace(
     parameters=tuple(

@@ -6,8 +6,8 @@ import json
 import pytest
 
 from physid_drake.errors import ProofError
-from physid_drake.prove.figures import figures_of, table
-from physid_drake.prove.score import Outcome, _holds, outcome, read_outcomes
+from physid_drake.validation.scoring.figures import figures_of, table
+from physid_drake.validation.scoring.score import Outcome, _holds, outcome, read_outcomes
 
 
 def truth(kind="effect", names=("viscous_drag",), size=8.0, value=0.4):

@@ -9,8 +9,8 @@ import time
 import pytest
 
 from physid_drake.errors import ProofError
-from physid_drake.prove.cluster import Cluster
-from physid_drake.prove.diagnosing import Task, attempt_of, diagnose_all
+from physid_drake.validation.sealing.cluster import Cluster
+from physid_drake.validation.sealing.diagnosing import Task, attempt_of, diagnose_all
 
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow
@@ -87,6 +87,6 @@ def test_a_diagnosis_that_takes_too_long_there_has_failed(tmp_path, address):
 
 
 def test_no_scheduler_is_one_line(monkeypatch):
-    monkeypatch.setattr("physid_drake.prove.cluster.PATIENCE", 1.0)
+    monkeypatch.setattr("physid_drake.validation.sealing.cluster.PATIENCE", 1.0)
     with pytest.raises(ProofError, match="no scheduler"):
         Cluster("tcp://127.0.0.1:9", 1.0)

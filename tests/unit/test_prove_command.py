@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from physid_drake import run_prove
 from physid_drake.cli import build_parser, main
 from physid_drake.errors import ProofError
-from physid_drake.prove.diagnosing import Task, attempt_of, diagnose_all, diagnose_command
-from physid_drake.prove.seal import write_seal
-from physid_drake.prove.secret import keep_secret, read_secret
 from physid_drake.run_folder import RunFolder
+from physid_drake.validation import run_prove
+from physid_drake.validation.sealing.diagnosing import Task, attempt_of, diagnose_all, diagnose_command
+from physid_drake.validation.sealing.seal import write_seal
+from physid_drake.validation.sealing.secret import keep_secret, read_secret
 
 # Notes that it was called, then does as the world's answer says.
 FAKE = """
@@ -146,7 +146,7 @@ def test_a_failure_that_is_tried_again_and_interrupted_has_not_ended(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr("physid_drake.prove.diagnosing.time.sleep", stop)
+        patch.setattr("physid_drake.validation.sealing.diagnosing.time.sleep", stop)
         diagnose_all(tasks, jobs=1, timeout=60.0, ended=lambda task, attempt: None, again=True)
     assert attempt_of(tmp_path / "a") is None
 
@@ -294,7 +294,7 @@ def test_a_crash_and_a_silence_have_a_line_too(tmp_path):
 def test_the_command_is_given_the_recording_and_no_truth(tmp_path):
     words = diagnose_command(tmp_path / "recordings" / "ab", tmp_path / "diagnoses" / "ab", tmp_path / "sealed")
     at = words.index("diagnose")
-    assert words[1:at] == ("-m", "physid_drake.prove.blindfold", json.dumps([str(tmp_path / "sealed")]))
+    assert words[1:at] == ("-m", "physid_drake.validation.sealing.blindfold", json.dumps([str(tmp_path / "sealed")]))
     assert not any("sealed" in word for word in words[at:])
     assert words[words.index("--jobs") + 1] == "1"
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from physid_drake.prove.floor import WINDOWS, floor_of
 from physid_drake.recording import PoseStream, Push
+from physid_drake.validation.worlds.floor import WINDOWS, floor_of
 
 RATE, STILL, MOVING = 100.0, 20, 140
 DEVIATIONS = np.array([1e-3, 1e-3, 1e-2])

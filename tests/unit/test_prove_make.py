@@ -12,15 +12,15 @@ import pytest
 pytest.importorskip("mujoco")
 
 from physid_drake.errors import ParameterError, ProofError
-from physid_drake.prove import make, mujoco_world
-from physid_drake.prove.effects import catalogue as fx
-from physid_drake.prove.effects.effect import parameters_of
-from physid_drake.prove.knobs import draw_knob
-from physid_drake.prove.mujoco_world import PushWorld
-from physid_drake.prove.scene import draw_scene
-from physid_drake.prove.secret import name_by_seed, read_secret
-from physid_drake.prove.world_plan import Plan
 from physid_drake.recording import Box, read_recording
+from physid_drake.validation.sealing.secret import name_by_seed, read_secret
+from physid_drake.validation.worlds import make, mujoco_world
+from physid_drake.validation.worlds.effects import catalogue as fx
+from physid_drake.validation.worlds.effects.effect import parameters_of
+from physid_drake.validation.worlds.knobs import draw_knob
+from physid_drake.validation.worlds.mujoco_world import PushWorld
+from physid_drake.validation.worlds.scene import draw_scene
+from physid_drake.validation.worlds.world_plan import Plan
 
 PLAN = Plan(
     shape=Box(size=(0.127, 0.051, 0.030)), mass=0.2, support_friction=0.3, hand_friction=0.2, tip_radius=0.008,

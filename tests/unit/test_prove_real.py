@@ -9,11 +9,14 @@ import sys
 import numpy as np
 import pytest
 
-from physid_drake import run_prove_real
 from physid_drake.cli import build_parser
 from physid_drake.errors import ProofError, RecordingError
-from physid_drake.prove.real import chosen_cases, prepare, slides_of_squares
-from physid_drake.prove.real_score import (
+from physid_drake.recording import read_recording
+from physid_drake.recording.adapters import convert_cube
+from physid_drake.recording.adapters.cube import RATE, SIDE
+from physid_drake.validation import run_prove_real
+from physid_drake.validation.scoring.real import chosen_cases, prepare, slides_of_squares
+from physid_drake.validation.scoring.real_score import (
     _fresh,
     balanced_pressure,
     mean_arm,
@@ -21,9 +24,6 @@ from physid_drake.prove.real_score import (
     published_errors,
     weight_near,
 )
-from physid_drake.recording import read_recording
-from physid_drake.recording.adapters import convert_cube
-from physid_drake.recording.adapters.cube import RATE, SIDE
 
 MIT_COLUMNS = [
     *(f"{when}_{what}" for when in ("start", "end") for what in

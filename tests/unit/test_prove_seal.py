@@ -13,13 +13,21 @@ from contextlib import nullcontext
 import pytest
 
 from physid_drake.errors import ConfigError, ProofError
-from physid_drake.prove import hiding, seal
-from physid_drake.prove.blindfold import HIDDEN_BY
-from physid_drake.prove.diagnosing import diagnose_command
-from physid_drake.prove.seal import RECORDING, check_seal, files_digest, seal_of, shut, unlock, write_seal
-from physid_drake.prove.secret import keep_secret, name_by_seed, settled_secret
 from physid_drake.resources import shipped
 from physid_drake.run_folder import write_whole
+from physid_drake.validation.sealing import hiding, seal
+from physid_drake.validation.sealing.blindfold import HIDDEN_BY
+from physid_drake.validation.sealing.diagnosing import diagnose_command
+from physid_drake.validation.sealing.seal import (
+    RECORDING,
+    check_seal,
+    files_digest,
+    seal_of,
+    shut,
+    unlock,
+    write_seal,
+)
+from physid_drake.validation.sealing.secret import keep_secret, name_by_seed, settled_secret
 
 
 @pytest.fixture
@@ -102,7 +110,7 @@ def test_a_shut_folder_opens_again_whatever_ends_the_block(folder):
 
 LOOKS = """
 import ctypes, glob, mmap, os, pathlib, shutil, subprocess, sys
-from physid_drake.prove.blindfold import blind_to
+from physid_drake.validation.sealing.blindfold import blind_to
 sealed = pathlib.Path(sys.argv[1])
 above = os.open(sealed.parent, os.O_RDONLY)
 within = os.open(sealed, os.O_RDONLY)
@@ -155,7 +163,7 @@ def test_the_blindfold_refuses_every_look_and_nothing_else(folder):
 
 HIDDEN = """
 import ctypes, json, os, pathlib, subprocess, sys
-from physid_drake.prove.hiding import hide
+from physid_drake.validation.sealing.hiding import hide
 sealed = pathlib.Path(sys.argv[1])
 if os.access(sealed, os.X_OK):
     os.chdir(sealed)
@@ -320,7 +328,7 @@ def test_a_command_under_the_blindfold_works_and_cannot_read_what_is_sealed(fold
         words = [
             sys.executable,
             "-m",
-            "physid_drake.prove.blindfold",
+            "physid_drake.validation.sealing.blindfold",
             json.dumps([str(folder / "sealed")]),
             "inspect",
             str(recording),

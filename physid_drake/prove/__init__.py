@@ -1,1 +1,0 @@
-"""Proof on worlds that the tool did not make: drawn at random, simulated by another engine, sealed."""

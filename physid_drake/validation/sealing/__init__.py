@@ -1,0 +1,1 @@
+"""Hides the truth of worlds from their diagnosis: seals, secrets, and a process of its own for each diagnosis."""
