@@ -1,7 +1,7 @@
 """The decision: from hypotheses that were fitted to what is said, by a few constants.
 
 All comparisons are of pushes that were left out, and no push decides alone: the one that speaks most for a
-hypothesis does not count for it. docs/diagnosis.md lists the constants; `benchmarks/decisions.py` leaves out each.
+hypothesis does not count for it. docs/method.md lists the constants; `benchmarks/decisions.py` leaves out each.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ class GreedyEntropySearch:
     (0.9 gives 0.095 nats) waits behind a runner-up (0.05 gives 0.150 nats). That is the paper's rule. It costs
     next to no rollouts: a favourite is tried on its way up to 1/e, and to be passed over it must leap beyond
     within one update. Once it has been tried, the runners-up are all that is left to learn about. Measured in
-    docs/results.md, "Searches".
+    docs/archive/results.md, "Searches".
 
     Candidates that were tried are left out: the simulation is deterministic and would say the same again.
     A batch takes the k greatest terms under one belief, without imagining the results of the first ones.

@@ -1,10 +1,10 @@
-"""The table of thresholds in docs/diagnosis.md says what the code does."""
+"""The table of thresholds in docs/method.md says what the code does."""
 
 import re
 from importlib import import_module
 from pathlib import Path
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "diagnosis.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "method.md"
 ROWS = re.findall(r"^\| `([\w.]+)\.(\w+)` \| ([\d.]+) \|", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
 
 

@@ -287,7 +287,7 @@ def test_names_are_salted_and_kept_and_the_seed_is_drawn(tmp_path):
     drawn = keep_secret(tmp_path / "drawn", None, "none")
     assert drawn.seed != keep_secret(tmp_path / "again", None).seed
     assert settled_secret(tmp_path / "drawn", None, None) == drawn
-    # Of world 0 of seed 42042, whose answers are in docs/answers.
+    # Of world 0 of seed 42042, whose answers are in docs/archive/answers.
     assert keep_secret(tmp_path / "opened", 42042, by_seed=True).name_of(0) == name_by_seed(0, 42042)
 
 

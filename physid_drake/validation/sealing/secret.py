@@ -49,7 +49,7 @@ class Secret:
 
 
 def name_by_seed(index: int, seed: int) -> str:
-    """The name that a world of a seed had before names were salted: such are in ``docs/answers``."""
+    """The name that a world of a seed had before names were salted: such are in ``docs/archive/answers``."""
     return _digits(f"world {seed} {index}")
 
 
