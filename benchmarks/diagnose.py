@@ -1,7 +1,7 @@
 """How often a diagnosis is right, in one proof or several together: diagnose.py [PROOF ...] [--worlds 20] [--seed N].
 
-PROOF is a folder of ``prove`` in which worlds have been diagnosed, or an archive of one in ``docs/archive/answers``, scored
-when it was opened. Without one, ``prove`` makes and diagnoses as many worlds as are asked for (``pip install
+PROOF is a folder of ``prove`` in which worlds have been diagnosed, or an archive of one (``docs/archive/answers``),
+scored when it was opened. Without one, ``prove`` makes and diagnoses as many worlds as are asked for (``pip install
 '.[proof]'``; minutes for each), and goes on where it stopped.
 """
 
