@@ -15,9 +15,9 @@ PLAN: Final = "plan.html"
 
 TITLES: Final = {INDEX: "Overview", DIAGNOSIS: "Diagnosis", SCENE: "In 3D", PLAN: "Plan"}
 TELLS: Final = {
-    DIAGNOSIS: "what is missing, how sure that is, where it shows, and what it changes",
+    DIAGNOSIS: "the missing physics, how certain it is, where it acts, and what it changes",
     SCENE: "the pushes in three dimensions: recorded, simulated and planned",
-    PLAN: "the push that brings the object to its goal, and what may come of it",
+    PLAN: "the push that brings the object to its goal, and its predicted results",
 }
 """What each page says, for the one that leads."""
 
@@ -53,7 +53,7 @@ tr + tr th, tr + tr td { border-top: 1px solid #dfe3ea; }
 <li><a href="{{ file }}">{{ name }}</a>: {{ tells }}.</li>
 {% endfor %}
 </ul>
-<p class="note">Beside these: {{ files | join(", ") }}.</p>
+<p class="note">Other files: {{ files | join(", ") }}.</p>
 </main></body></html>
 """
 

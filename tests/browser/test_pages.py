@@ -173,12 +173,12 @@ def test_the_live_view_shows_a_sign_and_its_button_stops_the_job(browser):
     tab.goto(live.url)
     tab.wait_for_timeout(1200)
     before = pixels(tab)
-    tell("effects, one at a time", 0, 0)
+    tell("single effects", 0, 0)
     tab.wait_for_timeout(800)
     assert changed(before, pixels(tab)) > 2e-4  # another line on the sign
     tab.click("text=Open Controls")
     tab.click(f"text={STOP}")
     tab.wait_for_timeout(500)
     with pytest.raises(KeyboardInterrupt):
-        tell("effects, one at a time", 0, 0)
+        tell("single effects", 0, 0)
     tab.close()

@@ -75,7 +75,7 @@ def test_the_command_writes_the_plan_and_the_same_seed_the_same_bytes(folder, tm
 
 def test_plain_plans_without_the_effects_and_says_what_they_make_of_it(folder, tmp_path, capsys, few_rows):
     with_effects = json.loads(planned_files(folder, tmp_path / "one")["plan.json"])
-    plain = json.loads(planned_files(folder, tmp_path / "two", "--plain")["plan.json"])
+    plain = json.loads(planned_files(folder, tmp_path / "two", "--baseline")["plan.json"])
     assert plain["effects"] == [] and with_effects["predicted_with_effects"] is None
     assert plain["settings"]["speed"]["value"] != with_effects["settings"]["speed"]["value"]
     assert plain["predicted_with_effects"]["cost_m"] > with_effects["predicted"]["cost_m"]
