@@ -36,7 +36,7 @@ AS_GOOD = 0.8  # of the gain in one phase: the pattern holds in both
 IMITATED = 1e-9  # of a look: less is rounding
 DIGITS = 6  # of gains that are compared: of looks that theta makes the same, the first, whatever the rounding
 A_PART = 0.25  # of the most that a phase or a degree of freedom has
-SAID = {"contact": "during contact", "free_slide": "during free sliding"}
+SAID = {"contact": "contact", "free_slide": "free sliding"}
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -303,7 +303,7 @@ def _location(case: Case, wrenches: Sequence[MissingWrench], seen: Sequence[_See
     in_question = [k for k, w in enumerate(wrenches) if w.phase in phase]
     much = np.sqrt((values[in_question] ** 2) @ [name in dof for name in DOFS])
     windows = tuple(_window(case, wrenches[k]) for k in (in_question[i] for i in np.argsort(-much)[:WINDOWS]))
-    where = " and ".join(SAID[p] for p in phase)
+    where = "during " + " and ".join(SAID[p] for p in phase)
     amount = _amount([w for w in wrenches if w.phase in phase], dof)
     statement = f"{where}{amount}; {detail}" + ("" if amount else "; not in any single window")
     if windows:

@@ -250,7 +250,7 @@ def test_corrected_plans_are_told_apart_by_what_was_named():
         ("tether", "consistent"),
     ]
     assert [(row[0], row[1], row[-1]) for row in summary.rows] == [
-        ("all worlds", 3, "1 of 3"), ("the effect was named, alone", 2, "1 of 2"), ("another answer", 1, "0 of 1"),
+        ("all worlds", 3, "1 of 3"), ("effect named correctly, alone", 2, "1 of 2"), ("other answers", 1, "0 of 1"),
     ]  # fmt: skip
     assert summary.rows[1][2:4] == (13.0, 6.0)  # medians
 
