@@ -12,11 +12,13 @@ from rich.table import Table
 from physid_drake.diagnose import Diagnosis
 from physid_drake.diagnose.values import Detectable, EffectFinding, FitQuality, Location, Partly, Ranked
 from physid_drake.effects import effect_named
+from physid_drake.pushes.tracker_noise import UNKNOWN
 from physid_drake.report.numbers import rounded
 from physid_drake.report.tables import SIGMA
 from physid_drake.report.terminal import narrow_table, numbers, words
 
 FORMAT = "physid-diagnosis/1"
+NOISE_UNKNOWN = "sigma: the tracker noise is unknown, and taken to be as large as the errors of the baseline model"
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> str:
@@ -189,13 +191,19 @@ def regime_table(diagnosis: Diagnosis) -> Table:
     return table
 
 
+def noise_known(diagnosis: Diagnosis) -> bool:
+    """Whether the tracker's noise was stated or seen at rest."""
+    return not any(warning.startswith(UNKNOWN) for warning in diagnosis.warnings)
+
+
 def fit_table(diagnosis: Diagnosis) -> Table:
     """How well held-out pushes are predicted, by the baseline model and with the effects found."""
     forced = diagnosis.fit.force_before is not None
     headings = ("mm", "deg", *(("N",) if forced else ()), "sigma", "reduced\nchi-square")
+    caption = f"{SIGMA}; reduced chi-square: 1 = noise only" if noise_known(diagnosis) else NOISE_UNKNOWN
     table = narrow_table(
         "prediction error of held-out pushes (root mean square)", words("model"), *map(numbers, headings),
-        caption=f"{SIGMA}; reduced chi-square: 1 = noise only",
+        caption=caption,
     )  # fmt: skip
     for name, figures in held_out_figures(diagnosis):
         table.add_row(name, *(f"{value:.2f}" if math.isfinite(value) else "-" for value in figures))

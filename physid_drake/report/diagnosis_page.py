@@ -26,10 +26,9 @@ from physid_drake.diagnose.values import (
 )
 from physid_drake.diagnose.whereabouts import number_of
 from physid_drake.effects import effect_named
-from physid_drake.pushes.tracker_noise import UNKNOWN
 from physid_drake.recording import Recording
 from physid_drake.report.answers import answers
-from physid_drake.report.diagnosis import held_out_figures
+from physid_drake.report.diagnosis import held_out_figures, noise_known
 from physid_drake.report.diagnosis_figures import (
     arrow_figure,
     error_figure,
@@ -164,7 +163,7 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "theta": [_theta_row(name, t) for name, t in diagnosis.theta.items()],
         "next_push": None if diagnosis.next_push is None else next_push_figure(diagnosis.next_push, recording, view),
         "noise": _noise(diagnosis),
-        "noise_known": not any(warning.startswith(UNKNOWN) for warning in diagnosis.warnings),
+        "noise_known": noise_known(diagnosis),
         "detectable": [_detectable_row(one) for one in diagnosis.detectable],
         "warnings": diagnosis.warnings,
     }

@@ -174,7 +174,7 @@ def _posterior_rows(spread: Spread, tolerance: float) -> list[tuple[str, str]]:
 def _setting(value: float, unit: str) -> str:
     if unit == "rad":
         return f"{math.degrees(value):.2f} deg"
-    return f"{1e3 * value:.1f} mm" if unit == "m" else f"{value:.4f} {unit}"
+    return f"{round(1e3 * value, 1) + 0.0:.1f} mm" if unit == "m" else f"{value:.4f} {unit}"
 
 
 def _said(trajectory: Trajectory, cost: float) -> str:

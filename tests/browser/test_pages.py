@@ -106,7 +106,7 @@ def test_the_first_screen_of_a_diagnosis_answers_what_a_user_asks(opened, job):
     for asked in ("How sure is that?", "Where?", "What now?", "May I trust it?"):
         assert asked in text
     assert answer["sentence"] in text and answer["location"]["statement"][1:] in text
-    assert "load_model" in text and "mm instead of" in text
+    assert "load_model" in text and "Error on held-out pushes" in text
 
 
 # The scene.

@@ -52,7 +52,7 @@ def test_inspect_shows_every_push_and_warns_on_stderr(tmp_path, capsys):
     shown = capsys.readouterr()
     assert "some_$pushes" in shown.out and "p2" in shown.out and "[mm/s]" in shown.out
     assert "warning: pushes/p0.csv: object: rows 21-32: gap" in shown.err
-    assert "(2 more like it, in 3 pushes)" in shown.err and shown.err.count("gap") == 1
+    assert "(2 similar warnings, in 3 pushes)" in shown.err and shown.err.count("gap") == 1
     assert (tmp_path / "top.png").read_bytes().startswith(b"\x89PNG")
 
 

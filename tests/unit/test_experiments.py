@@ -107,7 +107,7 @@ def test_a_result_is_written_without_what_is_not_known():
     assert content["tables"][0]["rows"] == [{"method": "one", "mm": 1.25}, {"method": "two", "mm": None}]
     assert content["panels"][0]["series"][0]["deviation"] == [None] * 3
     text = result_markdown(result, "name", "the command")
-    assert "| two | - |" in text and "    the command" in text and "Left out: three" in text
+    assert "| two | - |" in text and "    the command" in text and "Skipped: three" in text
     assert len(result_figure(result).axes) == 1
 
 
