@@ -259,7 +259,8 @@ def test_gains_across_regimes_are_shown_where_there_are_any(page):
         diagnosis_page(dc.replace(d, fit=dc.replace(d.fit, regimes=gains)), recording_of(), shown_pushes(), ())
     )
     assert not tags.open and {
-        "50 to 90 mm/s", "200 to 400 mm/s <i>", "−12.3 ± 3.0", "headings 0 to 90 deg", "headings 180 to 270 deg", "5.0 ± –"
+        "50 to 90 mm/s", "200 to 400 mm/s <i>", "−12.3 ± 3.0", "headings 0 to 90 deg",
+        "headings 180 to 270 deg", "5.0 ± –",
     } <= set(tags.words)  # fmt: skip
     fit, ranking = (tags.words.index(h) for h in ("Prediction of held-out pushes", "Why other effects were rejected"))
     assert fit < tags.words.index("log-likelihood gain") < ranking

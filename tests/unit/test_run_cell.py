@@ -107,7 +107,7 @@ def test_the_page_shows_the_numbers_of_the_result(page, done):
         assert name in text
         assert f"{estimate['value']:.4g}" in text
         assert "{:.4g} to {:.4g}".format(*estimate["ci90"]) in text
-    assert f"{1e3 * result['held_out']['after']['position_rms_m']:.2f}" in text
+    assert f"{1e3 * result['held_out']['identified']['position_rms_m']:.2f}" in text
     assert f"reduced chi-square {result['reduced_chi2']:.2f}" in text
     assert "Seed 3" in text
 
