@@ -52,5 +52,5 @@ def _why(name: str, one: Weighed | None, named: set[str], alike: set[str], evide
     if not confirmed(evidence.found, one):
         return "not confirmed by held-out pushes"
     if named:
-        return "predicts held-out pushes worse"
+        return "smaller gain on held-out pushes"
     return "confirmed by held-out pushes, but more than noise remains"

@@ -14,11 +14,10 @@ from physid_drake.diagnose.values import Detectable, EffectFinding, FitQuality, 
 from physid_drake.effects import effect_named
 from physid_drake.pushes.tracker_noise import UNKNOWN
 from physid_drake.report.numbers import rounded
-from physid_drake.report.tables import SIGMA
+from physid_drake.report.pages import sigma_means
 from physid_drake.report.terminal import narrow_table, numbers, words
 
 FORMAT = "physid-diagnosis/1"
-NOISE_UNKNOWN = "sigma: the tracker noise is unknown, and taken to be as large as the errors of the baseline model"
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> str:
@@ -200,7 +199,8 @@ def fit_table(diagnosis: Diagnosis) -> Table:
     """How well held-out pushes are predicted, by the baseline model and with the effects found."""
     forced = diagnosis.fit.force_before is not None
     headings = ("mm", "deg", *(("N",) if forced else ()), "sigma", "reduced\nchi-square")
-    caption = f"{SIGMA}; reduced chi-square: 1 = noise only" if noise_known(diagnosis) else NOISE_UNKNOWN
+    known = noise_known(diagnosis)
+    caption = sigma_means(known=known) + (" Reduced chi-square: 1 = noise only." if known else "")
     table = narrow_table(
         "prediction error of held-out pushes (root mean square)", words("model"), *map(numbers, headings),
         caption=caption,

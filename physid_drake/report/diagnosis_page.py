@@ -49,7 +49,7 @@ from physid_drake.report.numbers import (
     tiny,
 )
 from physid_drake.report.outline import outline_of
-from physid_drake.report.pages import DIAGNOSIS, SCENE, nav
+from physid_drake.report.pages import BASELINE_MEANS, DIAGNOSIS, HELD_OUT_MEANS, SCENE, nav, sigma_means
 from physid_drake.report.svg import AFTER, BEFORE, CONTACT, FREE, INK, MUTED, drawn
 from physid_drake.report.table_view import MM, ShownPush, TableView
 
@@ -152,6 +152,9 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "lets_go": any(view.shown[k].released is not None for k in order[:MOST_ERRORS]),
         "arrows": arrow_figure(view, () if diagnosis.location is None else diagnosis.location.windows),
         "answers": answers(diagnosis),
+        "baseline_means": BASELINE_MEANS,
+        "held_out_means": HELD_OUT_MEANS,
+        "sigma_means": sigma_means(known=noise_known(diagnosis)),
         "strips": strips[:MOST_STRIPS],
         "more_strips": strips[MOST_STRIPS:],
         "not_drawn": len({w.push for w in view.wrenches}) - len(strips),

@@ -14,15 +14,14 @@ from physid_drake.identify.accuracy import accuracy_of
 from physid_drake.identify.estimates import Estimate, estimates_of
 from physid_drake.plan import Hindsight, Plan
 from physid_drake.report.cells import cells_figure, cells_verdict, combination_text
-from physid_drake.report.pages import index_page
+from physid_drake.report.pages import BASELINE_MEANS, HELD_OUT_MEANS, index_page, sigma_means
 from physid_drake.report.plan import plan_rows
 from physid_drake.report.plan_page import caption_of, curve_svg
 from physid_drake.report.tables import accuracy_cells, identifiable_text, verdict
 
 _BODY = """
 <p>{% if diagnosis %}<b>{{ diagnosis.verdict }}</b>. {{ diagnosis.sentence }}{% else %}{{ verdict }}{% endif %}</p>
-<p class="note">Baseline model: the Drake cell with the parameters below and without any effect of the catalogue.
-Sigma: in units of tracker noise (one standard deviation).</p>
+<p class="note">{{ means }}</p>
 <h2>parameters{{ with_effects }}</h2>
 <div class="wide"><table>
 <tr><th>parameter</th><th>identified</th><th>90 % interval</th><th>identifiable</th></tr>
@@ -92,6 +91,7 @@ def overview_page(
     ]
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     body = environment.from_string(_BODY).render(
+        means=f"{BASELINE_MEANS} {HELD_OUT_MEANS} {sigma_means(known=known.case.noise.known)}",
         verdict=verdict(known),
         with_effects=f", with {names}" if names else ", baseline model",
         estimates=[_told(e) for e in estimates_of(fitter, fit)],

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from physid_drake.effects.rollout import Geometry, geometry_with
 from physid_drake.plan import DistanceToGoal, Ending, Hindsight, InsideRegion, Outcome, Plan, SweepRow, WithinDisc
 from physid_drake.report.outline import outline_of
-from physid_drake.report.pages import PLAN, nav
+from physid_drake.report.pages import BASELINE_MEANS, PLAN, nav
 from physid_drake.report.plan import plan_rows, push_files, title_of
 from physid_drake.report.svg import MUTED, drawn, svg_of
 from physid_drake.report.table_view import MM, placed
@@ -72,7 +72,8 @@ def plan_page(
         title=title_of(plan), rows=plan_rows(plan, with_effects=with_effects, hindsight=hindsight),
         above=picture,
         curve=curve_svg(plan) if plan.sweep else None, caption=caption_of(plan), files=push_files(plan),
-        seed=seed, other=with_effects is not None, trials=plan.search.belief.n_trials, nav=nav(PLAN, pages),
+        seed=seed, baseline_means=BASELINE_MEANS, other=with_effects is not None,
+        trials=plan.search.belief.n_trials, nav=nav(PLAN, pages),
     ) + "\n"  # fmt: skip
 
 
@@ -217,6 +218,6 @@ i { display: inline-block; width: 18px; height: 4px; border-radius: 2px; vertica
 {% endfor %}
 </table>
 <p class="note">{{ files | join(", ") }}: the hand's path for a controller (time_s, hand_x_m, hand_y_m, hand_z_m).
-{{ trials }} candidates evaluated; random seed {{ seed }}.</p>
+{{ trials }} candidates evaluated; random seed {{ seed }}. {{ baseline_means }}</p>
 </main></body></html>
 """

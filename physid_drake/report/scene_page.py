@@ -8,7 +8,7 @@ from pathlib import Path
 from jinja2 import Environment, StrictUndefined
 
 from physid_drake.plan.reach import SHIPPED_TABLE
-from physid_drake.report.pages import SCENE, nav
+from physid_drake.report.pages import BASELINE_MEANS, SCENE, nav
 from physid_drake.report.stage import (
     ARROW,
     BASELINE,
@@ -84,7 +84,7 @@ def _switches(setting: Setting, acts: Sequence[Act]) -> list[tuple[str, str, str
 
 
 def _notes(acts: Sequence[Act], unit_force: float | None) -> list[str]:
-    lines = []
+    lines = [BASELINE_MEANS]
     if unit_force is not None and any(act.missing for act in acts):
         lines.append(
             f"An arrow of {1e3 * ARROW:.0f} mm is {unit_force:.2g} N; grey arrows are within two standard deviations"

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
 from rich.table import Table
 
 from physid_drake.identify import Accuracy, Estimate, Identification
 from physid_drake.identify.identify import EXPLAINED
 from physid_drake.pushes.stated import FAR_BELOW, quieter_by
+from physid_drake.report.pages import sigma_means
 from physid_drake.report.terminal import narrow_table, numbers, words
-
-SIGMA: Final = "sigma: in units of tracker noise (one standard deviation)"
 
 
 def estimates_table(result: Identification, title: str) -> Table:
@@ -42,7 +40,7 @@ def accuracy_table(result: Identification) -> Table:
     headings = ("path\n[mm]", "path\n[deg]", "end\n[mm]", "end\n[deg]", "force\n[N]", "path\n[sigma]")
     table = narrow_table(
         "prediction error (root mean square)", words("pushes"), words("parameters"), *map(numbers, headings),
-        caption=SIGMA,
+        caption=sigma_means(known=result.case.noise.known),
     )  # fmt: skip
     rows = (
         ("held-out", "initial guess", result.before),
