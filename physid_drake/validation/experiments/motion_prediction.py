@@ -93,7 +93,7 @@ class MotionPrediction:
         best = [float(trials.misfits[:count].min()) for count in counts]
         return {
             "theta": trials.best_after(self.budget).tolist(),
-            "sigmas": [math.exp(b) for b in best],
+            "sigma": [math.exp(b) for b in best],
             "mm": [row["mm"] for row in rows],
             "deg": [row["deg"] for row in rows],
         }
@@ -120,7 +120,7 @@ class MotionPrediction:
             )
             for title, label, unit in (
                 ("test pushes: place", "error of the end [mm]", "mm"),
-                ("training pushes", "rms residual [sigma]", "sigmas"),
+                ("training pushes", "rms residual [sigma]", "sigma"),
             )
         )  # fmt: skip
         pushes = Panel(
@@ -153,7 +153,7 @@ class MotionPrediction:
                 found = [r["methods"][method] for r in records]
                 rows.append((method, count, *mean_and_deviation([f["mm"][count - 1] for f in found]),
                              *mean_and_deviation([f["deg"][count - 1] for f in found]),
-                             *mean_and_deviation([f["sigmas"][count - 1] for f in found])))  # fmt: skip
+                             *mean_and_deviation([f["sigma"][count - 1] for f in found])))  # fmt: skip
         for name, key in (("nominal parameters", "nominal_theta"), ("true parameters in the cell", "true_theta")):
             rows.append((name, None, *mean_and_deviation([r[key]["mm"] for r in records]),
                          *mean_and_deviation([r[key]["deg"] for r in records]), None, None))  # fmt: skip
