@@ -119,7 +119,7 @@ def size_of(errors):
 
 def table(found):
     rows = Table(
-        "worlds", "of", "method", "mm", "deg", "CPU s", "names it", title="pushes left out", title_justify="left"
+        "worlds", "of", "method", "mm", "deg", "CPU s", "names it", title="held-out pushes", title_justify="left"
     )
     for kind in KINDS:
         for k, method in enumerate(METHODS if found[kind] else ()):

@@ -266,7 +266,7 @@ def test_the_main_job_plans_with_what_it_identified(tmp_path):
     assert (out / "push.csv").exists() and (out / "plan.png").exists()
     for page in ("plan.html", "index.html"):
         text = (out / page).read_text()
-        assert f"{content['settings']['speed']['value']:.4f} m/s" in text and "Cost against speed" in text
+        assert f"{content['settings']['speed']['value']:.4f} m/s" in text and "Miss against speed" in text
 
 
 TILT = (TableTilt(x=0.04),)
