@@ -116,7 +116,7 @@ def cells_error(recording, truth):
 
 
 def table(rows):
-    made = Table(title="error of left-out pushes in mm, and over that of the true world")
+    made = Table(title="error of held-out pushes in mm, and over that of the true model")
     errors = ("true world", "as tracked", "cell", "diagnosis")
     for column in ("world", "truth", *errors, *(f"{name} / true" for name in errors[1:])):
         made.add_column(column, justify="left" if column in ("world", "truth") else "right")

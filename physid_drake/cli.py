@@ -5,11 +5,10 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import warnings
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from physid_drake.door import Parser, enter, path
+from physid_drake.door import Parser, enter, path, say_error
 from physid_drake.errors import ConfigError
 from physid_drake.recording import Recording
 from physid_drake.run_folder import made_with, write_whole
@@ -46,7 +45,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="physid_drake",
         description="Identify an object's mass and friction from recorded pushes, and find the physics "
-        "that a simulation leaves out.",
+        "that a simulation is missing.",
         epilog="`physid_drake COMMAND --help` says more. Start: physid_drake diagnose eraser_reference",
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="versions of this and of Drake")
@@ -80,9 +79,9 @@ class _Version(argparse.Action):
 
 def _register_inspect(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser("inspect", help="check a recording and show what is in it")
-    parser.add_argument("recording", metavar="RECORDING", help="a FOLDER, or the name of a recording that ships")
+    parser.add_argument("recording", metavar="RECORDING", help="a FOLDER, or the name of a shipped recording")
     parser.add_argument("--out", type=path, metavar="FILE.png", help="also draw all pushes from above into this file")
-    parser.add_argument("--no-fit", action="store_true", help="do not fit pushes to see whether conventions hold")
+    parser.add_argument("--no-fit", action="store_true", help="do not fit pushes to check units and conventions")
     parser.set_defaults(run=_run_inspect)
 
 
@@ -98,23 +97,23 @@ def _register_convert(subparsers: Subparsers) -> None:
     parser.add_argument(
         "layout",
         choices=["table", "bag", "cmu", "mit", "cube"],
-        help="table: numbers that a map explains (CSV, npz, HDF5, Parquet); bag: of ROS 1 or 2, the same; else whose"
-        " published layout SOURCE is in",
+        help="table: columns that a map describes (CSV, npz, HDF5, Parquet); bag: a ROS 1 or 2 bag, with a map; cmu,"
+        " mit, cube: published data sets",
     )
     parser.add_argument("source", type=path, metavar="SOURCE", help="a file, or a folder of them")
     parser.add_argument(
-        "folder", type=path, nargs="?", metavar="FOLDER", help="where the recording goes; new or empty"
+        "folder", type=path, nargs="?", metavar="FOLDER", help="output folder of the recording; new or empty"
     )
     parser.add_argument(
         "--guess",
         action="store_true",
-        help="of table and bag: show what is in SOURCE, and write a first map",
+        help="table and bag: show what is in SOURCE, and write a first map",
     )
+    parser.add_argument("--map", type=path, metavar="FILE.yaml", help="table and bag: what each column or topic is")
     parser.add_argument(
-        "--map", type=path, metavar="FILE.yaml", help="of table and bag: says what the columns or topics are"
+        "--limit", type=int, metavar="N", help="published data sets: convert N pushes, chosen at random"
     )
-    parser.add_argument("--limit", type=int, metavar="N", help="of a published layout: draw N pushes at random")
-    parser.add_argument("--seed", type=int, metavar="N", default=0, help="seed of that draw (default 0)")
+    parser.add_argument("--seed", type=int, metavar="N", default=0, help="random seed of that choice (default 0)")
     parser.set_defaults(run=_run_convert)
 
 
@@ -139,7 +138,7 @@ def _run_convert(arguments: argparse.Namespace) -> int:
         from physid_drake.run_inspect import look  # noqa: PLC0415
 
         for why in look(recording)[:1]:
-            warnings.warn(f"would be refused: {why}", UserWarning, stacklevel=1)
+            say_error(why)
         print(f"next: physid_drake inspect {arguments.folder}")
     return 0
 
@@ -150,9 +149,9 @@ def _guess(arguments: argparse.Namespace) -> int:
     from physid_drake.report.terminal import terminal  # noqa: PLC0415
 
     if arguments.layout not in ("table", "bag"):
-        raise ConfigError(f"--guess is of table and bag: the layout of {arguments.layout} is known; leave it out.")
+        raise ConfigError(f"--guess is for table and bag: the layout of {arguments.layout} is known; leave it out.")
     if arguments.folder is not None:
-        raise ConfigError("FOLDER is of a conversion: --guess writes no recording; leave it out.")
+        raise ConfigError("FOLDER is for a conversion: --guess writes no recording; leave it out.")
     if is_bag(arguments.source) != (arguments.layout == "bag"):
         other = "bag" if arguments.layout == "table" else "table"
         raise ConfigError(f"'{arguments.source}': is no {arguments.layout}; use `convert {other}`.")
@@ -172,7 +171,7 @@ def _published(arguments: argparse.Namespace) -> Recording:
     from physid_drake.recording.adapters import convert_cmu, convert_cube, convert_mit  # noqa: PLC0415
 
     if arguments.map is not None:
-        raise ConfigError(f"--map is of table and bag: the layout of {arguments.layout} is known; leave it out.")
+        raise ConfigError(f"--map is for table and bag: the layout of {arguments.layout} is known; leave it out.")
     if arguments.seed < 0:
         raise ConfigError(f"--seed must be at least 0, but is {arguments.seed}.")
     convert = {"cmu": convert_cmu, "mit": convert_mit, "cube": convert_cube}[arguments.layout]
@@ -181,23 +180,25 @@ def _published(arguments: argparse.Namespace) -> Recording:
 
 def _register_diagnose(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser(
-        "diagnose", help="say what physics a recording has that the simulation leaves out",
-        description="Say whether recorded pushes differ from a Drake simulation, where, and what physics was left "
-        "out; write a page, a 3D scene and a model with what was found.",
+        "diagnose", help="find the physics that a simulation of recorded pushes is missing",
+        description="Test whether recorded pushes differ from a Drake simulation, locate the mismatch and name the "
+        "missing physics; write a page, a 3D scene and a model with the effects found.",
         epilog=EFFECTS, formatter_class=_WithEffects,
     )  # fmt: skip
-    parser.add_argument("recording", metavar="RECORDING", help="a FOLDER, or the name of a recording that ships")
-    parser.add_argument("--out", type=path, metavar="FOLDER", help="where results go (default: diagnoses/FOLDER)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (default 0)")
+    parser.add_argument("recording", metavar="RECORDING", help="a FOLDER, or the name of a shipped recording")
+    parser.add_argument("--out", type=path, metavar="FOLDER", help="output folder (default: diagnoses/FOLDER)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed (default 0)")
     parser.add_argument("--alpha", type=float, default=0.01, metavar="P", help="false-alarm rate (default 0.01)")
-    parser.add_argument("--effects", nargs="+", metavar="NAME", help="look at these effects only")
+    parser.add_argument("--effects", nargs="+", metavar="NAME", help="test these effects only")
     parser.add_argument("--contact", choices=["point", "hydroelastic"], default="point",
-                        help="contact model of the rollouts; the other one is the numerics guard")  # fmt: skip
+                        help="contact model of the rollouts; the other model is the solver check")  # fmt: skip
     parser.add_argument(
-        "--time-step", type=float, metavar="S", help="tick in contact (default: 1 ms, or by the speed)"
+        "--time-step", type=float, metavar="S", help="time step in contact (default: 1 ms, or by push speed)"
     )
-    parser.add_argument("--pushes", type=int, default=24, metavar="N", help="look at so many at most (default 24)")
-    parser.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: the machine's cores)")
+    parser.add_argument(
+        "--pushes", type=int, default=24, metavar="N", help="largest number of pushes used (default 24)"
+    )
+    parser.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: number of cores)")
     parser.set_defaults(run=_run_diagnose)
 
 
@@ -211,37 +212,41 @@ def _run_diagnose(arguments: argparse.Namespace) -> int:
 def _register_prove(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser(
         "prove", help="measure the diagnosis on sealed worlds of another simulator",
-        description="Make recordings of pushes in MuJoCo, with and without an effect that Drake's model lacks; seal "
-        "the truth; diagnose them; open the truth and count: found, named, placed, false alarms (pip install "
-        "'.[proof]'). A minute for each world; goes on where it stopped.",
+        description="Make recordings of pushes in MuJoCo, with and without an effect that the Drake model lacks; "
+        "seal the ground truth; diagnose the recordings; open the ground truth and count effects found, named and "
+        "located, and false alarms (pip install '.[proof]'). About a minute per world; an interrupted run resumes.",
     )  # fmt: skip
-    parser.add_argument("--worlds", type=int, metavar="N", help="how many (default 200)")
+    parser.add_argument("--worlds", type=int, metavar="N", help="number of worlds (default 200)")
     parser.add_argument("--quick", action="store_true", help="ten worlds")
     parser.add_argument("--seed", type=int, metavar="N",
-                        help="of all worlds (default: drawn, and sealed with them; of --real: 0)")  # fmt: skip
+                        help="random seed (default: drawn, and sealed with the worlds; with --real: 0)")  # fmt: skip
     parser.add_argument(
         "--out",
         type=path,
         metavar="FOLDER",
-        help="where all goes (default: proofs/worlds or proofs/real)",
+        help="output folder (default: proofs/worlds or proofs/real)",
     )
     parser.add_argument(
-        "--kind", choices=["none", "effect", "other", "pair", "notched"], help="only such worlds (default: a mix)"
+        "--kind",
+        choices=["none", "effect", "other", "pair", "notched"],
+        help="make worlds of this kind only (default: a mix)",
     )
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N",
-                        help="diagnoses at a time (default: the machine's cores)")  # fmt: skip
+                        help="parallel diagnoses (default: number of cores)")  # fmt: skip
     parser.add_argument("--timeout", type=float, default=1800.0, metavar="S",
-                        help="a diagnosis that takes longer has failed (default 1800)")  # fmt: skip
+                        help="a diagnosis that takes longer counts as failed (default 1800)")  # fmt: skip
     parser.add_argument("--cluster", metavar="ADDRESS",
-                        help="of a Dask scheduler, to diagnose there (pip install '.[cluster]')")  # fmt: skip
-    parser.add_argument("--retry", action="store_true", help="diagnose again what failed before")
+                        help="run on the Dask scheduler at this address (pip install '.[cluster]')")  # fmt: skip
+    parser.add_argument("--retry", action="store_true", help="repeat diagnoses that failed before")
     parser.add_argument("--open", action="store_true",
-                        help="score what has been diagnosed so far, and diagnose no more")  # fmt: skip
+                        help="score the diagnoses made so far, and make no more")  # fmt: skip
     parser.add_argument("--real", type=path, metavar="FOLDER",
-                        help="instead of worlds, recordings of robots that others published")  # fmt: skip
-    parser.add_argument("--only", nargs="+", metavar="NAME", help="of --real: only cases whose names begin so")
+                        help="diagnose published recordings of real robots instead of worlds")  # fmt: skip
+    parser.add_argument(
+        "--only", nargs="+", metavar="NAME", help="with --real: only cases whose names begin with NAME"
+    )
     parser.add_argument("--pushes", type=int, metavar="N",
-                        help="of --real: pushes that are diagnosed (default 20)")  # fmt: skip
+                        help="with --real: number of pushes diagnosed (default 20)")  # fmt: skip
     parser.set_defaults(run=_run_prove)
 
 
@@ -251,50 +256,61 @@ def _run_prove(arguments: argparse.Namespace) -> int:
         given = {"--open": arguments.open, "--quick": arguments.quick, "--worlds": arguments.worlds is not None,
                  "--kind": arguments.kind is not None}  # fmt: skip
         for flag in (flag for flag, is_given in given.items() if is_given):
-            raise ConfigError(f"{flag} is of sealed worlds: leave it out with --real.")
+            raise ConfigError(f"{flag} is for sealed worlds: leave it out with --real.")
         from physid_drake.validation.run_prove_real import run_real  # noqa: PLC0415
 
         return run_real(arguments)
     for flag, given in (("--only", arguments.only), ("--pushes", arguments.pushes)):
         if given is not None:
-            raise ConfigError(f"{flag} chooses among real recordings: give --real too.")
+            raise ConfigError(f"{flag} is for real recordings: give --real too.")
     from physid_drake.validation.run_prove import run  # noqa: PLC0415
 
     return run(arguments)
 
 
 def _register_plan(subparsers: Subparsers) -> None:
-    parser = subparsers.add_parser(
-        "plan", help="find the push that brings the object to a goal, with a model's physics"
-    )
+    parser = subparsers.add_parser("plan", help="find the push that brings the object to a goal, with a model")
     parser.add_argument(
-        "run_folder", nargs="?", type=path, metavar="RUN", help="folder of a run_cell run or diagnosis"
+        "run_folder", nargs="?", type=path, metavar="RUN", help="folder of a run_cell run or a diagnosis"
     )
     wanted = parser.add_mutually_exclusive_group(required=True)
-    wanted.add_argument("--goal", nargs=2, type=float, metavar=("X", "Y"), help="on the table, in m")
-    wanted.add_argument("--reach", metavar="ROBOT", help="baxter or motoman: any place that this robot reaches")
+    wanted.add_argument("--goal", nargs=2, type=float, metavar=("X", "Y"), help="goal position on the table, in m")
+    wanted.add_argument("--reach", metavar="ROBOT", help="baxter or motoman: any position that this robot reaches")
     parser.add_argument("--start", nargs=3, type=float, metavar=("X", "Y", "DEG"),
-                        help="of the object, in m and degrees (default: the middle of the table)")  # fmt: skip
+                        help="start pose of the object (default: the middle of the table)")  # fmt: skip
     parser.add_argument("--policy", default="push_speed", metavar="NAME",
                         help="push_speed (default), push_direction, push or two_pushes")  # fmt: skip
     parser.add_argument("--model", type=path, metavar="FILE", help="plan with this model instead of RUN's model.yaml")
-    parser.add_argument("--plain", action="store_true", help="plan without the effects found, to compare")
-    parser.add_argument("--speed", type=float, metavar="M/S", help="of push_direction (default 0.05)")
+    parser.add_argument("--baseline", action="store_true",
+                        help="plan with the baseline model (without the effects found), to compare")  # fmt: skip
+    parser.add_argument(
+        "--speed", type=float, metavar="M/S", help="with push_direction: speed of the push (default 0.05)"
+    )
     parser.add_argument("--direction", type=float, metavar="DEG",
-                        help="of push_speed, or the middle of the search (default: to the goal)")  # fmt: skip
-    parser.add_argument("--travel", type=float, metavar="M", help="of the hand from the touch to the brake")
-    parser.add_argument("--tolerance", type=float, default=0.01, metavar="M", help="of a success (default 0.01)")
+                        help="direction of push_speed, or middle of the search (default: to the goal)")  # fmt: skip
+    parser.add_argument(
+        "--travel", type=float, metavar="M", help="distance that the hand moves from first contact until it brakes"
+    )
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        default=0.01,
+        metavar="M",
+        help="largest miss that counts as a success (default 0.01)",
+    )
     parser.add_argument(
         "--search",
         default="greedy_entropy",
         metavar="NAME",
         help="greedy_entropy (default), entropy_search or random",
     )
-    parser.add_argument("--budget", type=int, metavar="N", help="settings tried (default: 24, 48 or 64, by policy)")
-    parser.add_argument("--draws", type=int, default=20, metavar="N", help="of theta, for the spread (default 20)")
-    parser.add_argument("--risk", action="store_true", help="make the mean cost over the draws small")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (default 0)")
-    parser.add_argument("--out", type=path, metavar="FOLDER", help="where results go (default: plans/RECORDING)")
+    parser.add_argument(
+        "--budget", type=int, metavar="N", help="candidates evaluated (default: 24, 48 or 64, by policy)"
+    )
+    parser.add_argument("--draws", type=int, default=20, metavar="N", help="posterior samples (default 20)")
+    parser.add_argument("--risk", action="store_true", help="minimise the expected cost")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed (default 0)")
+    parser.add_argument("--out", type=path, metavar="FOLDER", help="output folder (default: plans/RECORDING)")
     parser.set_defaults(run=_run_plan)
 
 
@@ -311,23 +327,24 @@ def _register_experiment(subparsers: Subparsers) -> None:
         description="Repeat an experiment of the paper, with MuJoCo worlds in the place of its robot.",
         epilog="motion_prediction: how well identified frictions predict pushes. mit_pushes: the same on MIT's "
         "recorded pushes. push_direction: directions that bring an object to a goal. push_speed: speeds that let it "
-        "slide there. next_push: whether the push that is offered tells rivals apart. corrected_plan: what a plan "
-        "gains by the effects that a diagnosis found. closed_loop: several pushes to a goal, seen and learned from.",
+        "slide there. next_push: whether informative pushes reduce the error faster than random ones. "
+        "corrected_plan: what a plan gains from the effects that a diagnosis found. closed_loop: several pushes to "
+        "a goal, each planned after observing the last.",
     )  # fmt: skip
     parser.add_argument(
         "name",
         metavar="NAME",
-        help="motion_prediction, mit_pushes, push_direction, push_speed, next_push or corrected_plan",
+        help="motion_prediction, mit_pushes, push_direction, push_speed, next_push, corrected_plan or closed_loop",
     )
-    parser.add_argument("--quick", action="store_true", help="small sizes: two or three minutes")
-    parser.add_argument("--data", type=path, metavar="FOLDER", help="of mit_pushes: the published end points")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="repetitions at a time (default 1)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="of everything random (default 0)")
+    parser.add_argument("--quick", action="store_true", help="a small version: two or three minutes")
+    parser.add_argument("--data", type=path, metavar="FOLDER", help="mit_pushes: folder of the published end points")
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="parallel repetitions (default 1)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed (default 0)")
     parser.add_argument(
         "--out",
         type=path,
         metavar="FOLDER",
-        help="where results go (default: experiments/NAME, with --quick NAME_quick)",
+        help="output folder (default: experiments/NAME, with --quick NAME_quick)",
     )
     parser.set_defaults(run=_run_experiment)
 
@@ -341,17 +358,17 @@ def _run_experiment(arguments: argparse.Namespace) -> int:
 
 def _register_model(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser(
-        "model", help="take a model to a simulation of your own",
-        description="Take the model that a run or a diagnosis leaves to a simulation of your own.",
+        "model", help="export a model to your own simulation",
+        description="Export the model of a run or a diagnosis to your own simulation.",
     )  # fmt: skip
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True)
     export = actions.add_parser(
         "export", help="SDFormat, model directives and MJCF",
-        description="Write a model as SDFormat with Drake's contact properties, model directives that put object,"
-        " table and hand together, and MJCF; a README.txt says which effects the formats cannot express.",
+        description="Write a model as SDFormat with Drake's contact properties, as model directives that assemble"
+        " object, table and hand, and as MJCF; README.txt lists the effects that these formats cannot express.",
     )  # fmt: skip
     export.add_argument("model", type=path, metavar="MODEL", help="model.yaml, or the folder of a run that holds it")
-    export.add_argument("--out", type=path, metavar="FOLDER", help="where files go (default: exports/RECORDING)")
+    export.add_argument("--out", type=path, metavar="FOLDER", help="output folder (default: exports/RECORDING)")
     export.set_defaults(run=_run_model_export)
 
 
@@ -364,7 +381,7 @@ def _run_model_export(arguments: argparse.Namespace) -> int:
 
 def _register_run_cell(subparsers: Subparsers) -> None:
     # Its own parser reads its words, once Drake is imported.
-    subparsers.add_parser("run_cell", help="all at once: identify, diagnose, plan and show", add_help=False)
+    subparsers.add_parser("run_cell", help="everything at once: identify, diagnose, plan and show", add_help=False)
 
 
 COMMANDS: list[Callable[[Subparsers], None]] = [

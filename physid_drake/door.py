@@ -106,6 +106,11 @@ def _failed(message: str) -> int:
     return FAILED
 
 
+def say_error(message: str) -> None:
+    """Print a reason for which a recording cannot be used, as one line on standard error; the command goes on."""
+    _say(f"ERROR: {in_one_line(message)}")
+
+
 def _say(line: str) -> None:
     with suppress(OSError):  # nobody may read it
         print(line, file=sys.stderr, flush=True)

@@ -70,28 +70,35 @@ def main(argv: Sequence[str] | None = None) -> int:
         run(_parser().parse_args(argv), terminal())
         return DONE
 
-    return enter(begin, interrupted="interrupted; the same command goes on from what is kept, if anything is")
+    return enter(begin, interrupted="interrupted; the same command resumes from what has been saved, if anything has")
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = Parser(prog="python -m physid_drake.run_cell", description=__doc__)
+    parser = Parser(prog="python -m physid_drake.run_cell", description=(
+        "Read a recording, identify its parameters, diagnose missing physics, plan a push and show the results."
+    ))  # fmt: skip
     parser.add_argument(
         "config", nargs="?", metavar="CONFIG",
-        help="FILE or FILE:SCENARIO (default: sealed, which ships with the project; with --recording, the defaults)",
+        help="FILE or FILE:SCENARIO (default: sealed, which ships with the project; with --recording: the defaults)",
     )  # fmt: skip
-    parser.add_argument("--recording", metavar="FOLDER", help="the pushes, instead of the scenario's")
+    parser.add_argument("--recording", metavar="FOLDER", help="recording to use instead of the scenario's")
     parser.add_argument(
         "--out", type=path, metavar="FOLDER",
-        help="where results go (default: runs/<scenario>; with --recording and no CONFIG, runs/<recording>)",
+        help="output folder (default: runs/<scenario>; with --recording and no CONFIG: runs/<recording>)",
     )  # fmt: skip
-    parser.add_argument("--seed", type=int, metavar="N", help="of everything random, instead of the scenario's")
-    parser.add_argument("--set", dest="override", metavar="YAML", help="such as '{search: {budget: 20}}'")
+    parser.add_argument("--seed", type=int, metavar="N", help="random seed, instead of the scenario's")
+    parser.add_argument(
+        "--set",
+        dest="override",
+        metavar="YAML",
+        help="override settings of the scenario, such as '{search: {budget: 20}}'",
+    )
     parser.add_argument("--no-diagnosis", action="store_true", help="identify and plan with the baseline model only")
     parser.add_argument("--no-plan", action="store_true", help="plan no push")
-    parser.add_argument("--no-view", action="store_true", help="serve no live Meshcat while working")
+    parser.add_argument("--no-view", action="store_true", help="serve no live Meshcat view while working")
     parser.add_argument(
         "--host", default=LOOPBACK, metavar="ADDRESS",
-        help=f"where the live Meshcat listens (default {LOOPBACK}: this machine only; * for all its networks)",
+        help=f"address that the live Meshcat listens on (default {LOOPBACK}: this machine only; *: all networks)",
     )  # fmt: skip
     return parser
 
@@ -254,7 +261,7 @@ class Work:
 
     def _examined(self, known: Identification, bar: Progress) -> Examined:
         if self._scenario.search.online:
-            bar("in the Drake cell", 0, 0)
+            bar("refit in the Drake cell", 0, 0)
             known = with_prior(in_the_cell(known))
         if not self._diagnosing:
             self._say(f"identified: {', '.join(e.name for e in known.estimates if e.identifiable)}")
@@ -269,7 +276,7 @@ class Work:
         fit = examined.known.fit if evidence is None else evidence.leaving
         scatter, pushes = UNIT_SCATTER * fit.scatter, len(fit.pushes)
         plan = planner.with_model(model, friction_scatter=scatter, pushes=pushes, tick=bar)
-        self._say(f"planned: off by {1e3 * plan.cost:.1f} mm")
+        self._say(f"planned: miss {1e3 * plan.cost:.1f} mm")
         if diagnosis is not None:
             self._hindsight = self._with_plain(planner, examined, diagnosis, model, bar)
         return plan
@@ -310,9 +317,9 @@ def _show(result: Identification, recording: Recording, console: Console, *, alo
         console.print(verdict(result))
     odd = (*doubts(recording), *warning_lines(recording))
     for line in odd[:MOST_WARNINGS]:
-        console.print(f"Note: {line}", markup=False)
+        console.print(f"warning: {line}", markup=False)
     if len(odd) > MOST_WARNINGS:
-        console.print(f"and {len(odd) - MOST_WARNINGS} more: physid_drake inspect")
+        console.print(f"{len(odd) - MOST_WARNINGS} more warnings: physid_drake inspect")
     pools = (result.case.pool, result.fitter.predictor.rollouts.pool)
     diverged, count = (sum(getattr(pool, name) for pool in pools) for name in ("diverged", "count"))
     if diverged:
@@ -352,7 +359,7 @@ def _planner(scenario: Scenario, recording: Recording, identifier: Identifier, c
     except ConfigError as error:
         if asked:
             raise
-        console.print(f"No push is planned. {error}")
+        console.print(f"No push is planned: {error}")
         return None
 
 

@@ -71,14 +71,14 @@ def run(arguments: argparse.Namespace) -> int:
     with RunFolder.open(out, COMMAND, settings, name=SETTINGS, state=(STATE,), results=FILES) as folder:
         kept = KeptRollouts(folder.own(STATE))
         if len(kept):
-            console.print(f"going on with what was kept, rollouts: {len(kept)}")
+            console.print(f"resuming with {len(kept)} rollouts of the interrupted run")
         try:
             diagnosis, evidence = run_case(
                 case, console, seed=arguments.seed, alpha=arguments.alpha, effects=arguments.effects, kept=kept
             )
         except KeyboardInterrupt:
             if len(kept):
-                console.print("what was found is kept, and the same command goes on from there")
+                console.print("interrupted: the rollouts are kept, and the same command resumes from them")
             raise
         write(folder, diagnosis, evidence)
         folder.forget(STATE)
@@ -108,13 +108,15 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
     console.print(Text.assemble((diagnosis.verdict, "bold"), f" ({p_value}). {diagnosis.sentence}"))
     if diagnosis.location is not None:
         console.print(f"Where: {diagnosis.location.statement}.")
-    console.print(f"Left over: {diagnosis.left}.")
+    console.print(f"Remaining misfit: {diagnosis.left}.")
     if diagnosis.verdict == "unexplained" and diagnosis.reduced_chi2_before > FAR**2:
-        console.print("The baseline model misses by far: `physid_drake inspect` tries whether a convention is wrong.")
+        console.print(
+            "The baseline model is far off: `physid_drake inspect` tests whether a unit or convention is wrong."
+        )
     for warning in diagnosis.warnings[:MOST_NOTES]:
-        console.print(f"Note: {warning}.")
+        console.print(f"warning: {warning}.")
     if len(diagnosis.warnings) > MOST_NOTES:
-        console.print(f"Note: {len(diagnosis.warnings) - MOST_NOTES} more in diagnosis.json and on the page.")
+        console.print(f"{len(diagnosis.warnings) - MOST_NOTES} more warnings in diagnosis.json and on the page.")
     if diagnosis.effects:
         console.print(findings_table(diagnosis))
     console.print(fit_table(diagnosis))
@@ -124,9 +126,8 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
     push = diagnosis.next_push
     if push is not None:
         console.print(
-            f"Next push: towards {push.direction_deg:.0f} degrees at {push.speed_mps:.2g} m/s,"
-            f" {push.aim}, {push.start}, would settle it with probability"
-            f" {push.settles_with_probability:.2f}."
+            f"Next push: towards {push.direction_deg:.0f} deg at {push.speed_mps:.2g} m/s, {push.aim}, {push.start};"
+            f" distinguishes the candidates with probability {push.settles_with_probability:.2f}."
         )
 
 
@@ -174,6 +175,6 @@ def diagnosis_scene(
     return scene_page(
         setting_of(evidence.known, evidence), [*acts_of(evidence.known, evidence), *planned],
         name=diagnosis.recording, lines=[f"{diagnosis.verdict.capitalize()}. {diagnosis.sentence}"],
-        corrected=f"with {named}" if named else "with a force without a name",
+        corrected=f"with {named}" if named else "with an unnamed force",
         unit_force=unit_force_of(evidence), pages=pages,
     )  # fmt: skip

@@ -7,6 +7,7 @@ import warnings
 from pathlib import Path
 
 from physid_drake.doctor import examined
+from physid_drake.door import say_error
 from physid_drake.errors import RecordingError
 from physid_drake.pushes.doubts import doubts
 from physid_drake.pushes.refusals import refusals
@@ -45,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def look(recording: Recording) -> tuple[str, ...]:
-    """Warns of what is odd about a recording, and of all but the first reason for which a diagnosis would refuse it.
+    """Print warnings, and as ERROR lines all but the first reason for which a diagnosis refuses the recording.
 
     Returns:
         The reasons, those that are alike as one.
@@ -55,5 +56,5 @@ def look(recording: Recording) -> tuple[str, ...]:
     for line in (*warnings_by_kind(recording), *doubts(recording)):
         warnings.warn(line, UserWarning, stacklevel=2)
     for line in refused[1:]:
-        warnings.warn(f"would be refused: {line}", UserWarning, stacklevel=2)
+        say_error(line)
     return tuple(refused)

@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
     """
     model, learnt = _read(arguments)
     full = model
-    if arguments.plain:
+    if arguments.baseline:
         model = model.plain()
     start, goal, cost = _places(arguments, model)
     choices = Choices(
@@ -89,27 +89,27 @@ def run(arguments: argparse.Namespace) -> int:
             friction_scatter=learnt.friction_scatter, scatter_freedom=learnt.scatter_freedom, tick=tick,
         )  # fmt: skip
     if not math.isfinite(made.cost):
-        raise ConfigError(f"model '{model.recording}': every rollout diverged, so that there is no push to make.")
+        raise ConfigError(f"model '{model.recording}': every rollout diverged: no push was found.")
     if made.predicted.ending is not Ending.AT_REST:
         raise ConfigError(
-            f"model '{model.recording}': the best push that was found does not bring the object to rest on the table"
+            f"model '{model.recording}': the best push does not bring the object to rest on the table"
             f" ({made.predicted.ending.value}); nothing is written. Choose another start, goal or direction."
         )
-    with_effects = outcome_under(made, full) if arguments.plain and full.effects else None
+    with_effects = outcome_under(made, full) if arguments.baseline and full.effects else None
     hindsight = Hindsight(caveat=learnt.caveat) if learnt.caveat else None
     settings = settings_text(COMMAND, _settings(arguments))
     with RunFolder.open(out, COMMAND, settings, name=SETTINGS) as folder:
         if folder.holds(FILES[0]):
-            console.print(f"The plan that {out} held is replaced.")
+            console.print(f"Replaces the earlier plan in {out}.")
         write(folder, made, seed=arguments.seed, with_effects=with_effects, hindsight=hindsight)
     console.print(plan_table(made, with_effects=with_effects, hindsight=hindsight))
     if made.cost > made.tolerance:
         console.print(_miss(made, arguments, model, choices, goal, console))
     nothing = made.cost_function.at(np.array(start[:2]))
     if made.cost > nothing:
-        console.print(f"No push at all would leave the object nearer: {1e3 * nothing:.1f} mm.")
+        console.print(f"Without any push the object is nearer: {1e3 * nothing:.1f} mm.")
     if made.spread is None and arguments.draws:
-        console.print("The model has no intervals to draw from: no spread, no success rate.")
+        console.print("The model has no intervals to sample from: no expected miss, no success rate.")
     names = ["plan.json", *push_files(made), "plan.png"]
     console.print(f"written: {', '.join(names)} and pages; open {folder.path / INDEX}")
     return 0
@@ -125,7 +125,7 @@ def _miss(
 ) -> str:
     """That the best push misses the goal, and which other policy reaches it: those of more settings are tried."""
     situation = made.situation
-    said = f"The best push misses the goal by {1e3 * made.cost:.1f} mm; {1e3 * made.tolerance:g} mm were allowed."
+    said = f"The best push misses the goal by {1e3 * made.cost:.1f} mm; the tolerance is {1e3 * made.tolerance:g} mm."
     nearest: tuple[float, str] = made.cost, ""
     for name in WIDER.get(arguments.policy, ()):
         policy = policy_for(name, model, situation.start, goal, dc.replace(choices, direction=None))
@@ -141,9 +141,9 @@ def _miss(
             break
     cost, name = nearest
     if not name:
-        return f"{said} No other policy comes nearer: choose a goal that is nearer, or push again from where it ends."
+        return f"{said} No other policy comes nearer: choose a nearer goal, or push again from there."
     reaches = "reaches it" if cost <= made.tolerance else "comes nearer"
-    return f"{said} --policy {name} {reaches}: off by {1e3 * cost:.1f} mm."
+    return f"{said} --policy {name} {reaches}: miss {1e3 * cost:.1f} mm."
 
 
 def _trials(arguments: argparse.Namespace, policy: Policy) -> int:
@@ -201,7 +201,7 @@ def forget(folder: RunFolder) -> None:
 def _read(arguments: argparse.Namespace) -> tuple[Model, Learnt]:
     folder: Path | None = arguments.run_folder
     if folder is None and arguments.model is None:
-        raise ConfigError("plan: give the folder of a run or of a diagnosis, or --model FILE.")
+        raise ConfigError("plan: give the folder of a run or a diagnosis, or --model FILE.")
     if folder is not None and not folder.is_dir():
         raise ConfigError(f"run '{folder}': there is no such folder.")
     if arguments.model is None and folder is not None and not (folder / "model.yaml").exists():

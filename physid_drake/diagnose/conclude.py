@@ -102,7 +102,9 @@ def _by_cell(evidence: Evidence) -> tuple[str, ...]:
     count = len(evidence.found.fitter.predictor.by_cell)
     if not count:
         return ()
-    return (f"{count} of the pushes were rolled out by the Drake cell alone, whose motion the twin does not know",)
+    return (
+        f"{count} of the pushes were simulated in the Drake cell alone, because the fast twin does not cover them",
+    )
 
 
 def _location(evidence: Evidence, seed: int) -> Location | None:
@@ -160,15 +162,15 @@ def _quality(evidence: Evidence) -> FitQuality:
 def _left(evidence: Evidence) -> str:
     """What the model that leaves does not account for, in words."""
     if is_own_error(accuracy_of(evidence.case, evidence.errors_before)):
-        return "no more than what two simulators differ by"
+        return "no more than the difference between two simulators"
     after = evidence.leaving
     scatter = 100.0 * UNIT_SCATTER * after.scatter
     trend = friction_trend(evidence.fitter, after)
-    friction = f"friction scatters by {scatter:.0f} % from push to push" + ("" if trend is None else f", {trend}")
+    friction = f"friction scatter between pushes {scatter:.0f} %" + ("" if trend is None else f", {trend}")
     rough = evidence.known.rough
     if not rough.is_none:
-        friction += f", and by {100 * rough.table:.0f} % along its way ({100 * rough.tip:.0f} % at the tip)"
-    nameless = "" if evidence.named or evidence.best is None else "beside a force without a name, "
+        friction += f", within a push {100 * rough.table:.0f} % ({100 * rough.tip:.0f} % at the tip)"
+    nameless = "" if evidence.named or evidence.best is None else "beside an unnamed force, "
     if after.loudness <= loudest(evidence.case.noise):
         return f"{nameless}no more than noise; {friction}"
-    return f"{nameless}{after.loudness:.1f} times what noise and the simulator's own error would leave; {friction}"
+    return f"{nameless}{after.loudness:.1f} times the noise and the simulator's own error; {friction}"

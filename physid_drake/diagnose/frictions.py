@@ -27,16 +27,16 @@ def friction_trend(fitter: Fitter, fit: Fit) -> str | None:
     if len(every) < FEWEST:
         return None
     looks = {
-        "the further the object goes": [_way(case, i) for i in every],
-        "the faster it is pushed": [speed_of(case, i) for i in every],
-        "the later the push": [float(case.problems[i].order) for i in every],
+        "for longer motions": [_way(case, i) for i in every],
+        "at higher speed": [speed_of(case, i) for i in every],
+        "in later pushes": [float(case.problems[i].order) for i in every],
     }
     seen = {words: stats.kendalltau(frictions, values) for words, values in looks.items()}
     best = min(seen, key=lambda words: float(np.nan_to_num(seen[words].pvalue, nan=1.0)))
     if not len(looks) * seen[best].pvalue < CHANCE:
         return None
     tau = float(seen[best].statistic)
-    return f"{'more' if tau > 0.0 else 'less'} {best} (rank correlation {tau:.2f})"
+    return f"{'higher' if tau > 0.0 else 'lower'} {best} (rank correlation {tau:.2f})"
 
 
 def _way(case: Case, i: int) -> float:

@@ -36,7 +36,7 @@ AS_GOOD = 0.8  # of the gain in one phase: the pattern holds in both
 IMITATED = 1e-9  # of a look: less is rounding
 DIGITS = 6  # of gains that are compared: of looks that theta makes the same, the first, whatever the rounding
 A_PART = 0.25  # of the most that a phase or a degree of freedom has
-SAID = {"contact": "while it is pushed", "free_slide": "in its free slide"}
+SAID = {"contact": "contact", "free_slide": "free sliding"}
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -68,7 +68,7 @@ class _Seen:
 
 
 NOWHERE = Location(
-    statement="at the pushes' ends; of their way too little was recorded to say more", phase=(), dof=(),
+    statement="at the ends of the pushes; too few poses in between to say more", phase=(), dof=(),
     frame="none", windows=(),
 )  # fmt: skip
 
@@ -126,31 +126,31 @@ def looks_at(wrenches: Sequence[MissingWrench], order: Array, phases: Sequence[s
     force, motion, turn = DOFS[:2], DOFS[:1], DOFS[2:]
     return [
         Look(frame="object_velocity", dof=motion, weights=over.component(along, every),
-             words=lambda c: f"{_sense(c)} the motion, wherever the object heads"),
+             words=lambda c: f"{_sense(c)} the motion, for all headings"),
         Look(frame="object_velocity", dof=motion, weights=over.component(along, over.centred(speed)),
-             words=lambda c: f"{_sense(c)} the motion, more so the faster it is"),
+             words=lambda c: f"{_sense(c)} the motion, stronger at higher speed"),
         Look(frame="object_velocity", dof=DOFS[1:2], weights=over.component(across, every),
-             words=lambda c: f"to the {_side(c)} of the motion, wherever the object heads"),
+             words=lambda c: f"to the {_side(c)} of the motion, for all headings"),
         Look(frame="object_velocity", dof=turn, weights=over.component(torque, spin),
-             words=lambda c: f"{_sense(c)} its turning"),
+             words=lambda c: f"{_sense(c)} the rotation"),
         Look(frame="world", dof=force, weights=over.fixed(np.zeros_like(yaw)),
-             words=lambda c: f"towards {_degrees(c)} degrees on the table"),
+             words=lambda c: f"towards {_degrees(c)} deg on the table"),
         Look(frame="world", dof=force, weights=over.grain(heading),
-             words=lambda c: f"against the motion, most along {_axis(-c)} degrees on the table, and aside"),
+             words=lambda c: f"mainly against the motion, strongest for motion at {_axis(-c)} deg"),
         Look(frame="world", dof=motion, weights=over.component(along, *over.centred(place).T),
-             words=lambda c: f"along the motion, changing towards {_degrees(c)} degrees on the table"),
+             words=lambda c: f"along the motion, increasing towards {_degrees(c)} deg on the table"),
         Look(frame="object", dof=force, weights=over.fixed(yaw),
-             words=lambda c: f"towards {_degrees(c)} degrees of the object"),
+             words=lambda c: f"towards {_degrees(c)} deg of the object"),
         Look(frame="object", dof=force, weights=over.grain(heading - yaw),
-             words=lambda c: f"against the motion, most along {_axis(-c)} degrees of the object, and aside"),
+             words=lambda c: f"mainly against the motion, strongest for motion at {_axis(-c)} deg of the object"),
         Look(frame="object", dof=turn, weights=over.component(torque, every),
-             words=lambda c: f"as a torque to the {_side(c)}"),
+             words=lambda c: f"a {_turn(c)} torque"),
         Look(frame="object", dof=turn, weights=over.component(torque, *_circle(heading - yaw)),
-             words=lambda c: "as a torque, by which side of the object leads"),
+             words=lambda c: "a torque that depends on the direction of motion in the object frame"),
         Look(frame="hand", dof=turn, weights=over.component(torque, *_circle(heading)),
-             words=lambda c: "as a torque, by where the push heads"),
+             words=lambda c: "a torque that depends on the heading of the push"),
         Look(frame="push_order", dof=motion, weights=over.component(along, over.centred(order)),
-             words=lambda c: "along the motion, changing from push to push"),
+             words=lambda c: "along the motion, changing between pushes"),
     ]  # fmt: skip
 
 
@@ -202,6 +202,10 @@ def _circle(angle: Array) -> tuple[Array, Array]:
 
 def _side(coefficients: Array) -> str:
     return "left" if coefficients[0] > 0.0 else "right"
+
+
+def _turn(coefficients: Array) -> str:
+    return "counter-clockwise" if coefficients[0] > 0.0 else "clockwise"
 
 
 def _sense(coefficients: Array) -> str:
@@ -295,12 +299,13 @@ def _location(case: Case, wrenches: Sequence[MissingWrench], seen: Sequence[_See
         power = (values**2).mean(axis=0)
         dof = tuple(d for d, p in zip(DOFS, power.tolist(), strict=True) if p >= A_PART * power.max())
         few = len({w.push for w in wrenches}) < FEWEST_PUSHES
-        frame, detail = "none", "in too few pushes to say where" if few else "in no one direction that stands out"
+        frame, detail = "none", "too few pushes to find a direction" if few else "no direction stands out"
     in_question = [k for k, w in enumerate(wrenches) if w.phase in phase]
     much = np.sqrt((values[in_question] ** 2) @ [name in dof for name in DOFS])
     windows = tuple(_window(case, wrenches[k]) for k in (in_question[i] for i in np.argsort(-much)[:WINDOWS]))
-    where = " and ".join(SAID[p] for p in phase)
-    statement = f"{where}{_amount([w for w in wrenches if w.phase in phase], dof)}, {detail}"
+    where = "during " + " and ".join(SAID[p] for p in phase)
+    amount = _amount([w for w in wrenches if w.phase in phase], dof)
+    statement = f"{where}{amount}; {detail}" + ("" if amount else "; not in any single window")
     if windows:
         statement += f"; {whereabouts(windows)}"
     return Location(statement=statement, phase=phase, dof=dof, frame=frame, windows=windows)
@@ -324,10 +329,10 @@ def _phases(best: _Seen, seen: Sequence[_Seen]) -> tuple[str, ...]:
 
 
 def _amount(wrenches: Sequence[MissingWrench], dof: Sequence[str]) -> str:
-    """How much is missing in some degrees of freedom, where it stands out of its standard deviation."""
+    """How much is missing in some degrees of freedom, where it stands out of its standard deviation; else empty."""
     sure = [np.where(np.abs(w.wrench) > SURE * w.std, np.abs(w.wrench), 0.0) for w in wrenches]
     amounts = np.array(sure) * [name in dof for name in DOFS]
     forces, torques = amounts[:, :2].max(axis=1), amounts[:, 2]
     parts = [f"{np.median(forces[forces > 0.0]):.2g} N"] if (forces > 0.0).any() else []
     parts += [f"{1e3 * np.median(torques[torques > 0.0]):.2g} N mm"] if (torques > 0.0).any() else []
-    return f": about {' and '.join(parts)} missing" if parts else ", too little in any one window to be seen there"
+    return f", about {' and '.join(parts)}" if parts else ""

@@ -32,7 +32,7 @@ def ranking_of(evidence: Evidence, classes: Sequence[Sequence[str]]) -> tuple[Ra
     return tuple(
         Ranked(
             name=name,
-            gain=2.0 * max(0.0, scored[name]),
+            gain=max(0.0, scored[name]),
             p_value=float(np.exp(-surprise(np.array([sure[name]]), found.by_chance[name])[0])),
             held_out_gain=gains[name] if np.isfinite(gains[name]) else None,
             held_out_se=standard_error(alone[name].gains) if name in alone else None,
@@ -46,11 +46,11 @@ def _why(name: str, one: Weighed | None, named: set[str], alike: set[str], evide
     if name in named:
         return "found"
     if name in alike:
-        return "these pushes cannot tell it from what was found"
+        return "indistinguishable from the effect found"
     if one is None:
-        return "cannot be rolled out" if evidence.found.odd else "explains no more than chance would"
+        return "cannot be simulated" if evidence.found.odd else "no larger gain than by chance"
     if not confirmed(evidence.found, one):
-        return "pushes that were left out do not confirm it"
+        return "not confirmed by held-out pushes"
     if named:
-        return "predicts pushes that were left out worse"
-    return "pushes that were left out confirm it, but it leaves more than noise"
+        return "smaller gain on held-out pushes"
+    return "confirmed by held-out pushes, but more than noise remains"

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.diagnose.values import RegimeGain
+from physid_drake.diagnose.whereabouts import headings_of, speeds_of
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.pushes.case import Case
 from physid_drake.pushes.problem import push_speed
@@ -28,9 +30,10 @@ def regime_gains(fitter: Fitter, before: Fit, after: Fit) -> tuple[RegimeGain, .
         after: the model with effects.
     """
     found, case = [], fitter.case
-    for names, halves in ((("slow", "fast"), _by_speed(case)), (("one heading", "the other"), _by_heading(case))):
+    for halves, words in ((_by_speed(case), _speeds), (_by_heading(case), _headings)):
         if halves is None:
             continue
+        names = tuple(words(case, half) for half in halves)
         gains = fitter.held_out(after, halves) - fitter.held_out(before, halves)
         for tested, fitted in ((1, 0), (0, 1)):
             own = gains[list(halves[tested])]
@@ -66,9 +69,24 @@ def speed_of(case: Case, i: int) -> float:
     return push_speed(case.problems[i])
 
 
+def _speeds(case: Case, half: Sequence[int]) -> str:
+    """The range of speeds of some pushes."""
+    return speeds_of([speed_of(case, i) for i in half])
+
+
+def _headings(case: Case, half: Sequence[int]) -> str:
+    """The range of headings of some pushes."""
+    return headings_of([math.atan2(*_moves(case)[i, ::-1]) for i in half])
+
+
+def _moves(case: Case) -> Array:
+    """From each object's start to its end (n, 2) [m]."""
+    return np.array([p.poses[-1, :2] - np.array(p.start.pose[:2]) for p in case.problems])
+
+
 def _by_heading(case: Case) -> Halves | None:
     """Pushes that went to either side of the axis along which headings spread most; None where all go one way."""
-    moves = np.array([p.poses[-1, :2] - np.array(p.start.pose[:2]) for p in case.problems])
+    moves = _moves(case)
     headings = moves / np.maximum(np.linalg.norm(moves, axis=1, keepdims=True), 1e-9)
     centred = headings - headings.mean(axis=0)
     axis = np.linalg.eigh(centred.T @ centred)[1][:, -1]

@@ -108,10 +108,10 @@ def searched(
         tick: told the stage.
     """
     search = _Search(fitter, plain, kinds, np.random.default_rng(seed), alpha)
-    tick("is anything missing?", 0, 0)
+    tick("test for missing physics", 0, 0)
     found = search.begun()
     if found.odd or plain.loudness > 1.0:
-        tick("effects, one at a time", 0, 0)
+        tick("single effects", 0, 0)
         found = search.with_singles(found)
     if not found.odd or not found.named:
         return found
@@ -119,7 +119,7 @@ def searched(
     if found.left < alpha or found.named[0].fit.scatter > ODD_SCATTER:
         tick("pairs of effects", 0, 0)
         found = search.with_pairs(found)
-    tick("physics without a name", 0, 0)
+    tick("unnamed force", 0, 0)
     return dc.replace(found, unnamed=search.ranked(unnamed(fitter, plain)))
 
 

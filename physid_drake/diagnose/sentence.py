@@ -9,22 +9,22 @@ from physid_drake.diagnose.values import EffectFinding, Partly
 
 def _nothing_found(verdict: str, *, fewest: int | None, known: bool, quieter: float | None, rare: bool) -> str:
     if verdict == "underpowered" and fewest is not None:
-        return f"These pushes cannot tell: it takes at least {fewest} to say what is missing."
+        return f"Too few pushes for a diagnosis: it takes at least {fewest}."
     if verdict == "underpowered" and rare:
-        return "These pushes cannot tell: something may be missing, but those that were left out confirm no effect."
+        return "Not conclusive: some physics may be missing, but held-out pushes confirm no effect."
     if verdict == "underpowered":
-        return "These pushes cannot tell: an effect would have to be large to show in them."
+        return "Not conclusive: only a large effect would be detectable in these pushes."
     if not known:
         return (
-            "The baseline model explains these pushes as far as they tell: their noise, which nobody states and no"
-            " rest shows, is taken to be as large as what it leaves."
+            "The baseline model explains these pushes, as far as can be said: their noise is neither stated nor seen"
+            " at rest, so it is taken to be as large as the errors of the baseline model."
         )
     if quieter is not None:
         return (
-            "The baseline model explains these pushes as far as they tell: the noise that counts, stated or seen, is"
-            f" {quieter:,.0f} times what is left, and nothing smaller than it can be seen."
+            "The baseline model explains these pushes, as far as can be said: the assumed noise, stated or seen, is"
+            f" {quieter:,.0f} times the remaining errors, and effects smaller than it cannot be detected."
         )
-    return "The baseline model explains these pushes: nothing is missing that they could show."
+    return "The baseline model explains these pushes: no missing physics is detectable in them."
 
 
 def sentence(
@@ -55,24 +55,22 @@ def sentence(
             return _nothing_found(verdict, fewest=fewest, known=known, quieter=quieter, rare=rare)
         case "unexplained" if partly is not None:
             return (
-                "Simulation and recording differ, and nothing in the catalogue accounts for all of it:"
-                f" {' and '.join(partly.effects)} would take {_percent(partly.share)} of the squared error away."
+                "Simulation and recording differ, and no effect of the catalogue explains all of it:"
+                f" {' and '.join(partly.effects)} would remove {_percent(partly.share)} of the squared error."
                 f"{_nameless(better)}"
             )
         case "unexplained":
-            return (
-                f"Simulation and recording differ, and nothing in the catalogue accounts for it.{_nameless(better)}"
-            )
+            return f"Simulation and recording differ, and no effect of the catalogue explains it.{_nameless(better)}"
     names = [
         f"{f.name} ({f.statement})"
         + (f", or {' or '.join(f.indistinguishable_from)}" if f.indistinguishable_from else "")
         for f in findings
     ]
-    return "What is missing: " + "; and ".join(names) + "."
+    return "Missing physics: " + "; and ".join(names) + "."
 
 
 def _nameless(better: bool) -> str:
-    return " The model has a force without a name, with which pushes are predicted better." if better else ""
+    return " The model has an unnamed force, with which held-out pushes are predicted better." if better else ""
 
 
 def _percent(share: float) -> str:

@@ -71,14 +71,14 @@ def gathered(
     kinds = applicable(known.case.around, effects)
     found = searched(known.finder, known.found, kinds, seed=seed, alpha=alpha, tick=tick)
     if found.odd and not known.case.noise.known:  # of noise that nobody states, the kind is unknown, too
-        tick("noise of the process", 0, 0)
+        tick("process noise", 0, 0)
         rough, added = learned(found.fitter, found.richest)
         if not rough.is_none:
             known = identified_with(known, rough, added, seed=seed, tick=tick)
             found = searched(known.finder, known.found, kinds, seed=seed, alpha=alpha, tick=tick)
     case, plain, before = known.case, known.fit, known.errors
     decision = decided(found, most=loudest(case.noise))
-    tick("what was found, in the Drake cell", 0, 0)
+    tick("effects in the Drake cell", 0, 0)
     judge = Judge(known.finder)
     if len(case.problems) >= FEWEST_PUSHES and is_own_error(accuracy_of(case, before)):
         decision = Decision(verdict="consistent")
@@ -92,9 +92,9 @@ def gathered(
     )  # fmt: skip
     if decision.verdict in ("consistent", "underpowered"):
         return evidence
-    tick("the missing wrench", 0, 0)
+    tick("missing wrench", 0, 0)
     wrenches = with_phases(case, missing_wrenches(found.fitter, plain))
-    tick("the next push", 0, 0)
+    tick("next push", 0, 0)
     return dc.replace(evidence, wrenches=wrenches, next_push=next_push(case, _rivals(found.named, decision)))
 
 

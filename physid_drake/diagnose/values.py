@@ -157,10 +157,10 @@ class Ranked:
 
     Attributes:
         name: as in the catalogue.
-        gain: of its score test: twice the gain in log likelihood [nats].
+        gain: in log-likelihood, linearised: of its score test.
         p_value: that such an effect gains as much on held-out pushes by chance.
-        held_out_gain: of the effect, in log predictive density of left-out pushes [nats], over the model without it;
-            to first order where it was not fitted. None where it would have to act the other way round.
+        held_out_gain: of the effect, in log-likelihood of held-out pushes, over the model without it; linearised
+            where it was not fitted. None where it would have to act the other way round.
         held_out_se: its standard error over pushes; None where it was not fitted.
         why: it was found, or lost.
     """
@@ -216,14 +216,14 @@ class NextPush:
         """Where the hand's line passes the object, in words."""
         offset = round(1e3 * self.contact_offset_m)
         if offset == 0:
-            return "through the middle"
-        return f"{abs(offset)} mm {'left' if offset > 0 else 'right'} of the middle"
+            return "through the centre"
+        return f"{abs(offset)} mm {'left' if offset > 0 else 'right'} of the centre"
 
     @property
     def start(self) -> str:
         """Where the object stands before it, in words."""
         place = f"({1e3 * self.start_x_m:.0f}, {1e3 * self.start_y_m:.0f}) mm"
-        return f"with the object at {place}, turned by {self.start_yaw_deg:.0f} degrees"
+        return f"with the object at {place}, yaw {self.start_yaw_deg:.0f} deg"
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -284,5 +284,5 @@ class Diagnosis:
     def with_it(self) -> str | None:
         """In words, what the model that leaves has beside the baseline model; None where nothing."""
         if self.effects:
-            return "with what is missing"
-        return None if self.fit.rms_after == self.fit.rms_before else "with a force without a name"
+            return "with the effects found"
+        return None if self.fit.rms_after == self.fit.rms_before else "with an unnamed force"

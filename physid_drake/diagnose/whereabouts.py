@@ -19,8 +19,12 @@ def whereabouts(windows: Sequence[Window]) -> str:
         return ""
     pushes = list(dict.fromkeys(number_of(w.push) for w in sorted(windows, key=lambda w: w.push)))
     listed = ", ".join(pushes[:-1]) + (" and " if len(pushes) > 1 else "") + pushes[-1]
-    parts = [_places(windows), _headings([w.heading for w in windows]), _speeds([w.speed for w in windows])]
-    return f"most surely in push{'es' if len(pushes) > 1 else ''} {listed}: {', '.join(parts)}"
+    parts = [
+        _places(windows),
+        headings_of([w.heading for w in windows]),
+        "at " + speeds_of([w.speed for w in windows]),
+    ]
+    return f"clearest in push{'es' if len(pushes) > 1 else ''} {listed}: {', '.join(parts)}"
 
 
 def number_of(push: str) -> str:
@@ -36,21 +40,22 @@ def _places(windows: Sequence[Window]) -> str:
     return f"between ({min(x)}, {min(y)}) and ({max(x)}, {max(y)}) mm"
 
 
-def _headings(headings: Sequence[float]) -> str:
-    """The arc that holds all headings [rad]."""
+def headings_of(headings: Sequence[float]) -> str:
+    """The arc that holds all headings [rad], in words."""
     mean = cmath.phase(sum((cmath.rect(1.0, h) for h in headings), 0j))
     off = [math.remainder(h - mean, 2.0 * math.pi) for h in headings]
     if max(map(abs, off)) > ALL_ROUND:
-        return "heading all ways"
+        return "all headings"
     low, high = (round(math.degrees(mean + edge)) for edge in (min(off), max(off)))
     turn = 360 * math.floor(low / 360)
     low, high = low - turn, high - turn
     if low == high:
-        return f"heading {low} degrees"
-    return f"heading {low} to {high} degrees" if high < 360 else f"heading {low} through 0 to {high - 360} degrees"
+        return f"heading {low} deg"
+    return f"headings {low} to {high} deg" if high < 360 else f"headings {low} through 0 to {high - 360} deg"
 
 
-def _speeds(speeds: Sequence[float]) -> str:
+def speeds_of(speeds: Sequence[float]) -> str:
+    """The range of speeds [m/s], in words."""
     low, high = 1e3 * min(speeds), 1e3 * max(speeds)
     texts = [f"{value:.2g}" if value < 100.0 else f"{value:.0f}" for value in (low, high)]
-    return f"at {texts[0]} mm/s" if texts[0] == texts[1] else f"at {texts[0]} to {texts[1]} mm/s"
+    return f"{texts[0]} mm/s" if texts[0] == texts[1] else f"{texts[0]} to {texts[1]} mm/s"

@@ -62,28 +62,26 @@ class Finding:
         """One line for each convention; none where the pushes speak for what is said."""
         if self.after is None:
             return []
-        instead = "instead of being refused" if self.before is None else f"instead of {self.before:.3g}"
+        instead = "instead of not at all" if self.before is None else f"instead of {self.before:.3g}"
         lines = [
             f"the pushes fit to {self.after:.2g} sigma {instead} if {one.says} ({one.remedy})" for one in self.better
         ]
         if len(lines) > 1:
-            lines.append(
-                "these fit alike, and pushes do not tell them apart: look at which way the object really turned"
-            )
+            lines.append("these are indistinguishable from the pushes: check which way the object really turned")
         return lines
 
     def sentence(self) -> str:
         """What came of it."""
         if self.before is None:
-            left = "some of the pushes cannot be fitted as they are"
+            left = "some of the pushes cannot be fitted as recorded"
         else:
             left = (
-                f"the baseline model (no effects), fitted roughly to some pushes, leaves {self.before:.3g} sigma"
-                " (1 is tracker noise)"
+                "a rough fit of the baseline model (no effects) to some pushes has an error of"
+                f" {self.before:.3g} sigma (in units of tracker noise)"
             )
         if self.better or (self.before is not None and self.before < FAR):
             return left
-        return f"{left}; no other convention that was tried makes them fit"
+        return f"{left}; no other unit or convention that was tested fits better"
 
 
 def examined(recording: Recording, tick: Progress | None = None) -> Finding:

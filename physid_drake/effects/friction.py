@@ -221,7 +221,7 @@ class FrictionDrift(Effect):
 
     name: ClassVar[str] = "friction_drift"
     element: ClassVar[str] = "table"
-    statement: ClassVar[str] = "friction changes from push to push: wear, dust, warming up"
+    statement: ClassVar[str] = "friction changes between pushes: wear, dust, warming up"
     frame: ClassVar[str] = "push_order"
     amplitudes: ClassVar[tuple[str, ...]] = ("per_push",)
 

@@ -82,7 +82,9 @@ def baseline(fitter: Fitter, rng: np.random.Generator, starts: Sequence[Array] =
     best = sorted((p for p in points if p is not None), key=fitter.roughly)[:STARTS]
     if not best:
         name = fitter.case.recording.name
-        raise RecordingError(f"recording '{name}': at no theta that was tried can all of its pushes be simulated.")
+        raise RecordingError(
+            f"recording '{name}': no parameters were found with which all of its pushes can be simulated."
+        )
     fits = fitter.fitted(fitter.started([hypothesis] * len(best), best, [None] * len(best)), LAST)
     fits = fitter.fitted(fitter.renewed(fitter.robust(fits)), LAST)
     return settled(fitter, max(fits, key=lambda f: f.log_likelihood), rng)

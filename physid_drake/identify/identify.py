@@ -180,11 +180,11 @@ def identified(
         RecordingError: if no push can be rolled out.
     """
     say: Progress = tick or (lambda stage, done, total: None)
-    say("theta" if search is None else "search for theta", 0, 0)  # what is compiled, is compiled here
+    say("parameter fit" if search is None else "parameter search", 0, 0)  # what is compiled, is compiled here
     finder = fitter_of(case, seed)
     best = None if search is None else search.run(finder)
     starts = [] if best is None or not np.isfinite(best.error_best) else [best.theta_best]
-    say("theta", 0, 0)
+    say("parameter fit", 0, 0)
     return _identified(finder, seed, starts, best, EVEN_SURFACES, say)
 
 
@@ -214,7 +214,7 @@ def _identified(
     tick: Progress,
 ) -> Identification:
     found = with_tolerances(finder, baseline(finder, np.random.default_rng(seed), starts))
-    tick("in the Drake cell", 0, 0)
+    tick("refit in the Drake cell", 0, 0)
     return in_the_cell(Identification(
         case=finder.case, fitter=finder, fit=found, found=found, finder=finder, search=search, rough=rough,
     ))  # fmt: skip

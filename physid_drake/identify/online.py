@@ -165,7 +165,7 @@ class OnlineIdentifier:
         newest = len(names) - 1
         expected = _error(finder, newest, belief.theta)
         found = self._search(belief, finder, newest, rng)
-        self._progress("what the push tells", newest, 0)
+        self._progress("new push", newest, 0)
         fit = with_tolerances(finder, self._fitted(belief, finder, found, rng))
         return OnlineBelief(
             space=belief.space, pushes=pushes, finder=finder, fit=fit, search=found,
@@ -188,7 +188,7 @@ class OnlineIdentifier:
             lambda thetas: log_misfits(finder.predictor, [push], finder.at_rest(), thetas),
             belief.space, belief.draw(rng, CANDIDATES), self._chooser, budget=self._budget, rng=rng,
             entropy_tolerance=0.0,
-            on_trial=lambda b: self._progress("search on the new push", b.n_trials, self._budget),
+            on_trial=lambda b: self._progress("search with the new push", b.n_trials, self._budget),
         )  # fmt: skip
 
     def _fitted(self, belief: OnlineBelief, finder: Fitter, found: SearchResult, rng: np.random.Generator) -> Fit:

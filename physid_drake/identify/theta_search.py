@@ -59,7 +59,7 @@ class ThetaSearch:
 
     def _keep(self, belief: Belief) -> None:
         """Written beside and renamed, so that an interruption leaves the last whole one; a full disk ends no run."""
-        self._tick("search for theta", belief.n_trials, self._config.budget)
+        self._tick("parameter search", belief.n_trials, self._config.budget)
         if self._state is None:
             return
         try:

@@ -106,7 +106,7 @@ def beyond_reach(table: Corners, hand: Array, end: Array) -> list[str]:
     robots, lines = reaches(table), []
     far = float(robots["motoman"].beyond(hand).max())
     if far > 0.0:
-        lines.append(f"the hand would go {1e3 * far:.0f} mm beyond where the Motoman reaches")
+        lines.append(f"the hand goes {1e3 * far:.0f} mm beyond where the Motoman reaches")
     far = float(robots["baxter"].beyond(end)[0])
     if far > 0.0:
         lines.append(f"the object stops {1e3 * far:.0f} mm beyond where the Baxter reaches")

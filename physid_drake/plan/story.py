@@ -186,7 +186,9 @@ def plan(
             for stream in (streams[0], streams[3])
         )
     if risk and not drawn:
-        raise ConfigError("plan: the mean over the belief needs draws, and a model with intervals to draw from.")
+        raise ConfigError(
+            "plan: --risk needs posterior samples (--draws above 0), and a model with intervals to sample from."
+        )
     story = _Story(model, drawn, policy, cost, situation, tick or (lambda stage, done, total: None))
     objective = story.mean_costs if risk else story.likely_costs
     found = search_minimum(
@@ -254,10 +256,12 @@ def caveat_of(verdict: str, alike: Mapping[str, Sequence[str]]) -> str:
     """
     rivals = {name: others for name, others in alike.items() if others}
     if rivals:
-        unsure = "; nor ".join(f"{name} from {' or '.join(others)}" for name, others in rivals.items())
-        return f"these pushes cannot tell {unsure}, which may move the object elsewhere"
+        unsure = "; ".join(
+            f"{name} is indistinguishable from {' or '.join(others)}" for name, others in rivals.items()
+        )
+        return f"{unsure}: the object may move differently"
     if verdict == "unexplained":
-        return "the baseline model does not account for the recorded pushes, and this is its plan: it may not hold"
+        return "the model does not explain the recorded pushes: the plan may fail"
     return ""
 
 
@@ -267,8 +271,7 @@ def caveats_of(made: Plan, hindsight: Hindsight | None = None) -> list[str]:
     caveats = [hindsight.caveat] if hindsight is not None and hindsight.caveat else []
     if known is not None and speed > FASTER * known:
         caveats.append(
-            f"it goes at {speed:.2f} m/s and the fastest recorded push at {known:.2f} m/s: what depends on speed may"
-            " be otherwise there"
+            f"extrapolates beyond the recorded speeds (plan {speed:.2f} m/s, fastest recorded push {known:.2f} m/s)"
         )
     ways = np.vstack([path.positions(np.linspace(0.0, float(path.times[-1]), 100)) for path in made.predicted.paths])
     return [*caveats, *beyond_reach(made.model.table, ways, made.predicted.end[:2])]
@@ -358,4 +361,4 @@ class _Story:
         return tuple(rows)
 
     def tell_search(self, belief: Belief, budget: int) -> None:
-        self._tick("search over the policy", belief.n_trials, budget)
+        self._tick("policy search", belief.n_trials, budget)

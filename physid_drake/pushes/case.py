@@ -39,7 +39,7 @@ MOST_SLIDE_TICK = 0.05  # s
 MOST_PUSHES = 24  # more take longer and tell little more
 UNIT_SCATTER = 0.025  # of friction, push to push: the columns' unit and the median of its prior
 LEAST_MOTION = 6.0  # standard deviations: an object that moves less in every push does not move
-WHY_LOST = "at any theta: the solver diverges, or no object stands so"
+WHY_LOST = "with any parameters: the solver diverges, or no object stands like this"
 # A rollout's own error acts like a start that is known no better than this [m, m, rad].
 START_FLOOR = np.array([3e-5, 3e-5, 3e-4])
 
@@ -80,12 +80,10 @@ class Case:
     def warnings(self) -> tuple[str, ...]:
         """What a reader must know of how the recording was taken."""
         some = len(self.problems) + len(self.lost)
-        thinned = (
-            f"{some} of the {self.pushes} pushes were looked at, at equal distances (diagnose --pushes N for more)"
-        )
+        thinned = f"{some} of the {self.pushes} pushes were used, evenly spaced (diagnose --pushes N for more)"
         unseen = unseen_motion(self.recording, self.noise.position)
         few = (thinned,) if some < self.pushes else ()
-        gone = f"left out: {', '.join(self.lost)}, which the cell cannot simulate {WHY_LOST}"
+        gone = f"skipped: {', '.join(self.lost)}, which the cell cannot simulate {WHY_LOST}"
         lost = (gone,) if self.lost else ()
         said = (*doubts(self.recording), *self.noise.warnings, *unseen, *self._unused_forces())
         read = (f"{push.name}: {warning.rstrip('.')}" for push in self.recording.pushes for warning in push.warnings)
@@ -97,7 +95,7 @@ class Case:
         if not recorded or any(len(problem.force_times) for problem in self.problems):
             return ()
         return (
-            f"none of the recorded forces could be compared: it takes two samples in {WINDOW:g} s, while the hand"
+            f"none of the recorded forces could be used: it takes two samples in {WINDOW:g} s, while the hand"
             " pushes and after it has surely touched",
         )
 

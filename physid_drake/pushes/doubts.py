@@ -90,8 +90,8 @@ def _sparse_forces(recording: Recording) -> tuple[str, ...]:
     if not names:
         return ()
     return (
-        f"forces are compared as means over {WINDOW:g} s, and in none of these are two samples: {some_names(names)};"
-        " they are not used",
+        f"forces are compared as means over {WINDOW:g} s, but no such window has two samples: {some_names(names)};"
+        " these forces are not used",
     )
 
 
@@ -101,9 +101,8 @@ def _hand_seldom_seen(recording: Recording) -> tuple[str, ...]:
     if not names:
         return ()
     return (
-        f"the hand is seen less often than every {SELDOM:g} s and goes more than {1e3 * UNSEEN_WAY:.0f} mm in"
-        f" between: {some_names(names)}; when it touches the object and when it brakes is hardly known; record it at"
-        " 100 Hz",
+        f"the hand is sampled less often than every {SELDOM:g} s and moves more than {1e3 * UNSEEN_WAY:.0f} mm in"
+        f" between: {some_names(names)}; the times of contact and of braking are uncertain; record it at 100 Hz",
     )
 
 
@@ -138,11 +137,11 @@ def _beside_the_tip(recording: Recording) -> tuple[str, ...]:
     if abs(middle) <= BESIDE:
         return (
             f"as objects begin to move, the hand's tip is {1e3 * usual:.0f} mm inside some and away from others"
-            " (median); the object's frame is turned or off its place in it, or its size along x or y is not what is"
-            " said",
+            " (median); the object's frame is turned or off its place in it, or its size along x or y is not as"
+            " stated",
         )
     where = "inside the object" if middle > 0.0 else "away from the object"
     return (
         f"as objects begin to move, the hand's tip is {1e3 * abs(middle):.0f} mm {where} (median);"
-        " its radius, the object's size or a frame is not what is said, or it lags or gives way",
+        " its radius, the object's size or a frame is not as stated, or the tip lags or is compliant",
     )

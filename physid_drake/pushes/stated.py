@@ -52,8 +52,8 @@ def _louder_than_seen(recording: Recording) -> tuple[str, ...]:
     )
     return tuple(
         f"{key} states {stated:.3g} {unit}, {stated / shown:.0f} times the {shown:.2g} {unit} that the stream shows;"
-        f" is it in {unit}? A tracker that smooths shows less, but hardly so much less; what is smaller than what is"
-        " stated counts as noise"
+        f" is it in {unit}? A tracker that smooths shows less, but hardly so much less; effects smaller than the"
+        " stated noise cannot be detected"
         for key, unit, stated, shown, finest in figures
         if stated is not None and shown is not None and shown > SILENT * finest and stated > MANY_TIMES * shown
     )

@@ -78,7 +78,7 @@ class TrackerNoise:
         """The same noise, ``factor`` times as large, and perhaps another one of the forces; it says so."""
         position, rotation = factor * self.position, factor * self.rotation
         said = (
-            f"{UNKNOWN}: the object's noise is taken to be what the baseline model leaves,"
+            f"{UNKNOWN}: the object's noise is taken to be as large as the errors of the baseline model,"
             f" {1e3 * position:.2g} mm and {math.degrees(rotation):.2g} deg"
         )
         return dc.replace(
@@ -189,7 +189,7 @@ def _quieter(what: str, plain: Noise, seen: SeenNoise | None, unit: str, scale: 
         return []
     return [
         f"the {what} noise at rest is {scale * seen.std:.2g} {unit}, far less than the {scale * stated:.2g} {unit}"
-        " that the recording states; what is smaller than that is taken for noise"
+        " that the recording states; effects smaller than the stated noise cannot be detected"
     ]
 
 

@@ -84,7 +84,7 @@ def acts_of_plan(plan: Plan, hindsight: Hindsight | None = None) -> list[Act]:
     acts = []
     if hindsight is not None and hindsight.plain is not None and hindsight.outcome is not None:
         bodies = {BASELINE: _track(plan, hindsight.plain.predicted), CORRECTED: _track(plan, hindsight.outcome[0])}
-        acts.append(_planned(hindsight.plain, bodies, "planned with the baseline model"))
+        acts.append(_planned(hindsight.plain, bodies, "baseline plan, simulated with the effect"))
     name = "planned push" + (
         f", with {' and '.join(e.name for e in plan.model.effects)}" if plan.model.effects else ""
     )

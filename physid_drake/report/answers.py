@@ -21,43 +21,45 @@ def answers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
 def _how_sure(d: Diagnosis) -> str:
     p_value = f"p {'< 1e-300' if d.p_value <= 0.0 else '= ' + tiny(d.p_value)}"
     if d.verdict == "consistent":
-        return f"The baseline model leaves as much as noise does ({p_value}; a mismatch is below {number(d.alpha)})."
+        return (
+            f"The errors of the baseline model are noise ({p_value}; a mismatch is claimed below {number(d.alpha)})."
+        )
     if d.verdict == "underpowered":
-        return f"These pushes are too few, or show too little, to tell ({p_value})."
-    said = f"That the baseline model is not enough: {p_value}."
+        return f"Not conclusive: the pushes are too few, or move too little ({p_value})."
+    said = f"Baseline model: {p_value} (a mismatch is claimed below {number(d.alpha)})."
     if d.effects:
         names = ", ".join(f"{e.name} {chance(e.probability)}" for e in d.effects)
-        said += f" That the name is right, among those of the catalogue: {names}."
+        said += f" Probability of the effect, among those of the catalogue: {names}."
         alike = sorted({name for e in d.effects for name in e.indistinguishable_from})
         if alike:
-            said += f" These pushes cannot tell it from {' or '.join(alike)}."
+            said += f" Indistinguishable from {' or '.join(alike)}."
     return said
 
 
 def _what_now(d: Diagnosis) -> str:
-    use = "model.yaml has it: load_model(folder) builds that in Drake, and physid_drake plan pushes with it."
+    use = "use model.yaml, which includes it: load_model(folder) builds it in Drake, and physid_drake plan uses it."
     match d.verdict:
         case "explained":
-            return use
+            return _capital(use)
         case "ambiguous":
             return f"{_next(d.next_push)} Until then, {use}"
         case "consistent":
-            return "Use the baseline model of model.yaml. What these pushes would have shown is listed below."
+            return "Use the baseline model in model.yaml. The smallest detectable effects are listed below."
         case "underpowered":
-            return "Record more pushes: faster ones, longer ones, of several headings, and repeat some."
-    without = " model.yaml has a force without a name in its place." if d.with_it else ""
+            return "Record more pushes: faster, longer, with several headings, and repeat some."
+    without = " model.yaml has an unnamed force instead." if d.with_it else ""
     return (
-        "physid_drake inspect tries whether a unit or a convention of the recording is wrong; else it is physics that"
-        f" the catalogue does not have: add an effect of your own.{without}"
+        "Run physid_drake inspect, which tests whether a unit or a convention of the recording is wrong. If not, the"
+        f" physics is not in the catalogue: add your own effect.{without}"
     )
 
 
 def _next(push: NextPush | None) -> str:
     if push is None:
-        return "Record other pushes: faster or slower ones, of other headings."
+        return "Record other pushes: faster or slower, with other headings."
     return (
-        f"Make the push that tells them apart (with probability {chance(push.settles_with_probability)}): towards"
-        f" {push.direction_deg:.0f} degrees at {1e3 * push.speed_mps:.0f} mm/s, {push.aim}."
+        f"Make the push that distinguishes them (with probability {chance(push.settles_with_probability)}): towards"
+        f" {push.direction_deg:.0f} deg at {1e3 * push.speed_mps:.0f} mm/s, {push.aim}."
     )
 
 
@@ -66,19 +68,19 @@ def _trust(d: Diagnosis) -> str:
     before, after = fixed(1e3 * fit.position_before), fixed(1e3 * fit.position_after)
     turned = fixed(math.degrees(fit.rotation_before)), fixed(math.degrees(fit.rotation_after))
     if d.with_it:
-        said = f"Pushes that were left out of the fit are missed by {after} mm instead of {before}"
-        said += f", and {turned[1]} degrees instead of {turned[0]}" if math.isfinite(fit.rotation_before) else ""
+        said = f"Error on held-out pushes: {after} mm (baseline model {before})"
+        said += f", {turned[1]} deg ({turned[0]})" if math.isfinite(fit.rotation_before) else ""
     else:
-        said = f"Pushes that were left out of the fit are missed by {before} mm"
-        said += f" and {turned[0]} degrees" if math.isfinite(fit.rotation_before) else ""
+        said = f"Error on held-out pushes: {before} mm"
+        said += f", {turned[0]} deg" if math.isfinite(fit.rotation_before) else ""
     regimes = [r for r in fit.regimes if math.isfinite(r.gain)]
     if regimes:
         better = sum(r.gain > SURELY * r.standard_error for r in regimes)
-        said += f"; surely better in {better} of {len(regimes)} tests on pushes of another kind"
-    said += f". Left over: {d.left}."
+        said += f"; significantly better in {better} of {len(regimes)} tests across regimes"
+    said += f". Remaining misfit: {d.left}."
     if d.warnings:
         count = len(d.warnings)
-        said += f" {count} thing{'' if count == 1 else 's'} about the recording to read below."
+        said += f" {count} warning{'' if count == 1 else 's'} below."
     return said
 
 

@@ -1,4 +1,4 @@
-"""What pushes tell about friction that differs from cell to cell: a table, sentences, a figure."""
+"""Which cells of a friction grid are identifiable from the pushes: a table, sentences, a figure."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ Array = NDArray[np.float64]
 
 
 def cells_table(cells: CellsTold) -> Table:
-    """What the pushes tell about combinations of the cells' frictions, told best first."""
-    headings = ("singular\nvalue", "prior's\nstd left", "told")
+    """Which combinations of the cells' frictions are identifiable, best first."""
+    headings = ("singular\nvalue", "posterior /\nprior std", "identifiable")
     table = narrow_table(
-        "what these pushes tell about the cells", words("combination of ln frictions"), *map(numbers, headings),
+        "identifiability of the friction cells", words("combination of log frictions"), *map(numbers, headings),
         caption=cells_verdict(cells),
     )  # fmt: skip
     for c in cells.combinations:
@@ -43,24 +43,24 @@ def place_of(name: str) -> str:
 
 
 def cells_verdict(cells: CellsTold) -> str:
-    """In a sentence or two, which cells these pushes tell apart."""
+    """In a sentence or two, which cells are identifiable and which neighbours are distinguishable."""
     count = len(cells.combinations)
-    text = f"{cells.told} of {count} combinations of the cells' frictions are told by these pushes"
+    text = f"{cells.told} of {count} combinations of the cells' frictions are identifiable"
     text += "; the others keep their prior." if cells.told < count else "."
     if not cells.not_apart:
-        return f"{text} All neighbours are told apart." if cells.apart else text
+        return f"{text} All neighbouring cells are distinguishable." if cells.apart else text
     pairs = ", ".join(f"{place_of(a)} and {place_of(b)}" for a, b in cells.not_apart)
-    return f"{text} Not told apart: {pairs}."
+    return f"{text} Indistinguishable neighbours: {pairs}."
 
 
 def cells_figure(cells: CellsTold) -> Markup:
-    """Friction of each cell, and what is left of its prior's spread, from above in the object's axes."""
+    """Friction of each cell, and its posterior over its prior standard deviation, from above in the object's axes."""
     with drawn():
         figure = Figure(figsize=(5.2, 2.2), layout="constrained")
         left, right = figure.subplots(1, 2)
         _draw_map(left, cells, cells.friction, "friction", "{:.3f}", None)
-        _draw_map(right, cells, 100.0 * cells.left, "% of the prior's spread left", "{:.0f}", (0.0, 100.0))
-        return svg_of(figure, "cells", "Friction of the cells, and what is left of their prior")
+        _draw_map(right, cells, 100.0 * cells.left, "posterior / prior std [%]", "{:.0f}", (0.0, 100.0))
+        return svg_of(figure, "cells", "Friction of the cells, and posterior over prior standard deviation")
 
 
 def _draw_map(axes: Axes, cells: CellsTold, values: Array, title: str, form: str,

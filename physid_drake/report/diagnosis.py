@@ -10,9 +10,11 @@ from typing import Any
 from rich.table import Table
 
 from physid_drake.diagnose import Diagnosis
-from physid_drake.diagnose.values import EffectFinding, FitQuality, Location, Partly
+from physid_drake.diagnose.values import Detectable, EffectFinding, FitQuality, Location, Partly, Ranked
 from physid_drake.effects import effect_named
+from physid_drake.pushes.tracker_noise import UNKNOWN
 from physid_drake.report.numbers import rounded
+from physid_drake.report.pages import sigma_means
 from physid_drake.report.terminal import narrow_table, numbers, words
 
 FORMAT = "physid-diagnosis/1"
@@ -31,7 +33,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> str:
         "effects": [_effect(e) for e in d.effects],
         "location": None if d.location is None else _location(d.location),
         "fit": {
-            "unit": "standard deviations of the measurement",
+            "unit": "tracker noise (sigma)",
             "held_out_rms_before": d.fit.rms_before,
             "held_out_rms_after": d.fit.rms_after,
             "held_out_rms_before_m": d.fit.position_before,
@@ -39,8 +41,8 @@ def diagnosis_json(diagnosis: Diagnosis) -> str:
             "held_out_rms_before_rad": d.fit.rotation_before,
             "held_out_rms_after_rad": d.fit.rotation_after,
             **_forces(d.fit),
-            "log_score_gain": d.fit.log_score_gain,
-            "log_score_gain_se": d.fit.log_score_gain_se,
+            "log_likelihood_gain": d.fit.log_score_gain,
+            "log_likelihood_gain_se": d.fit.log_score_gain_se,
             "per_push": [{"push": name, "before": b, "after": a} for name, b, a in d.fit.per_push],
             "regimes": [dc.asdict(r) for r in d.fit.regimes],
         },
@@ -52,10 +54,10 @@ def diagnosis_json(diagnosis: Diagnosis) -> str:
         "next_push": None if d.next_push is None else dc.asdict(d.next_push),
         "seed": d.seed,
         "pushes": d.pushes,
-        "ranking": [dc.asdict(r) for r in d.ranking],
-        "detectable": [dc.asdict(x) for x in d.detectable],
-        "left": d.left,
-        "partly": None if d.partly is None else _partly(d.partly),
+        "ranking": [_ranked(one) for one in d.ranking],
+        "detectable": [_detectable(one) for one in d.detectable],
+        "remaining_misfit": d.left,
+        "partial_explanation": None if d.partly is None else _partly(d.partly),
         "reduced_chi2_before": d.reduced_chi2_before,
         "reduced_chi2_after": d.reduced_chi2_after,
         "friction_scatter": d.friction_scatter,
@@ -87,6 +89,20 @@ def _forces(fit: FitQuality) -> dict[str, Any]:
     if fit.force_before is None:
         return {}
     return {"held_out_rms_before_n": fit.force_before, "held_out_rms_after_n": fit.force_after}
+
+
+def _ranked(one: Ranked) -> dict[str, Any]:
+    return {
+        "name": one.name, "linearised_gain": one.gain, "p_value": one.p_value, "held_out_gain": one.held_out_gain,
+        "held_out_se": one.held_out_se, "why": one.why,
+    }  # fmt: skip
+
+
+def _detectable(one: Detectable) -> dict[str, Any]:
+    return {
+        "name": one.name, "parameter": one.parameter, "value": one.value, "unit": one.unit,
+        "motion_sigma": one.sigmas,
+    }  # fmt: skip
 
 
 def _partly(partly: Partly) -> dict[str, Any]:
@@ -123,12 +139,12 @@ def _location(location: Location) -> dict[str, Any]:
 def findings_table(diagnosis: Diagnosis) -> Table:
     """The effects found, with their parameters."""
     alike = [
-        f"{e.name} cannot be told from {', '.join(e.indistinguishable_from)}"
+        f"{e.name} is indistinguishable from {', '.join(e.indistinguishable_from)}"
         for e in diagnosis.effects
         if e.indistinguishable_from
     ]
     table = narrow_table(
-        f"what is missing in '{diagnosis.recording}'", words("effect"), words("parameter"), numbers("value"),
+        f"missing physics in '{diagnosis.recording}'", words("effect"), words("parameter"), numbers("value"),
         words("90 % interval"), numbers("probability"), caption="; ".join(alike) or None,
     )  # fmt: skip
     for effect in diagnosis.effects:
@@ -151,10 +167,11 @@ def _interval(ci90: Any) -> str:
 
 
 def ranking_table(diagnosis: Diagnosis, most: int = 8) -> Table:
-    """The effects that explain most, and why the others lose."""
+    """The effects of the catalogue, best first, and why others were rejected."""
+    title = "why other effects were rejected" if diagnosis.effects else "effects of the catalogue, best first"
     table = narrow_table(
-        "the catalogue, best first", words("effect"), numbers("score\ngain"), numbers("p"), numbers("held-out\ngain"),
-        words("why"),
+        title, words("effect"), numbers("linearised\ngain"), numbers("p"), numbers("held-out\ngain"), words("why"),
+        caption="gain: in log-likelihood",
     )  # fmt: skip
     for r in diagnosis.ranking[:most]:
         unsure = "" if r.held_out_se is None else f" +- {r.held_out_se:.0f}"
@@ -164,30 +181,37 @@ def ranking_table(diagnosis: Diagnosis, most: int = 8) -> Table:
 
 
 def regime_table(diagnosis: Diagnosis) -> Table:
-    """Whether what one regime teaches holds in the other."""
+    """Whether a model that is fitted to one regime holds in another."""
     table = narrow_table(
-        "gain of pushes of another regime than those fitted to", words("fitted to"), words("tested on"),
-        numbers("gain in log density"),
-    )  # fmt: skip
+        "generalisation across regimes", words("fitted to"), words("tested on"), numbers("log-likelihood\ngain")
+    )
     for r in diagnosis.fit.regimes:
         table.add_row(r.fitted_on, r.tested_on, f"{r.gain:.0f} +- {r.standard_error:.0f}")
     return table
 
 
+def noise_known(diagnosis: Diagnosis) -> bool:
+    """Whether the tracker's noise was stated or seen at rest."""
+    return not any(warning.startswith(UNKNOWN) for warning in diagnosis.warnings)
+
+
 def fit_table(diagnosis: Diagnosis) -> Table:
-    """How well pushes are predicted that were left out, before and after."""
+    """How well held-out pushes are predicted, by the baseline model and with the effects found."""
     forced = diagnosis.fit.force_before is not None
-    headings = ("mm", "deg", *(("N",) if forced else ()), "sigmas", "reduced\nchi-square")
+    headings = ("mm", "deg", *(("N",) if forced else ()), "sigma", "reduced\nchi-square")
+    known = noise_known(diagnosis)
+    caption = sigma_means(known=known) + (" Reduced chi-square: 1 = noise only." if known else "")
     table = narrow_table(
-        "pushes predicted while left out (root mean square)", words("model"), *map(numbers, headings)
-    )
+        "prediction error of held-out pushes (root mean square)", words("model"), *map(numbers, headings),
+        caption=caption,
+    )  # fmt: skip
     for name, figures in held_out_figures(diagnosis):
         table.add_row(name, *(f"{value:.2f}" if math.isfinite(value) else "-" for value in figures))
     return table
 
 
 def held_out_figures(diagnosis: Diagnosis) -> list[tuple[str, list[float]]]:
-    """Errors of pushes left out, of the baseline model and of what was found: mm, deg, N if known, sigmas, misfit."""
+    """Errors on held-out pushes, of the baseline and the final model: mm, deg, N if known, sigma, chi-square."""
     d, fit = diagnosis, diagnosis.fit
     rows = [
         (

@@ -42,7 +42,7 @@ def views_from_above(view: TableView) -> list[tuple[str, Markup]]:
     box = box_of(view, view.shown)
     alpha = 0.7 if len(view.shown) > MANY_PUSHES else 0.9
     views = []
-    for kind, colour, title in (("before", BEFORE, "baseline model"), ("after", AFTER, "with what is missing")):
+    for kind, colour, title in (("before", BEFORE, "baseline model"), ("after", AFTER, "with the effects found")):
         motions = [push.before if kind == "before" else push.after for push in view.shown]
         if all(m is None for m in motions):
             continue
@@ -234,4 +234,4 @@ def next_push_figure(push: NextPush, recording: Recording, view: TableView) -> M
     axes.add_patch(Circle((float(start[0]), float(start[1])), tip, color=CONTACT))
     arrow = {"arrowstyle": "-|>", "color": CONTACT, "linewidth": 1.4, "shrinkA": 0.0, "shrinkB": 0.0}
     axes.annotate("", end.tolist(), start.tolist(), arrowprops=arrow)
-    return svg_of(figure, "next push", "The push that would tell more")
+    return svg_of(figure, "next push", "The most informative next push")

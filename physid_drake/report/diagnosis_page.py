@@ -26,10 +26,9 @@ from physid_drake.diagnose.values import (
 )
 from physid_drake.diagnose.whereabouts import number_of
 from physid_drake.effects import effect_named
-from physid_drake.pushes.tracker_noise import UNKNOWN
 from physid_drake.recording import Recording
 from physid_drake.report.answers import answers
-from physid_drake.report.diagnosis import held_out_figures
+from physid_drake.report.diagnosis import held_out_figures, noise_known
 from physid_drake.report.diagnosis_figures import (
     arrow_figure,
     error_figure,
@@ -50,7 +49,7 @@ from physid_drake.report.numbers import (
     tiny,
 )
 from physid_drake.report.outline import outline_of
-from physid_drake.report.pages import DIAGNOSIS, SCENE, nav
+from physid_drake.report.pages import BASELINE_MEANS, DIAGNOSIS, HELD_OUT_MEANS, SCENE, nav, sigma_means
 from physid_drake.report.svg import AFTER, BEFORE, CONTACT, FREE, INK, MUTED, drawn
 from physid_drake.report.table_view import MM, ShownPush, TableView
 
@@ -67,9 +66,9 @@ BADGES = {
 }
 MEANING = {
     "consistent": "There is no evidence against the baseline model.",
-    "explained": "One model accounts for what the baseline model leaves.",
-    "ambiguous": "More than one effect accounts for these pushes: they are named together, not guessed at.",
-    "unexplained": "The mismatch is real, and no effect of the catalogue brings it down to noise.",
+    "explained": "One model explains the errors of the baseline model.",
+    "ambiguous": "More than one effect explains these pushes; all of them are named.",
+    "unexplained": "The mismatch is significant, and no effect of the catalogue reduces it to noise.",
     "underpowered": "These pushes are too few, or move too little, to show an effect of ordinary size.",
 }
 DOFS = {"along_motion": "along the motion", "across_motion": "across the motion", "rotation": "in rotation"}
@@ -153,9 +152,12 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "lets_go": any(view.shown[k].released is not None for k in order[:MOST_ERRORS]),
         "arrows": arrow_figure(view, () if diagnosis.location is None else diagnosis.location.windows),
         "answers": answers(diagnosis),
+        "baseline_means": BASELINE_MEANS,
+        "held_out_means": HELD_OUT_MEANS,
+        "sigma_means": sigma_means(known=noise_known(diagnosis)),
         "strips": strips[:MOST_STRIPS],
         "more_strips": strips[MOST_STRIPS:],
-        "left_out": len({w.push for w in view.wrenches}) - len(strips),
+        "not_drawn": len({w.push for w in view.wrenches}) - len(strips),
         "fits": _fits(diagnosis),
         "bars": _bars(diagnosis),
         "regimes": _regimes(diagnosis),
@@ -164,7 +166,7 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "theta": [_theta_row(name, t) for name, t in diagnosis.theta.items()],
         "next_push": None if diagnosis.next_push is None else next_push_figure(diagnosis.next_push, recording, view),
         "noise": _noise(diagnosis),
-        "noise_known": not any(warning.startswith(UNKNOWN) for warning in diagnosis.warnings),
+        "noise_known": noise_known(diagnosis),
         "detectable": [_detectable_row(one) for one in diagnosis.detectable],
         "warnings": diagnosis.warnings,
     }
@@ -200,7 +202,7 @@ def _parameter_row(name: str, p: ParameterEstimate) -> tuple[str, str, str, str]
     """Name, value, interval, null."""
     if isinstance(p.value, list | tuple):
         shape = f"{len(p.value)} × {len(p.value[0])} values"
-        return name, shape, "in the drawing", "even"
+        return name, shape, "in the figure", "even"
     null = "–" if p.null is None else quantity(p.null, p.unit)
     beside = [*([] if p.null is None else [p.null]), *(p.ci90 or ())]
     digits = digits_between(p.value, beside)
@@ -217,7 +219,7 @@ def _detectable_row(one: Detectable) -> tuple[str, str, str, str]:
 
 
 def _frame(frame: str) -> str:
-    return "no one frame" if frame == "none" else f"of the {frame.replace('_', ' ')}"
+    return "none" if frame == "none" else f"of the {frame.replace('_', ' ')}"
 
 
 def _told(theta: ThetaEstimate) -> float:
@@ -277,13 +279,13 @@ def _ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _theta_row(name: str, theta: ThetaEstimate) -> dict[str, Any]:
-    told = theta.identifiable and theta.value is not None
+    identifiable = theta.identifiable and theta.value is not None
     return {
         "name": name.replace("_", " "),
         "before": quantity(theta.before, theta.unit),
-        "after": quantity(theta.value, theta.unit) if told else "not told by these pushes",
-        "interval": interval(theta.ci90, theta.unit) if told else "–",
-        "told": told,
+        "after": quantity(theta.value, theta.unit) if identifiable else "not identifiable",
+        "interval": interval(theta.ci90, theta.unit) if identifiable else "–",
+        "identifiable": identifiable,
     }
 
 
@@ -295,12 +297,12 @@ def _noise(diagnosis: Diagnosis) -> list[tuple[str, str]]:
         ("rotation", "rotation_rad", math.degrees(1.0), "°"),
         ("jitter of time stamps", "jitter_s", MM, " ms"),
         ("hand", "hand_m", MM, " mm"),
-        ("hand's correlated over", "hand_correlation_time_s", MM, " ms"),
+        ("correlation time (hand)", "hand_correlation_time_s", MM, " ms"),
         ("force", "force_n", 1.0, " N"),
     ]
-    told = [(name, f"{number(scale * noise[key])}{unit}") for name, key, scale, unit in rows if key in noise]
+    known = [(name, f"{number(scale * noise[key])}{unit}") for name, key, scale, unit in rows if key in noise]
     times = noise.get("correlation_time_s")
     if times:
-        told.append(("correlated over", ", ".join(number(MM * t) for t in times) + " ms (position, rotation)"))
-    told.append(("friction from push to push", f"{number(100.0 * diagnosis.friction_scatter)} %"))
-    return told
+        known.append(("correlation time (position, rotation)", ", ".join(number(MM * t) for t in times) + " ms"))
+    known.append(("friction scatter between pushes", f"{number(100.0 * diagnosis.friction_scatter)} %"))
+    return known

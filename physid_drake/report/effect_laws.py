@@ -19,7 +19,7 @@ from physid_drake.report.svg import AFTER, BEFORE, CONTACT, INK, svg_of
 from physid_drake.report.table_view import MM, Array, TableView, box_of, draw_ground, draw_recorded, map_axes
 
 _Law = Callable[[Mapping[str, Any], TableView], "tuple[Figure, str] | None"]
-_TICKS = " Ticks: speeds of the object in these pushes."
+_TICKS = " Marks on the axis: speeds of the object in these pushes."
 
 
 def law_figure(effect: EffectFinding, k: int, view: TableView) -> tuple[Markup, str] | None:
@@ -55,12 +55,12 @@ def _ticks(view: TableView) -> str:
 
 def _stribeck(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
     mu = view.friction or 1.0
-    up = "friction with the table" if view.friction else "friction over the baseline model's"
-    figure, axes, speeds = _curve(view, 3.0 * p["speed"], "slip [m/s]", up)
+    up = "friction with the table" if view.friction else "friction relative to the baseline model"
+    figure, axes, speeds = _curve(view, 3.0 * p["speed"], "slip speed [m/s]", up)
     axes.plot(speeds, mu * (1.0 + p["excess"] * np.exp(-((speeds / p["speed"]) ** 2))), color=AFTER, linewidth=1.8)
     axes.axhline(mu, color=BEFORE, linewidth=1.0, linestyle="--")
     axes.set_ylim(0.0, 1.15 * mu * (1.0 + max(0.0, p["excess"])))
-    return figure, "Friction over slip; dashed: what it falls to." + _ticks(view)
+    return figure, "Friction over slip speed; dashed: its value at high speed." + _ticks(view)
 
 
 def _drag(power: int) -> _Law:
@@ -92,7 +92,7 @@ def _ellipse(frame: str) -> _Law:
         reach = 1.1 * max(low, high)
         draw_ground(axes, (-reach, -reach, reach, reach), 0.79 * 3.5 / (0.82 * 3.0))
         axes.set(xlabel=f"along x of the {frame}", ylabel=f"along y of the {frame}")
-        return figure, "Friction by the direction it pulls in; dashed: alike in all; dotted: the slippery axis."
+        return figure, "Friction by the direction of its force; dashed: isotropic; dotted: the low-friction axis."
 
     return draw
 
@@ -105,7 +105,7 @@ def _patch(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
     colour = CONTACT if p["ratio"] > 1.0 else AFTER
     axes.add_patch(Circle((x, y), r, facecolor=colour, alpha=0.18, linewidth=0))
     axes.add_patch(Circle((x, y), r, facecolor="none", edgecolor=colour, linewidth=1.4))
-    return figure, f"In the circle friction is {number(p['ratio'])} times that of the rest of the table."
+    return figure, f"In the circle, friction is {number(p['ratio'])} times that of the rest of the table."
 
 
 def _gradient(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
@@ -125,7 +125,7 @@ def _gradient(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
         text = f"× {1.0 + float(slope @ at) / MM:.2f}"
         axes.text(at[0], at[1], text, ha="center", va="center", fontweight="bold", zorder=5)
     axes.set(xlim=(left, right), ylim=(low, high))
-    return figure, "Friction over that at the table's origin."
+    return figure, "Friction relative to the table's origin."
 
 
 def _field(axes: Axes, force: Callable[[Array], Array]) -> bool:
@@ -148,7 +148,7 @@ def _tilt(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
     slope = np.array([math.sin(p["x"]), math.sin(p["y"])])
     _field(axes, lambda at: np.tile(slope, (len(at), 1)))
     steep, towards = math.degrees(math.hypot(p["x"], p["y"])), math.degrees(math.atan2(p["y"], p["x"]))
-    return figure, f"Downhill: {number(steep)}° steep, towards {number(towards)}° from x."
+    return figure, f"Arrows: downhill. Slope {number(steep)}°, towards {number(towards)}° from x."
 
 
 def _spring(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
@@ -159,7 +159,7 @@ def _spring(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
         distance = np.maximum(np.hypot(*away.T), 1e-9)
         return np.asarray((np.maximum(0.0, distance - rest) / distance)[:, None] * away)
 
-    return _pull(p, view, force, "Pull of the spring; longest arrow: strongest.")
+    return _pull(p, view, force, "Force of the spring; the longest arrow is the strongest.")
 
 
 def _magnet(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
@@ -168,7 +168,7 @@ def _magnet(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
         square = (away**2).sum(axis=1)
         return np.asarray((1.0 / (square + p["core"] ** 2) / np.sqrt(np.maximum(square, 1e-12)))[:, None] * away)
 
-    return _pull(p, view, force, "Pull towards the point; longest arrow: strongest.")
+    return _pull(p, view, force, "Force towards the point; the longest arrow is the strongest.")
 
 
 def _pull(p: Mapping[str, Any], view: TableView, force: Callable[[Array], Array], caption: str) -> tuple[Figure, str]:
@@ -184,8 +184,8 @@ def _pull(p: Mapping[str, Any], view: TableView, force: Callable[[Array], Array]
     _field(axes, force)
     if near:
         axes.plot(x, y, "o", color=CONTACT, markersize=6, zorder=4)
-        return figure, caption + " Dot: where it is fixed."
-    return figure, caption + f" It is fixed beyond the view, at ({number(p['x'])}, {number(p['y'])}) m."
+        return figure, caption + " Dot: anchor."
+    return figure, caption + f" Its anchor is outside the view, at ({number(p['x'])}, {number(p['y'])}) m."
 
 
 def _support(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str] | None:
@@ -219,8 +219,8 @@ def _support(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str] | None
             text = f"{ends[0, i, j]:.2f} to {ends[1, i, j]:.2f}"
             axes.annotate(text, at, (0, -9), textcoords="offset points", ha="center", fontsize=6.5, color=dark)
     axes.set(xlabel="x of the object [mm]", ylabel="y of the object [mm]")
-    caption = "How firmly each part of the underside stands on the table, over the mean, with 90 % intervals."
-    return figure, caption + " The pressure is that, tilted until it balances the weight."
+    caption = "Stiffness of the support under each part of the object, relative to the mean, with 90 % intervals."
+    return figure, caption + " The pressure is this, tilted until it balances the weight."
 
 
 def _middles(outline: Array, x: Array, y: Array) -> Array:

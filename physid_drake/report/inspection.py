@@ -30,7 +30,7 @@ def inspection_table(recording: Recording) -> Table:
     steps = _rounding(recording)
     headings = (
         "poses", "time\n[s]", "hand\n[mm/s]", "object\n[mm/s]", "moved\n[mm]", "turned\n[deg]", "gaps", "noise\n[mm]",
-        "noise\n[deg]", "warn",
+        "noise\n[deg]", "warnings",
     )  # fmt: skip
     table = narrow_table(
         recording.name, words("push"), *map(numbers, headings), caption=_noise_line(estimate_noise(recording), steps)
@@ -70,7 +70,9 @@ def warnings_by_kind(recording: Recording) -> list[str]:
     for said in kinds.values():
         pushes = len({line.partition(":")[0] for line in said})
         where = f"in {pushes} pushes" if pushes > 1 else "in this push"
-        lines.append(said[0] if len(said) == 1 else f"{said[0].rstrip('.')} ({len(said) - 1} more like it, {where}).")
+        lines.append(
+            said[0] if len(said) == 1 else f"{said[0].rstrip('.')} ({len(said) - 1} similar warnings, {where})."
+        )
     hidden = len(lines) - MOST_KINDS + 1
     return lines if hidden <= 1 else [*lines[: MOST_KINDS - 1], f"and {hidden} more kinds of warnings."]
 
@@ -176,19 +178,19 @@ def _noise_line(noise: NoiseEstimate, steps: tuple[float, float]) -> str:
         for said, step, scale, unit in (("places", steps[0], 1e3, "mm"), ("yaw", steps[1], 180.0 / np.pi, "deg"))
         if step > 0.0
     )
-    rounded = f"; rounded: {grid}, which is a noise of its step / sqrt(12)" if grid else ""
+    rounded = f"; rounded: {grid}, which adds a noise of step / sqrt(12)" if grid else ""
     return _seen_line(noise) + rounded
 
 
 def _seen_line(noise: NoiseEstimate) -> str:
     if noise.object_position_std is None or noise.object_rotation_std is None:
-        return "noise: unknown, the object is nowhere recorded at rest"
+        return "noise: unknown, because the object is never recorded at rest"
     parts = [
         f"noise at rest: object {noise.object_position_std * 1e3:.3f} mm, "
         f"{np.rad2deg(noise.object_rotation_std):.3f} deg (one standard deviation, {noise.samples} samples)"
     ]
     if noise.position_autocorrelation is not None:
-        parts.append(f"correlation to the next sample {noise.position_autocorrelation:.2f}")
+        parts.append(f"correlation of successive samples {noise.position_autocorrelation:.2f}")
     if noise.force_std is not None:
         parts.append(f"force {noise.force_std:.3f} N")
     return "; ".join(parts)

@@ -14,33 +14,36 @@ from physid_drake.identify.accuracy import accuracy_of
 from physid_drake.identify.estimates import Estimate, estimates_of
 from physid_drake.plan import Hindsight, Plan
 from physid_drake.report.cells import cells_figure, cells_verdict, combination_text
-from physid_drake.report.pages import index_page
+from physid_drake.report.pages import BASELINE_MEANS, HELD_OUT_MEANS, index_page, sigma_means
 from physid_drake.report.plan import plan_rows
 from physid_drake.report.plan_page import caption_of, curve_svg
-from physid_drake.report.tables import accuracy_cells, verdict
+from physid_drake.report.tables import accuracy_cells, identifiable_text, verdict
 
 _BODY = """
 <p>{% if diagnosis %}<b>{{ diagnosis.verdict }}</b>. {{ diagnosis.sentence }}{% else %}{{ verdict }}{% endif %}</p>
-<h2>theta{{ with_effects }}</h2>
-<div class="wide"><table><tr><th>parameter</th><th>estimate</th><th>90 % interval</th><th>told</th></tr>
+<p class="note">{{ means }}</p>
+<h2>parameters{{ with_effects }}</h2>
+<div class="wide"><table>
+<tr><th>parameter</th><th>identified</th><th>90 % interval</th><th>identifiable</th></tr>
 {% for e in estimates %}
 <tr>{% for cell in e %}<td>{{ cell }}</td>{% endfor %}</tr>
 {% endfor %}
 </table></div>
 {% if cells %}
-<h2>what these pushes tell about the cells</h2>
+<h2>identifiability of the friction cells</h2>
 {{ cells.map }}
 <div class="wide"><table>
-<tr><th>combination of ln frictions</th><th>singular value</th><th>left</th><th>told</th></tr>
+<tr><th>combination of log frictions</th><th>singular value</th><th>posterior / prior std</th>
+<th>identifiable</th></tr>
 {% for row in cells.rows %}
 <tr>{% for c in row %}<td>{{ c }}</td>{% endfor %}</tr>
 {% endfor %}
 </table></div>
 <p>{{ cells.verdict }}</p>
 {% endif %}
-<h2>error of prediction of each push, left out (root mean square)</h2>
+<h2>prediction error of held-out pushes (root mean square)</h2>
 <div class="wide"><table>
-<tr><th></th><th>mm</th><th>deg</th><th>end mm</th><th>end deg</th><th>N</th><th>std</th></tr>
+<tr><th></th><th>path mm</th><th>path deg</th><th>end mm</th><th>end deg</th><th>force N</th><th>path sigma</th></tr>
 {% for label, cells in accuracy %}
 <tr><th>{{ label }}</th>{% for c in cells %}<td>{{ c }}</td>{% endfor %}</tr>
 {% endfor %}
@@ -81,13 +84,14 @@ def overview_page(
     fitter, fit = (known.fitter, known.fit) if evidence is None else (evidence.fitter, evidence.leaving)
     names = " and ".join(part.kind.name for part in fit.hypothesis.parts)
     rows = [
-        ("before any push", known.before),
-        ("before it was learned from", known.foreseen),
+        ("initial guess", known.before),
+        ("next push, from earlier pushes", known.foreseen),
         ("baseline model", known.after),
         (f"with {names}", accuracy_of(known.case, evidence.errors_after) if evidence is not None and names else None),
     ]
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     body = environment.from_string(_BODY).render(
+        means=f"{BASELINE_MEANS} {HELD_OUT_MEANS} {sigma_means(known=known.case.noise.known)}",
         verdict=verdict(known),
         with_effects=f", with {names}" if names else ", baseline model",
         estimates=[_told(e) for e in estimates_of(fitter, fit)],
@@ -100,9 +104,8 @@ def overview_page(
 
 
 def _told(e: Estimate) -> tuple[str, str, str, str]:
-    told = "no (prior)" if not e.identifiable else "at its bound" if e.at_bound else "yes"
     unit = "" if e.unit == "-" else f" {e.unit}"
-    return e.name, f"{e.value:.4g}{unit}", f"{e.ci90[0]:.4g} to {e.ci90[1]:.4g}", told
+    return e.name, f"{e.value:.4g}{unit}", f"{e.ci90[0]:.4g} to {e.ci90[1]:.4g}", identifiable_text(e)
 
 
 def _shown_cells(cells: CellsTold) -> dict[str, Any]:
@@ -114,7 +117,7 @@ def _shown_cells(cells: CellsTold) -> dict[str, Any]:
 
 
 def _shown_plan(plan: Plan, hindsight: Hindsight | None) -> dict[str, Any]:
-    known = " and ".join(e.name for e in plan.model.effects) or "the identified theta"
+    known = " and ".join(e.name for e in plan.model.effects) or "the baseline model"
     return {
         "title": f"plan: {plan.policy.name}, with {known}",
         "rows": plan_rows(plan, hindsight=hindsight),

@@ -15,11 +15,23 @@ PLAN: Final = "plan.html"
 
 TITLES: Final = {INDEX: "Overview", DIAGNOSIS: "Diagnosis", SCENE: "In 3D", PLAN: "Plan"}
 TELLS: Final = {
-    DIAGNOSIS: "what is missing, how sure that is, where it shows, and what it changes",
+    DIAGNOSIS: "the missing physics, how certain it is, where it acts, and what it changes",
     SCENE: "the pushes in three dimensions: recorded, simulated and planned",
-    PLAN: "the push that brings the object to its goal, and what may come of it",
+    PLAN: "the push that brings the object to its goal, and its predicted results",
 }
 """What each page says, for the one that leads."""
+BASELINE_MEANS: Final = (
+    "Baseline model: the Drake cell with identified parameters and without any effect of the catalogue."
+)
+HELD_OUT_MEANS: Final = "Held-out push: predicted by a model that was fitted to all other pushes."
+
+
+def sigma_means(*, known: bool) -> str:
+    """What sigma is, where the tracker's noise is known and where it is not."""
+    if known:
+        return "Sigma: in units of tracker noise (one standard deviation)."
+    return "Sigma: the tracker noise is unknown, and taken to be as large as the errors of the baseline model."
+
 
 _NAV = """<nav aria-label="pages" style="font: 13px/1.4 system-ui, sans-serif; margin: 0 0 12px">
 {%- for file, title in pages %}
@@ -53,7 +65,7 @@ tr + tr th, tr + tr td { border-top: 1px solid #dfe3ea; }
 <li><a href="{{ file }}">{{ name }}</a>: {{ tells }}.</li>
 {% endfor %}
 </ul>
-<p class="note">Beside these: {{ files | join(", ") }}.</p>
+<p class="note">Other files: {{ files | join(", ") }}.</p>
 </main></body></html>
 """
 

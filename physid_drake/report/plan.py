@@ -65,13 +65,13 @@ def plan_json(
         "hand_height_m": tip_height_of(plan.model, plan.situation),
         "predicted": _outcome(plan.predicted, plan.cost),
         "predicted_with_effects": None if with_effects is None else _outcome(*with_effects),
-        "plain_push": None if hindsight is None else _plain_push(hindsight),
-        "caveat": "; ".join(caveats_of(plan, hindsight)) or None,
-        "belief": None if plan.spread is None else _belief(plan.spread, plan.tolerance),
+        "baseline_plan": None if hindsight is None else _baseline_plan(hindsight),
+        "warnings": caveats_of(plan, hindsight),
+        "posterior": None if plan.spread is None else _posterior(plan.spread, plan.tolerance),
         "loss_m": plan.loss,
         "sweep": {"setting": plan.policy.swept, "rows": [_row(row) for row in plan.sweep]},
         "search": {
-            "made_small": "mean cost under the belief" if plan.risk else "cost under the most likely theta",
+            "minimised": "expected cost" if plan.risk else "cost with the most likely parameters",
             "trials": plan.search.belief.n_trials,
             "failed": plan.search.n_failed,
             "stop_reason": plan.search.stop_reason,
@@ -107,24 +107,24 @@ def plan_rows(
     if isinstance(plan.cost_function, WithinDisc):
         (gx, gy), radius = plan.cost_function.centre, plan.cost_function.radius
         rows.append(
-            ("goal", f"within {1e3 * radius:.0f} mm of {1e3 * gx:.0f}, {1e3 * gy:.0f} mm, where a robot reaches")
+            ("goal", f"within {1e3 * radius:.0f} mm of {1e3 * gx:.0f}, {1e3 * gy:.0f} mm, within a robot's reach")
         )
     rows += _settings_rows(plan)
     rows.append(("predicted end", _said(plan.predicted, plan.cost)))
     if not isinstance(plan.cost_function, InsideRegion) and plan.tolerance < plan.cost < plan.loss:
-        rows.append(("misses the goal", f"by {1e3 * plan.cost:.1f} mm; {1e3 * plan.tolerance:g} mm were allowed"))
+        rows.append(("misses the goal", f"by {1e3 * plan.cost:.1f} mm; the tolerance is {1e3 * plan.tolerance:g} mm"))
     if with_effects is not None:
         rows.append(("with the effects found", _said(*with_effects)))
     if plan.spread is not None:
-        whose = "" if with_effects is None else ", says the baseline model"
-        rows += [(what + whose, value) for what, value in _belief_rows(plan.spread, plan.tolerance)]
+        whose = "" if with_effects is None else ", baseline model"
+        rows += [(what + whose, value) for what, value in _posterior_rows(plan.spread, plan.tolerance)]
     if hindsight is not None and hindsight.plain is not None and hindsight.outcome is not None:
         settings = ", ".join(value for _, value in _settings_rows(hindsight.plain))
         rows += [
-            ("planned without effects", f"{settings}; thought to be off by {1e3 * hindsight.plain.cost:.1f} mm"),
-            ("that push with them", _said(*hindsight.outcome)),
+            ("baseline plan", f"{settings}; predicted miss {1e3 * hindsight.plain.cost:.1f} mm"),
+            ("baseline plan, simulated with the effect", _said(*hindsight.outcome)),
         ]
-    return [*rows, *(("beware", caveat) for caveat in caveats_of(plan, hindsight))]
+    return [*rows, *(("warning", caveat) for caveat in caveats_of(plan, hindsight))]
 
 
 def _settings_rows(plan: Plan) -> list[tuple[str, str]]:
@@ -134,8 +134,8 @@ def _settings_rows(plan: Plan) -> list[tuple[str, str]]:
     ]  # fmt: skip
 
 
-def _plain_push(hindsight: Hindsight) -> dict[str, Any] | None:
-    """The push that was planned without effects: what was thought of it, and what comes of it with them."""
+def _baseline_plan(hindsight: Hindsight) -> dict[str, Any] | None:
+    """The plan with the baseline model: what that predicts, and what the model with the effects does."""
     plain, outcome = hindsight.plain, hindsight.outcome
     if plain is None or outcome is None:
         return None
@@ -143,7 +143,7 @@ def _plain_push(hindsight: Hindsight) -> dict[str, Any] | None:
         **_outcome(*outcome),
         "settings": _settings(plain),
         "predicted": _outcome(plain.predicted, plain.cost),
-        "belief": None if plain.spread is None else _belief(plain.spread, plain.tolerance),
+        "posterior": None if plain.spread is None else _posterior(plain.spread, plain.tolerance),
     }
 
 
@@ -154,27 +154,27 @@ def _settings(plan: Plan) -> dict[str, Any]:
     }
 
 
-def _belief_rows(spread: Spread, tolerance: float) -> list[tuple[str, str]]:
+def _posterior_rows(spread: Spread, tolerance: float) -> list[tuple[str, str]]:
     rate, (low, high) = spread.success_rate(tolerance)
     count = len(spread.costs)
     band = spread.band
     rows = [
-        ("cost under the belief",
-         f"mean {1e3 * spread.mean:.1f} mm, 5 to 95 %: {1e3 * band[0]:.1f} to {1e3 * band[1]:.1f} mm"),
-        (f"within {1e3 * tolerance:g} mm", f"{rate:.2f} (90 %: {low:.2f} to {high:.2f}) of {count} draws"),
-        ("falls or topples", f"{spread.losses} of {count} draws"),
+        ("expected miss", f"{1e3 * spread.mean:.1f} mm (90 %: {1e3 * band[0]:.1f} to {1e3 * band[1]:.1f} mm)"),
+        ("success rate",
+         f"{round(rate * count)}/{count} (90 %: {low:.2f} to {high:.2f}) within {1e3 * tolerance:g} mm"),
+        ("falls or topples", f"{spread.losses}/{count}"),
     ]  # fmt: skip
     if spread.moving:
-        rows.append(("does not stop", f"{spread.moving} of {count} draws, which count as lost"))
+        rows.append(("does not stop", f"{spread.moving}/{count}, counted as lost"))
     if spread.diverged:
-        rows.append(("diverged", f"{spread.diverged} of {count} draws, which count as lost"))
+        rows.append(("diverged", f"{spread.diverged}/{count}, counted as lost"))
     return rows
 
 
 def _setting(value: float, unit: str) -> str:
     if unit == "rad":
         return f"{math.degrees(value):.2f} deg"
-    return f"{1e3 * value:.1f} mm" if unit == "m" else f"{value:.4f} {unit}"
+    return f"{round(1e3 * value, 1) + 0.0:.1f} mm" if unit == "m" else f"{value:.4f} {unit}"
 
 
 def _said(trajectory: Trajectory, cost: float) -> str:
@@ -182,7 +182,7 @@ def _said(trajectory: Trajectory, cost: float) -> str:
     place = f"{x:.1f}, {y:.1f} mm, {yaw:.1f} deg"
     if trajectory.ending is not Ending.AT_REST:
         return f"{place}, {trajectory.ending.value}: this push does not bring it to the goal"
-    return f"{place}, {trajectory.ending.value}; off by {1e3 * cost:.1f} mm"
+    return f"{place}, {trajectory.ending.value}; miss {1e3 * cost:.1f} mm"
 
 
 def _pose(pose: Any) -> dict[str, float]:
@@ -194,10 +194,10 @@ def _outcome(trajectory: Trajectory, cost: float) -> dict[str, Any]:
     return {"end": _pose(trajectory.end), "ending": trajectory.ending.value, "cost_m": _finite(cost)}
 
 
-def _belief(spread: Spread, tolerance: float) -> dict[str, Any]:
+def _posterior(spread: Spread, tolerance: float) -> dict[str, Any]:
     rate, interval = spread.success_rate(tolerance)
     return {
-        "draws": len(spread.costs),
+        "samples": len(spread.costs),
         "mean_cost_m": spread.mean,
         "cost_5_95_m": list(spread.band),
         "losses": spread.losses,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from physid_drake.effects.rollout import Geometry, geometry_with
 from physid_drake.plan import DistanceToGoal, Ending, Hindsight, InsideRegion, Outcome, Plan, SweepRow, WithinDisc
 from physid_drake.report.outline import outline_of
-from physid_drake.report.pages import PLAN, nav
+from physid_drake.report.pages import BASELINE_MEANS, PLAN, nav
 from physid_drake.report.plan import plan_rows, push_files, title_of
 from physid_drake.report.svg import MUTED, drawn, svg_of
 from physid_drake.report.table_view import MM, placed
@@ -33,7 +33,7 @@ def curve_svg(plan: Plan, *, size: tuple[float, float] = (5.2, 3.4)) -> Markup:
     with drawn():
         figure = Figure(figsize=size, layout="constrained")
         _draw_curve(figure.add_subplot(), plan)
-        return svg_of(figure, "plan curve", f"Cost against {plan.policy.swept}")
+        return svg_of(figure, "plan curve", f"Miss against {plan.policy.swept}")
 
 
 def plan_png(plan: Plan) -> bytes:
@@ -72,20 +72,21 @@ def plan_page(
         title=title_of(plan), rows=plan_rows(plan, with_effects=with_effects, hindsight=hindsight),
         above=picture,
         curve=curve_svg(plan) if plan.sweep else None, caption=caption_of(plan), files=push_files(plan),
-        seed=seed, other=with_effects is not None, trials=plan.search.belief.n_trials, nav=nav(PLAN, pages),
+        seed=seed, baseline_means=BASELINE_MEANS, other=with_effects is not None,
+        trials=plan.search.belief.n_trials, nav=nav(PLAN, pages),
     ) + "\n"  # fmt: skip
 
 
 def caption_of(plan: Plan) -> str:
     """What the curve shows, in words."""
-    fixed = "" if plan.policy.space.dimension == 1 else ", the other settings at their best"
-    text = f"Cost against {plan.policy.swept}{fixed}."
+    fixed = "" if plan.policy.space.dimension == 1 else ", with the other settings at their optimum"
+    text = f"Miss against {plan.policy.swept}{fixed}."
     drawn = [row.spread for row in plan.sweep if row.spread is not None]
     if drawn:
-        text += f" Line: the most likely theta; band: 5 to 95 % of {len(drawn[0].costs)} draws from the belief."
+        text += f" Line: most likely parameters; band: 5 to 95 % of {len(drawn[0].costs)} posterior samples."
     lost = sum(s.losses + s.moving for s in drawn) + sum(row.ending is not Ending.AT_REST for row in plan.sweep)
     if lost:
-        text += f" An object that falls, topples or does not stop costs {MM * plan.loss:.0f} mm."
+        text += f" An object that falls, topples or does not stop counts as {MM * plan.loss:.0f} mm."
     return text
 
 
@@ -107,7 +108,7 @@ def _draw_curve(axes: Axes, plan: Plan) -> None:
         axes.plot([best], [MM * plan.cost], "o", color=GOAL, markersize=6, zorder=4, clip_on=False)
     axes.axvline(best, color=GOAL, linewidth=0.8, linestyle=":")
     axes.axhline(MM * plan.tolerance, color=MUTED, linewidth=0.6, linestyle="--")
-    axes.set(xlabel=f"{plan.policy.swept} [{unit}]", ylabel="cost [mm]")
+    axes.set(xlabel=f"{plan.policy.swept} [{unit}]", ylabel="miss [mm]")
     axes.set_ylim(bottom=0.0)
     axes.grid()
 
@@ -204,9 +205,8 @@ i { display: inline-block; width: 18px; height: 4px; border-radius: 2px; vertica
 <div class="columns">
 <figure>{{ above }}<figcaption><i style="background:#2563c9; margin-left:0"></i>object
 <i style="background:repeating-linear-gradient(90deg, #b4540a 0 7px, transparent 7px 10px)"></i>hand
-<i style="background:#1d7a46"></i>goal and tolerance. Faint: where the object ends under draws from the belief.
-{% if other %}Dashed red: where it ends with the effects found.{% endif %}
-
+<i style="background:#1d7a46"></i>goal and tolerance. Faint: end poses of the posterior samples.
+{% if other %}Dashed red: end pose with the effects found.{% endif %}
 </figcaption></figure>
 {% if curve %}
 <figure>{{ curve }}<figcaption>{{ caption }} Green: the plan; dashed: the tolerance.</figcaption></figure>
@@ -218,6 +218,6 @@ i { display: inline-block; width: 18px; height: 4px; border-radius: 2px; vertica
 {% endfor %}
 </table>
 <p class="note">{{ files | join(", ") }}: the hand's path for a controller (time_s, hand_x_m, hand_y_m, hand_z_m).
-{{ trials }} settings tried; seed {{ seed }}.</p>
+{{ trials }} candidates evaluated; random seed {{ seed }}. {{ baseline_means }}</p>
 </main></body></html>
 """

@@ -24,15 +24,15 @@ SOON: Final = 2.0
 LATE: Final = 0.1
 """Of a stage that lasts longer than it usually does, so much is left."""
 
-IDENTIFICATION_STAGES: Final[Mapping[str, float]] = {"theta": 5.0, "in the Drake cell": 4.0}
+IDENTIFICATION_STAGES: Final[Mapping[str, float]] = {"parameter fit": 5.0, "refit in the Drake cell": 4.0}
 DIAGNOSIS_STAGES: Final[Mapping[str, float]] = {
-    **IDENTIFICATION_STAGES, "is anything missing?": 2.5, "effects, one at a time": 15.0, "pairs of effects": 25.0,
-    "physics without a name": 5.5, "what was found, in the Drake cell": 4.0, "the missing wrench": 0.3,
-    "the next push": 0.5,
+    **IDENTIFICATION_STAGES, "test for missing physics": 2.5, "single effects": 15.0, "pairs of effects": 25.0,
+    "unnamed force": 5.5, "effects in the Drake cell": 4.0, "missing wrench": 0.3,
+    "next push": 0.5,
 }  # fmt: skip
 HINDSIGHT: Final = "planning with the baseline model"
-PLANNING_STAGES: Final[Mapping[str, float]] = {"search over the policy": 6.0, "sweep": 19.0, HINDSIGHT: 24.0}
-JOB_STAGES: Final[Mapping[str, float]] = {"search for theta": 4.0, **DIAGNOSIS_STAGES, **PLANNING_STAGES}
+PLANNING_STAGES: Final[Mapping[str, float]] = {"policy search": 6.0, "sweep": 19.0, HINDSIGHT: 24.0}
+JOB_STAGES: Final[Mapping[str, float]] = {"parameter search": 4.0, **DIAGNOSIS_STAGES, **PLANNING_STAGES}
 """How long the stages last beside one another; `benchmarks/diagnosis_time.py` prints those of a diagnosis."""
 
 

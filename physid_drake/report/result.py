@@ -26,8 +26,8 @@ FORMAT = "physid-result/1"
 def result_json(examined: Examined, recording: Recording, seed: int, versions: dict[str, str]) -> str:
     """The result as JSON text; the same recording, configuration and seed give the same bytes.
 
-    Theta is that of the model that leaves, with the effects that were found where some were; ``baseline`` is there
-    then, too, and has what the baseline model had.
+    Theta is that of the final model, with the effects found if there are any; then ``baseline`` is there, too, with
+    what the baseline model had.
 
     Args:
         examined: what was identified, and diagnosed if it was.
@@ -50,12 +50,12 @@ def result_json(examined: Examined, recording: Recording, seed: int, versions: d
         "theta": _theta(estimates_of(fitter, fit)),
         **({"baseline": _baseline(known)} if changed else {}),
         **({} if known.cells is None else {"cells": _cells(known.cells)}),
-        "held_out": {"pushes": pushes, "before": _numbers(known.before), "after": _numbers(after)},
+        "held_out": {"pushes": pushes, "initial_guess": _numbers(known.before), "identified": _numbers(after)},
         "training": {"pushes": pushes},
-        **({} if known.foreseen is None else {"foreseen": _numbers(known.foreseen)}),
+        **({} if known.foreseen is None else {"next_push_prediction": _numbers(known.foreseen)}),
         "reduced_chi2": fit.reduced_chi2,
         "friction_scatter": UNIT_SCATTER * fit.scatter,
-        "push_unknowns": unknowns_of(known.case, fit),
+        "per_push_parameters": unknowns_of(known.case, fit),
         "noise": known.noise,
         "search": None if search is None else _search(search, known),
         "rollouts": known.rollouts if examined.diagnosis is None else examined.diagnosis.rollouts,
@@ -102,14 +102,19 @@ def _cells(cells: CellsTold) -> dict[str, Any]:
         "grid": list(cells.grid),
         "names": list(cells.names),
         "friction": cells.friction.tolist(),
-        "prior_std_left": cells.left.tolist(),
-        "combinations_told": cells.told,
+        "posterior_over_prior_std": cells.left.tolist(),
+        "combinations_identifiable": cells.told,
         "combinations": [
-            {"weights": c.weights.tolist(), "singular_value": c.strength, "prior_std_left": c.left, "told": c.told}
+            {
+                "weights": c.weights.tolist(),
+                "singular_value": c.strength,
+                "posterior_over_prior_std": c.left,
+                "identifiable": c.told,
+            }
             for c in cells.combinations
         ],
-        "neighbours_told_apart": [list(pair) for pair in cells.apart],
-        "neighbours_not_told_apart": [list(pair) for pair in cells.not_apart],
+        "neighbours_distinguishable": [list(pair) for pair in cells.apart],
+        "neighbours_indistinguishable": [list(pair) for pair in cells.not_apart],
     }
 
 
@@ -123,6 +128,6 @@ def _numbers(accuracy: Accuracy | None) -> dict[str, float] | None:
         "end_position_rms_m": accuracy.end_position,
         "end_rotation_rms_rad": accuracy.end_rotation,
         "force_rms_n": accuracy.force,
-        "sigmas_rms": accuracy.rms,
+        "rms_sigma": accuracy.rms,
         "diverged": accuracy.diverged,
     }

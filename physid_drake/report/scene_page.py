@@ -8,7 +8,7 @@ from pathlib import Path
 from jinja2 import Environment, StrictUndefined
 
 from physid_drake.plan.reach import SHIPPED_TABLE
-from physid_drake.report.pages import SCENE, nav
+from physid_drake.report.pages import BASELINE_MEANS, SCENE, nav
 from physid_drake.report.stage import (
     ARROW,
     BASELINE,
@@ -71,27 +71,27 @@ def _switches(setting: Setting, acts: Sequence[Act]) -> list[tuple[str, str, str
     shipped = abs(x1 - x0 - SHIPPED_TABLE[0]) + abs(y1 - y0 - SHIPPED_TABLE[1]) < 1e-6
     found = []
     if RECORDED in setting.shapes:
-        found.append((RECORDED, _css(COLOURS[RECORDED]), "object as recorded", True))
+        found.append((RECORDED, _css(COLOURS[RECORDED]), "recorded object", True))
     found.append(("paths", "", "paths", True))
     if any(act.missing for act in acts):
         found += [
-            ("missing", _css(MISSING), "force that the baseline model lacks", True),
-            ("mismatch", _css(MISSING), "where on the table it lacks something", True),
+            ("missing", _css(MISSING), "force missing from the baseline model", True),
+            ("mismatch", _css(MISSING), "where on the table it is missing", True),
         ]
     if setting.hand is not None:
         found.append(("hand", "", "hand", True))
-    return [*found, ("reach", "", "where the robots reach: Motoman blue, Baxter red", shipped)]
+    return [*found, ("reach", "", "reach of the robots: Motoman blue, Baxter red", shipped)]
 
 
 def _notes(acts: Sequence[Act], unit_force: float | None) -> list[str]:
-    lines = []
+    lines = [BASELINE_MEANS]
     if unit_force is not None and any(act.missing for act in acts):
         lines.append(
-            f"An arrow of {1e3 * ARROW:.0f} mm is {unit_force:.2g} N; grey ones are within two standard deviations of"
-            f" nothing. The darkest spots on the table are {LOUDEST:.0f} standard deviations from nothing."
+            f"An arrow of {1e3 * ARROW:.0f} mm is {unit_force:.2g} N; grey arrows are within two standard deviations"
+            f" of zero. The darkest spots on the table are {LOUDEST:.0f} standard deviations from zero."
         )
     if any(act.goal is not None for act in acts):
-        lines.append("Green: the goal of the planned push, as large as the tolerance.")
+        lines.append("Green: the goal of the planned push; its radius is the tolerance.")
     return lines
 
 

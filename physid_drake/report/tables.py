@@ -6,48 +6,55 @@ import math
 
 from rich.table import Table
 
-from physid_drake.identify import Accuracy, Identification
+from physid_drake.identify import Accuracy, Estimate, Identification
 from physid_drake.identify.identify import EXPLAINED
 from physid_drake.pushes.stated import FAR_BELOW, quieter_by
+from physid_drake.report.pages import sigma_means
 from physid_drake.report.terminal import narrow_table, numbers, words
 
 
 def estimates_table(result: Identification, title: str) -> Table:
-    """Theta with intervals, and whether these pushes tell it."""
+    """The parameters with intervals, and whether they are identifiable from these pushes."""
     table = narrow_table(
-        title, words("parameter"), numbers("estimate"), numbers("90 % interval"), words("told by these pushes"),
-        numbers("before"),
+        title, words("parameter"), numbers("identified"), numbers("90 % interval"), words("identifiable"),
+        numbers("initial guess"),
     )  # fmt: skip
     for e in result.estimates:
         unit = "" if e.unit == "-" else f" {e.unit}"
-        told = "yes" if e.identifiable else "no: anything in this interval"
-        if e.identifiable and e.at_bound:
-            told = "at its bound: it may lie beyond (theta.bounds)"
         table.add_row(
-            e.name, f"{e.value:.4g}{unit}", f"{e.ci90[0]:.4g} to {e.ci90[1]:.4g}", told, f"{e.prior:.4g}{unit}"
-        )
+            e.name, f"{e.value:.4g}{unit}", f"{e.ci90[0]:.4g} to {e.ci90[1]:.4g}", identifiable_text(e),
+            f"{e.prior:.4g}{unit}",
+        )  # fmt: skip
     return table
 
 
+def identifiable_text(estimate: Estimate) -> str:
+    """Whether a parameter is identifiable, in words."""
+    if not estimate.identifiable:
+        return "no (interval is the prior)"
+    return "yes, at its bound (theta.bounds)" if estimate.at_bound else "yes"
+
+
 def accuracy_table(result: Identification) -> Table:
-    """How well pushes are predicted, before and after."""
-    headings = ("path\n[mm]", "path\n[deg]", "end\n[mm]", "end\n[deg]", "force\n[N]", "std of\nsensors")
+    """How well pushes are predicted, with the initial guess and with what was identified."""
+    headings = ("path\n[mm]", "path\n[deg]", "end\n[mm]", "end\n[deg]", "force\n[N]", "path\n[sigma]")
     table = narrow_table(
-        "error of prediction (root mean square)", words("pushes"), words("theta"), *map(numbers, headings)
-    )
+        "prediction error (root mean square)", words("pushes"), words("parameters"), *map(numbers, headings),
+        caption=sigma_means(known=result.case.noise.known),
+    )  # fmt: skip
     rows = (
-        ("each, left out", "before", result.before),
-        ("each, left out", "after", result.after),
-        ("each, before it was learned from", "after those before", result.foreseen),
+        ("held-out", "initial guess", result.before),
+        ("held-out", "identified", result.after),
+        ("next push", "from earlier pushes", result.foreseen),
     )
-    for pushes, theta, accuracy in rows:
+    for pushes, parameters, accuracy in rows:
         if accuracy is not None:
-            table.add_row(pushes, theta, *accuracy_cells(accuracy))
+            table.add_row(pushes, parameters, *accuracy_cells(accuracy))
     return table
 
 
 def accuracy_cells(accuracy: Accuracy) -> list[str]:
-    """The numbers of an accuracy as text: mm, degrees, mm, degrees, N, standard deviations; a dash for none."""
+    """The numbers of an accuracy as text: mm, degrees, mm, degrees, N, sigma; a dash for none."""
     numbers = (
         (1e3 * accuracy.position, 2), (math.degrees(accuracy.rotation), 2), (1e3 * accuracy.end_position, 2),
         (math.degrees(accuracy.end_rotation), 2), (accuracy.force, 3), (accuracy.rms, 2),
@@ -61,19 +68,19 @@ def verdict(result: Identification) -> str:
     quieter = quieter_by(chi2, result.degrees) if chi2 < FAR_BELOW else None
     if quieter is not None:
         return (
-            f"The baseline model leaves far less than the noise that counts (reduced chi-square {chi2:.2g}, 1"
-            f" expected): that is {quieter:,.0f} times what is left, and nothing smaller than it can be seen. Is it"
+            f"The errors of the baseline model are far below the assumed noise (reduced chi-square {chi2:.2g}; 1 ="
+            f" noise only): the noise is {quieter:,.0f} times as large, and smaller effects cannot be detected. Is it"
             " stated too large (sensors of recording.yaml)?"
         )
     if result.explains:
-        return f"The baseline model explains these pushes to their noise (reduced chi-square {chi2:.2f})."
+        return f"The baseline model explains these pushes (reduced chi-square {chi2:.2f}; 1 = noise only)."
     if result.reduced_chi2 < EXPLAINED:
         scatter = 100.0 * result.friction_scatter
         return (
-            f"The baseline model does not explain these pushes: it leaves no more than their noise (reduced"
-            f" chi-square {chi2:.2f}), but with frictions that differ by {scatter:.0f} % from push to push."
+            "The baseline model explains these pushes to their noise (reduced chi-square"
+            f" {chi2:.2f}) only with a friction scatter between pushes of {scatter:.0f} %, which is too much."
         )
     return (
-        f"The baseline model does not explain these pushes to their noise (reduced chi-square {chi2:.2f}, 1"
-        " expected): the intervals are widened for it, and some physics or a sensor's figure is missing."
+        f"The baseline model does not explain these pushes (reduced chi-square {chi2:.2f}; 1 = noise only): the"
+        " intervals are widened accordingly. Physics is missing, or a sensor's noise is stated too small."
     )

@@ -82,7 +82,7 @@ def _show(console: Console, result: Result, out: Path) -> None:
     for table in result.tables:
         console.print(rich_table(table))
     for reason in result.skipped:
-        console.print(f"left out: {reason}", markup=False)
+        console.print(f"skipped: {reason}", markup=False)
     names = [f"{table.name}.csv" for table in result.tables]
     console.print(
         f"written: {', '.join(['result.md', 'result.json', *names, 'figure.svg'])} in {out}", soft_wrap=True

@@ -60,7 +60,7 @@ def run_real(arguments: argparse.Namespace, command: Commander = diagnose_comman
         outcomes = [
             real_outcome(case, published, out)
             if reasons.get(case.name) is None
-            else RealOutcome(case=case, skipped=f"left out: {reasons[case.name]}")
+            else RealOutcome(case=case, skipped=f"skipped: {reasons[case.name]}")
             for case in chosen_cases(None)
             if case in cases or attempt_of(out / "diagnoses" / case.id) is not None
         ]

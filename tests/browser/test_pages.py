@@ -106,7 +106,7 @@ def test_the_first_screen_of_a_diagnosis_answers_what_a_user_asks(opened, job):
     for asked in ("How sure is that?", "Where?", "What now?", "May I trust it?"):
         assert asked in text
     assert answer["sentence"] in text and answer["location"]["statement"][1:] in text
-    assert "load_model" in text and "mm instead of" in text
+    assert "load_model" in text and "Error on held-out pushes" in text
 
 
 # The scene.
@@ -173,12 +173,12 @@ def test_the_live_view_shows_a_sign_and_its_button_stops_the_job(browser):
     tab.goto(live.url)
     tab.wait_for_timeout(1200)
     before = pixels(tab)
-    tell("effects, one at a time", 0, 0)
+    tell("single effects", 0, 0)
     tab.wait_for_timeout(800)
     assert changed(before, pixels(tab)) > 2e-4  # another line on the sign
     tab.click("text=Open Controls")
     tab.click(f"text={STOP}")
     tab.wait_for_timeout(500)
     with pytest.raises(KeyboardInterrupt):
-        tell("effects, one at a time", 0, 0)
+        tell("single effects", 0, 0)
     tab.close()

@@ -38,7 +38,7 @@ FLAGS = {
     "inspect": ("--out", "--no-fit"),
     "convert": ("--limit", "--seed", "--map", "--guess"),
     "diagnose": ("--out", "--seed", "--alpha", "--effects", "--contact", "--time-step", "--pushes", "--jobs"),
-    "plan": ("--goal", "--start", "--policy", "--model", "--plain", "--speed", "--direction", "--travel",
+    "plan": ("--goal", "--start", "--policy", "--model", "--baseline", "--speed", "--direction", "--travel",
     "--tolerance",
              "--search", "--budget", "--draws", "--risk", "--seed", "--out"),
     "prove": ("--worlds", "--quick", "--seed", "--out", "--kind", "--jobs", "--timeout", "--retry", "--open",
@@ -53,7 +53,7 @@ COUNTS = {"--goal": 2, "--start": 3}
 BARE = (
     "--no-fit",
     "--guess",
-    "--plain",
+    "--baseline",
     "--quick",
     "--retry",
     "--open",

@@ -98,7 +98,7 @@ def test_an_interrupted_diagnosis_goes_on_to_the_same_bytes(tmp_path):
     live, cut_off = tmp_path / "live.bin", tmp_path / "cut_off.bin"
 
     def copy(stage, done, total):
-        if stage == "is anything missing?":  # what an interrupted run would leave here
+        if stage == "test for missing physics":  # what an interrupted run would leave here
             shutil.copy(live, cut_off)
 
     whole, _ = diagnose(made, effects=effects, tick=copy, kept=KeptRollouts(live))

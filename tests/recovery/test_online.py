@@ -177,8 +177,8 @@ def test_a_straight_slide_tells_the_sides_apart_but_not_front_and_back():
     # And so it is reported.
     content = json.loads(result_json(Examined(known=result), recording, 0, {}))["cells"]
     assert content["grid"] == [2, 2]
-    assert content["combinations_told"] == 2
-    assert ["support_friction_0_0", "support_friction_1_0"] in content["neighbours_not_told_apart"]
+    assert content["combinations_identifiable"] == 2
+    assert ["support_friction_0_0", "support_friction_1_0"] in content["neighbours_indistinguishable"]
     assert "0,0 and 1,0" in cells_verdict(told)
     assert cells_table(told).row_count == 4
     assert cells_figure(told).startswith("<svg")

@@ -124,7 +124,7 @@ def test_a_plan_and_an_export_of_what_was_found(terminal):
     assert_nothing_is_cut(shown)
     assert "predicted end" in shown and " ".join(shown.split()).endswith("open planned/index.html")
     shown, status, _ = terminal.seen("model", "export", "found", "--out", "exported")
-    assert status == 0 and "anisotropic_table: friction that is no one coefficient" in " ".join(shown.split())
+    assert status == 0 and "anisotropic_table: friction that is not one coefficient" in " ".join(shown.split())
     assert_nothing_is_cut(shown)
 
 
@@ -145,7 +145,7 @@ def test_the_main_job_moves_through_its_stages(terminal):
     assert status == 0
     assert_nothing_is_cut(shown)
     assert " ".join(shown.split()).endswith("open job/index.html")
-    assert {"theta", "sweep"} <= {stage for stage in STAGES if any(stage in line for line in progress)}
+    assert {"parameter fit", "sweep"} <= {stage for stage in STAGES if any(stage in line for line in progress)}
 
 
 def test_a_log_becomes_a_recording(terminal):

@@ -52,7 +52,7 @@ def test_inspect_shows_every_push_and_warns_on_stderr(tmp_path, capsys):
     shown = capsys.readouterr()
     assert "some_$pushes" in shown.out and "p2" in shown.out and "[mm/s]" in shown.out
     assert "warning: pushes/p0.csv: object: rows 21-32: gap" in shown.err
-    assert "(2 more like it, in 3 pushes)" in shown.err and shown.err.count("gap") == 1
+    assert "(2 similar warnings, in 3 pushes)" in shown.err and shown.err.count("gap") == 1
     assert (tmp_path / "top.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -65,7 +65,7 @@ def test_inspect_says_what_a_diagnosis_would_refuse(tmp_path, capsys):
     shown = capsys.readouterr()
     assert "some_$pushes" in shown.out  # what is in it is shown all the same
     assert shown.err.splitlines()[-1].startswith("error: recording 'some_$pushes': with 50 kg")
-    assert "would be refused: push 'pushes/p0.csv': the object starts at" in shown.err
+    assert "ERROR: push 'pushes/p0.csv': the object starts at" in shown.err
 
 
 def test_a_broken_recording_is_one_line_and_status_one(tmp_path, capsys):

@@ -55,7 +55,7 @@ def test_errors_of_forces_are_written_where_forces_were_compared():
 def test_the_table_of_errors_has_newtons_where_forces_were_compared():
     forced = dc.replace(diagnosis_with().fit, force_before=0.3, force_after=0.1)
     assert [column.header for column in fit_table(diagnosis_with()).columns] == [
-        "model", "mm", "deg", "sigmas", "reduced\nchi-square",
+        "model", "mm", "deg", "sigma", "reduced\nchi-square",
     ]  # fmt: skip
     table = fit_table(diagnosis_with(fit=forced))
     (newtons,) = (column for column in table.columns if column.header == "N")

@@ -76,12 +76,12 @@ def diagnosis_with(**changes):
     d = Diagnosis(
         recording="eraser <u>",
         verdict="explained",
-        sentence="What is missing: stribeck_friction.",
+        sentence="Missing physics: stribeck_friction.",
         p_value=1e-9,
         alpha=0.01,
         effects=(effect("stribeck_friction", **LAWS["stribeck_friction"]),),
         location=Location(
-            statement="in its free slide: about 0.1 N", phase=("free_slide",), dof=("along_motion",),
+            statement="during free sliding, about 0.1 N", phase=("free_slide",), dof=("along_motion",),
             frame="object_velocity", windows=(WINDOW,),
         ),
         fit=FitQuality(
@@ -194,8 +194,8 @@ def test_a_page_is_well_formed_and_complete(page):
     # Law, next push, two views, arrows, and for each push its errors and its strip.
     assert tags.seen.count("svg") == 1 + 1 + 2 + 1 + 2 + 2
     for words in (
-        "explained", "What is missing: stribeck_friction.", "1 × 10⁻⁹", "not told by these pushes", "0.2 to 0.3",
-        "In its free slide: about 0.1 N", "too little", "< 10⁻³⁰⁰", "nothing beyond noise",
+        "explained", "Missing physics: stribeck_friction.", "1 × 10⁻⁹", "not identifiable", "0.2 to 0.3",
+        "During free sliding, about 0.1 N", "too little", "< 10⁻³⁰⁰", "nothing beyond noise",
     ):  # fmt: skip
         assert words in text
 
@@ -230,14 +230,14 @@ def test_where_nothing_was_found_only_the_plain_cell_is_shown():
     found = diagnosis_with(verdict="unexplained", effects=())
     bare = dc.replace(found, fit=dc.replace(found.fit, rms_after=found.fit.rms_before))
     text = diagnosis_page(bare, recording_of(), shown_pushes(after=False)[:1], WRENCHES[:2])
-    assert "with what is missing" not in text and 'class="after"' not in text
+    assert "with the effects found" not in text and 'class="after"' not in text
     assert "No effect of the catalogue is claimed." in text
 
 
 def test_what_a_force_without_a_name_does_to_the_errors_is_shown():
     found = diagnosis_with(verdict="unexplained", effects=())
     text = diagnosis_page(found, recording_of(), shown_pushes()[:1], WRENCHES[:2])
-    assert "with a force without a name" in text and 'class="after"' in text
+    assert "with an unnamed force" in text and 'class="after"' in text
     assert "No effect of the catalogue is claimed." in text
 
 
@@ -249,21 +249,22 @@ def test_what_is_not_a_number_is_a_dash(page):
 
 def test_gains_across_regimes_are_shown_where_there_are_any(page):
     gains = (
-        RegimeGain(fitted_on="slow", tested_on="fast <i>", gain=-12.34, standard_error=3.0),
-        RegimeGain(fitted_on="one heading", tested_on="the other", gain=5.0, standard_error=math.nan),
+        RegimeGain(fitted_on="50 to 90 mm/s", tested_on="200 to 400 mm/s <i>", gain=-12.34, standard_error=3.0),
+        RegimeGain(
+            fitted_on="headings 0 to 90 deg", tested_on="headings 180 to 270 deg", gain=5.0, standard_error=math.nan
+        ),
     )
     d = diagnosis_with()
     tags = Tags(
         diagnosis_page(dc.replace(d, fit=dc.replace(d.fit, regimes=gains)), recording_of(), shown_pushes(), ())
     )
-    assert not tags.open and {"slow", "fast <i>", "−12.3 ± 3.0", "one heading", "the other", "5.0 ± –"} <= set(
-        tags.words
-    )
-    fit, ranking = (
-        tags.words.index(h) for h in ("How well pushes are predicted that were left out", "Why the others lose")
-    )
-    assert fit < tags.words.index("gain in log density") < ranking
-    assert "gain in log density" not in page
+    assert not tags.open and {
+        "50 to 90 mm/s", "200 to 400 mm/s <i>", "−12.3 ± 3.0", "headings 0 to 90 deg",
+        "headings 180 to 270 deg", "5.0 ± –",
+    } <= set(tags.words)  # fmt: skip
+    fit, ranking = (tags.words.index(h) for h in ("Prediction of held-out pushes", "Why other effects were rejected"))
+    assert fit < tags.words.index("log-likelihood gain") < ranking
+    assert "Generalisation across regimes" in tags.words and "Generalisation across regimes" not in page
 
 
 def test_a_scene_beside_the_page_is_linked(page):
@@ -271,7 +272,9 @@ def test_a_scene_beside_the_page_is_linked(page):
     linked = diagnosis_page(diagnosis_with(), recording_of(), shown_pushes(), WRENCHES, pages=pages)
     assert linked.count('<a href="scene.html"') == 2 and linked.count('<a href="index.html"') == 1
     assert not Tags(linked).open and 'href="plan.html"' not in linked and 'href="diagnosis.html"' not in linked
-    assert linked.index("Where it is") < linked.rindex("scene.html") < linked.index("What is missing over time")
+    assert (
+        linked.index("Where it is") < linked.rindex("scene.html") < linked.index("Missing force and torque over time")
+    )
     assert "<a" not in page
 
 
@@ -318,11 +321,13 @@ def test_a_ratio_near_one_is_told_from_one(value, others, said):
 @pytest.mark.parametrize("known", [True, False])
 def test_where_nobody_knows_the_noise_the_captions_say_so(known):
     warnings = (
-        () if known else (f"{UNKNOWN}: the object's noise is taken to be what the baseline model leaves, 2 mm",)
+        ()
+        if known
+        else (f"{UNKNOWN}: the object's noise is taken to be as large as the errors of the baseline model, 2 mm",)
     )
     text = diagnosis_page(diagnosis_with(warnings=warnings), recording_of(), shown_pushes(), WRENCHES)
-    assert ("1 is noise alone" in text) is known
-    assert ("as loud as what" in text) is not known
+    assert ("1 = noise only" in text) is known
+    assert ("taken to be as large as" in text.partition("<section>")[0]) is not known
 
 
 def test_where_it_is_has_no_empty_lines():
@@ -333,7 +338,7 @@ def test_where_it_is_has_no_empty_lines():
 
 def test_where_most_is_missing_is_a_table_and_numbers_in_the_picture():
     text = " ".join(diagnosis_page(diagnosis_with(), recording_of(), shown_pushes(), WRENCHES).split())
-    for cell in ("0.50 to 1.00", "31, -12", "331", "41.2", "free slide"):
+    for cell in ("0.50 to 1.00", "31, -12", "331", "41.2", "free sliding"):
         assert f">{cell}</td>" in text
     assert "Numbers: the windows of the table." in text
 
@@ -343,4 +348,4 @@ def test_where_nothing_is_missing_nothing_is_placed(verdict):
     text = diagnosis_page(
         diagnosis_with(verdict=verdict, location=None, effects=()), recording_of(), shown_pushes(), ()
     )
-    assert "Where it is" not in text and "What is missing over time" not in text
+    assert "Where it is" not in text and "Missing force and torque over time" not in text

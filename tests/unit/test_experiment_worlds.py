@@ -172,7 +172,7 @@ def test_motion_prediction_runs_from_end_to_end_and_is_resumed(tmp_path):
     assert names <= {file.name for file in tmp_path.iterdir()}
     for record in records:
         for method in record["methods"].values():
-            assert all(np.diff(method["sigmas"]) <= 1e-12)
+            assert all(np.diff(method["sigma"]) <= 1e-12)
         assert record["true_theta"]["mm"] < 5.0
     kept = (tmp_path / "repetitions" / "001.json").read_text()
     with claim("motion_prediction", experiment, tmp_path) as folder:

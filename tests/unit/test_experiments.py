@@ -107,7 +107,7 @@ def test_a_result_is_written_without_what_is_not_known():
     assert content["tables"][0]["rows"] == [{"method": "one", "mm": 1.25}, {"method": "two", "mm": None}]
     assert content["panels"][0]["series"][0]["deviation"] == [None] * 3
     text = result_markdown(result, "name", "the command")
-    assert "| two | - |" in text and "    the command" in text and "Left out: three" in text
+    assert "| two | - |" in text and "    the command" in text and "Skipped: three" in text
     assert len(result_figure(result).axes) == 1
 
 
@@ -250,7 +250,7 @@ def test_corrected_plans_are_told_apart_by_what_was_named():
         ("tether", "consistent"),
     ]
     assert [(row[0], row[1], row[-1]) for row in summary.rows] == [
-        ("all worlds", 3, "1 of 3"), ("the effect was named, alone", 2, "1 of 2"), ("another answer", 1, "0 of 1"),
+        ("all worlds", 3, "1 of 3"), ("effect named correctly, alone", 2, "1 of 2"), ("other answers", 1, "0 of 1"),
     ]  # fmt: skip
     assert summary.rows[1][2:4] == (13.0, 6.0)  # medians
 

@@ -146,4 +146,4 @@ def test_what_is_told_does_not_depend_on_the_order_of_what_else_is_unknown():
     alone = told_by(tied((2, 1)), [[50.0, 50.0], [50.0, -50.0]])
     assert alone.told == 2
     assert alone.apart == (("support_friction_0_0", "support_friction_1_0"),)
-    assert cells_verdict(alone).endswith("All neighbours are told apart.")
+    assert cells_verdict(alone).endswith("All neighbouring cells are distinguishable.")

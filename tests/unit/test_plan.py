@@ -122,7 +122,7 @@ def test_the_mean_over_the_belief_stays_further_from_an_edge_that_it_may_fall_ov
     [
         ({"budget": 0}, "budget"), ({"draws": -1}, "draws"), ({"sweep": -1}, "sweep"),
         ({"tolerance": 0.0}, "tolerance"),
-        ({"search": "luck"}, "luck"), ({"risk": True, "draws": 0}, "belief"),
+        ({"search": "luck"}, "luck"), ({"risk": True, "draws": 0}, "posterior samples"),
         ({"model": replace(MODEL, hand_radius=None)}, "no hand"),
         ({"name": "throw"}, "throw"), ({"goal": (2.0, 0.0)}, "not on the table"),
         ({"goal": (math.nan, 0.0)}, "finite"),

@@ -134,11 +134,11 @@ def test_the_table_counts_worlds(tmp_path):
     for what, figure, _, _ in table(figures_of(outcomes)):
         rows.setdefault(what.strip(), figure)
     assert len(outcomes) == 4
-    assert rows["no effect: called a mismatch"] == "1 of 2 (50 %)"
-    assert rows["named rightly, or in a class of two"] == "1 of 1 (100 %)"
+    assert rows["no effect: false alarms"] == "1 of 2 (50 %)"
+    assert rows["named correctly, alone or in a class of two"] == "1 of 1 (100 %)"
     assert rows["effect below 5 sigma: found"] == "0 of 0"
     assert rows["not in the catalogue: unexplained"] == "0 of 1 (0 %)"
-    assert rows["amplitudes, of pairs, too: 90 % intervals that hold the truth"] == "1 of 1 (100 %)"
+    assert rows["amplitudes (pairs included): coverage of the 90 % intervals"] == "1 of 1 (100 %)"
 
 
 @pytest.mark.parametrize("value", [float("inf"), float("nan"), 1e308])

@@ -242,9 +242,9 @@ def test_another_proof_in_the_same_folder_is_refused(worlds):
         (["--only", "cmu"], "give --real too"),
         (["--pushes", "5"], "give --real too"),
         (["--real", "/nowhere"], "there is no such folder"),
-        (["--real", "/", "--quick"], "--quick is of sealed worlds"),
-        (["--real", "/", "--worlds", "3"], "--worlds is of sealed worlds"),
-        (["--real", "/", "--kind", "none"], "--kind is of sealed worlds"),
+        (["--real", "/", "--quick"], "--quick is for sealed worlds"),
+        (["--real", "/", "--worlds", "3"], "--worlds is for sealed worlds"),
+        (["--real", "/", "--kind", "none"], "--kind is for sealed worlds"),
         (["--real", "/", "--only", "nothing"], "no real case is named 'nothing'"),
         (["--real", "/", "--pushes", "2"], "--pushes must be at least 3"),
     ],
@@ -307,7 +307,7 @@ def test_the_child_is_asked_what_hides_the_truth_and_the_proof_counts_it(worlds,
     assert [attempt["hidden_by"] for attempt in attempts] == ["mount namespace"] * 3
     assert {attempt["error"] for attempt in attempts} == {None, "error: the cell fell apart."}
     assert json.loads((worlds / "proof.json").read_text())["hidden_by"] == {"mount namespace": 3}
-    assert "What hid the truth from the diagnoses: mount namespace, 3 of 3." in (worlds / "proof.md").read_text()
+    assert "The truth was hidden from the diagnoses by: mount namespace, 3 of 3." in (worlds / "proof.md").read_text()
 
 
 def test_nothing_outside_of_the_sealed_folder_tells_seed_or_kind_before_it_is_opened(worlds, monkeypatch):

@@ -206,7 +206,7 @@ def test_the_command_writes_a_table_and_goes_on(published, tmp_path, monkeypatch
     content = json.loads((tmp_path / "out" / "real.json").read_text())
     cases = {case["name"]: case for case in content["cases"]}
     assert set(cases) == {"mit_rect1_v10", "mit_rect1_v20", "square_drops"}
-    assert cases["mit_rect1_v10"]["skipped"].startswith("left out: ")
+    assert cases["mit_rect1_v10"]["skipped"].startswith("skipped: ")
     done = cases["mit_rect1_v20"]
     assert (done["verdict"], done["pushes"], done["held_out_m"]) == ("unexplained", 20, [0.004, 0.004])
     assert done["held_out_n"] == held_out
@@ -214,7 +214,7 @@ def test_the_command_writes_a_table_and_goes_on(published, tmp_path, monkeypatch
     assert set(hidden) == {published, tmp_path / "out" / "held_out"}
     first = (tmp_path / "out" / "real.md").read_bytes()
     head, row = (next(line for line in first.decode().splitlines() if word in line) for word in ("case", "rect1_v20"))
-    assert row.split("|")[head.split("|").index(" N ")] == column
+    assert row.split("|")[head.split("|").index(" held-out N ")] == column
     assert run_prove_real.run_real(arguments, command=fake) == 0
     assert (tmp_path / "out" / "real.md").read_bytes() == first
     fewer = build_parser().parse_args([*words[:3], "--only", "square", "--out", str(tmp_path / "out")])

@@ -102,7 +102,7 @@ def test_an_object_that_is_carried_is_doubted(recording):
 def test_a_hand_that_is_seen_too_seldom_is_doubted(recording, every, said):
     """Of 100 Hz."""
     seldom = replace(recording, pushes=tuple(replace(p, hand=thinned(p.hand, every)) for p in recording.pushes))
-    assert any("the hand is seen less often than every 0.09 s" in doubt for doubt in doubts(seldom)) == said
+    assert any("the hand is sampled less often than every 0.09 s" in doubt for doubt in doubts(seldom)) == said
 
 
 def test_poses_after_a_brake_that_is_hardly_seen_are_not_compared(recording):
@@ -192,12 +192,12 @@ def test_an_estimate_at_its_bound_is_said_to_be():
     )
     others = replace(estimate, at_bound=False), replace(estimate, identifiable=False)
     first, second, third = estimates_table(SimpleNamespace(estimates=(estimate, *others)), "made").columns[3].cells
-    assert first.startswith("at its bound") and second == "yes" and third.startswith("no")
+    assert first.startswith("yes, at its bound") and second == "yes" and third.startswith("no")
 
 
 def test_pushes_that_fit_by_frictions_alone_are_not_said_to_be_explained():
     told = SimpleNamespace(reduced_chi2=1.1, explains=False, friction_scatter=0.14)
-    assert "frictions that differ by 14 %" in verdict(told)
+    assert "friction scatter between pushes of 14 %" in verdict(told)
     told.explains = True
     assert verdict(told).startswith("The baseline model explains")
 

@@ -19,7 +19,7 @@ def test_an_explained_mismatch_answers_all_four():
     told = said()
     assert list(told) == QUESTIONS
     assert "stribeck_friction" in told["How sure is that?"] and "load_model" in told["What now?"]
-    assert "0.50 mm instead of 2.00" in told["May I trust it?"]
+    assert "0.50 mm (baseline model 2.00)" in told["May I trust it?"]
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ def test_an_explained_mismatch_answers_all_four():
         ("consistent", "Use the baseline model"),
         ("underpowered", "Record more pushes"),
         ("unexplained", "physid_drake inspect"),
-        ("ambiguous", "Make the push that tells them apart"),
+        ("ambiguous", "Make the push that distinguishes them"),
     ],
 )
 def test_what_to_do_follows_from_the_verdict(verdict, now):
@@ -44,4 +44,4 @@ def test_rivals_without_a_push_that_tells_them_apart_ask_for_other_pushes():
 
 def test_rotation_that_was_not_measured_is_not_spoken_of():
     fit = dc.replace(diagnosis_with().fit, rotation_before=math.nan, rotation_after=math.nan)
-    assert "degrees" not in said(fit=fit)["May I trust it?"] and "nan" not in said(fit=fit)["May I trust it?"]
+    assert " deg" not in said(fit=fit)["May I trust it?"] and "nan" not in said(fit=fit)["May I trust it?"]

@@ -21,7 +21,7 @@ def test_a_page_that_is_alone_links_to_nothing():
 
 
 def test_the_page_that_leads_says_what_came_of_it_and_what_the_others_tell():
-    page = index_page("Diagnosis of <mug>", ["What is missing: a & b."], ("diagnosis.json", INDEX, DIAGNOSIS, SCENE))
+    page = index_page("Diagnosis of <mug>", ["Missing physics: a & b."], ("diagnosis.json", INDEX, DIAGNOSIS, SCENE))
     assert "Diagnosis of &lt;mug&gt;" in page and "a &amp; b" in page and "<mug>" not in page
     assert page.count(f'href="{DIAGNOSIS}"') == 2 and "in three dimensions" in page and PLAN not in page
     assert "diagnosis.json" in page and "http" not in page

@@ -50,7 +50,7 @@ def test_the_result_says_everything_that_was_asked(done):
     assert result["format"] == "physid-result/1"
     assert result["seed"] == 3
     assert set(result["versions"]) >= {"physid_drake", "drake", "numpy", "scipy", "python"}
-    assert result["held_out"]["pushes"] == result["training"]["pushes"] == [*result["push_unknowns"]]
+    assert result["held_out"]["pushes"] == result["training"]["pushes"] == [*result["per_push_parameters"]]
     assert result["model"] == {"verdict": None, "effects": []} and result["pushes"] == 3
     friction = result["theta"]["support_friction"]
     assert set(friction) == {"value", "unit", "ci90", "identifiable", "prior", "at_bound"}
@@ -107,7 +107,7 @@ def test_the_page_shows_the_numbers_of_the_result(page, done):
         assert name in text
         assert f"{estimate['value']:.4g}" in text
         assert "{:.4g} to {:.4g}".format(*estimate["ci90"]) in text
-    assert f"{1e3 * result['held_out']['after']['position_rms_m']:.2f}" in text
+    assert f"{1e3 * result['held_out']['identified']['position_rms_m']:.2f}" in text
     assert f"reduced chi-square {result['reduced_chi2']:.2f}" in text
     assert "Seed 3" in text
 
@@ -132,8 +132,8 @@ def test_the_terminal_shows_theta_accuracy_and_verdict(recording, tmp_path, caps
     assert quick(tmp_path / "out", recording=recording, theta={"parameters": ["mass"]}) == 0
     shown = capsys.readouterr().out
     assert "mass" in shown
-    assert "no: anything" in shown
-    assert "left out" in shown
+    assert "no (interval is the prior)" in " ".join(shown.split())
+    assert "held-out" in shown
     assert "reduced chi-square" in shown
 
 
@@ -245,7 +245,7 @@ def test_the_main_job_learns_push_by_push_on_request(tmp_path):
     assert quick(tmp_path / "out", recording=recording, search={"online": True}) == 0
     content = json.loads((tmp_path / "out" / "result.json").read_text())
     assert len(content["training"]["pushes"]) == 2
-    assert content["foreseen"]["sigmas_rms"] < content["held_out"]["before"]["sigmas_rms"]
+    assert content["next_push_prediction"]["rms_sigma"] < content["held_out"]["initial_guess"]["rms_sigma"]
 
 
 @pytest.mark.slow
@@ -335,7 +335,7 @@ def test_all_files_of_a_run_say_the_same(tmp_path):
             == pytest.approx(model["intervals"][f"theta.{name}"], rel=1e-5)
         )
         assert told["value"] == pytest.approx(np.ravel(model["theta"][name])[0], rel=1e-5)
-    errors = result["held_out"]["after"]
+    errors = result["held_out"]["identified"]
     assert errors["position_rms_m"] == said["fit"]["held_out_rms_after_m"]
     assert errors["rotation_rms_rad"] == said["fit"]["held_out_rms_after_rad"]
     assert result["reduced_chi2"] == said["reduced_chi2_before"] == said["reduced_chi2_after"]

@@ -62,11 +62,11 @@ def test_results_go_to_a_folder_named_after_the_recordings(tmp_path, monkeypatch
     monkeypatch.setattr(run_diagnose, "run_case", interrupted)
     shutil.copytree(shipped("recordings") / "eraser_reference", tmp_path / "mine")
     assert main(["diagnose", "mine"]) == 130
-    assert "the same command goes on from there" in capsys.readouterr().out
+    assert "the same command resumes from them" in capsys.readouterr().out
     RunFolder(path=tmp_path / "diagnoses" / "mine", command="diagnose").write("diagnosis.json", "{}")
     assert main(["diagnose", "mine"]) == 130
     shown = capsys.readouterr().out
-    assert "going on with what was kept, rollouts: 1" in shown
+    assert "resuming with 1 rollouts of the interrupted run" in shown
     assert main(["diagnose", "mine", "--seed", "1"]) == 1
     assert "of other settings" in capsys.readouterr().err
 

@@ -124,16 +124,17 @@ class ClosedLoops:
             setting=(
                 f"{len(records)} erasers, each identified from {TRAINING} recorded push (its mass is known), are"
                 f" brought to a goal {1e3 * DISTANCE:.0f} mm away by at most {self.pushes} pushes of the policy push"
-                f" ({self.budget} settings tried for each). Open loop: each push begins where the model thinks that"
-                " the last one ended. Closed loop: the object is seen, theta's belief is updated and the next push"
-                " planned with it; within 5 mm of the goal it is left there. In the closed loop of the hidden robot"
+                f" ({self.budget} candidates evaluated for each). Open loop: each push begins where the model"
+                " predicts that the last one ended. Closed loop: the object is observed, the parameters are updated"
+                " and the next push is planned with them; within 5 mm of the goal it is left there. In the closed"
+                " loop of the hidden robot"
                 f" the median error of support friction is {before:.1f} % before the first push and {after:.1f} %"
                 " after the last one."
             ),
             tables=(
                 Table(
                     name="misses", title="miss of the goal by number of pushes [mm]",
-                    columns=("robot", "pushes are", "pushes", "mean", "std", "median"), rows=tuple(rows),
+                    columns=("robot", "control", "pushes", "mean", "std", "median"), rows=tuple(rows),
                 ),
             ),
             panels=tuple(panels),

@@ -83,25 +83,26 @@ class CorrectedPlans:
         rows = [_row(record) for record in sorted(records, key=lambda r: str(r["effect"]))]
         said = {"all worlds": records}
         for right in (True, False):
-            words = "the effect was named, alone" if right else "another answer"
+            words = "effect named correctly, alone" if right else "other answers"
             said[words] = [r for r in records if (r["named"] == r["effect"]) is right]
         summary = [(words, len(some), *_summary(some)) for words, some in said.items() if some]
         ranks = tuple(float(k + 1) for k in range(len(records)))
         nothing = (math.nan,) * len(records)
         return Result(
             setting=(
-                f"{len(records)} hidden worlds (MuJoCo), each with one effect of the catalogue in turn; friction"
-                " scatters from push to push. Each recording is diagnosed; a push to a goal"
+                f"{len(records)} hidden worlds (MuJoCo), each with one effect of the catalogue in turn, with"
+                " friction scatter between pushes. Each recording is diagnosed; a push to a goal"
                 f" {1e3 * DISTANCE:.0f} mm away is planned with the corrected model and with the identified baseline"
-                f" model (policy {POLICY}, {self.budget} pushes tried), and both are made in the hidden world."
+                f" model (policy {POLICY}, {self.budget} candidates evaluated), and both are made in the hidden"
+                " world."
             ),
             tables=(
                 Table(
-                    name="misses", title="how far from the goal the object stopped [mm]",
-                    columns=("hidden effect", "answer", "baseline", "corrected"), rows=tuple(rows),
+                    name="misses", title="distance from the goal at rest [mm]",
+                    columns=("hidden effect", "diagnosis", "baseline", "corrected"), rows=tuple(rows),
                 ),
                 Table(
-                    name="summary", title="by what the diagnosis said [mm]",
+                    name="summary", title="by diagnosis [mm]",
                     columns=(
                         "", "worlds", "baseline, median", "corrected, median", "baseline, 90 %", "corrected, 90 %",
                         "corrected is nearer",

@@ -218,9 +218,9 @@ class MitPushes:
         return Result(
             setting=(
                 f"Pushes of the MIT dataset on ABS, 50 mm long. Each fold learns from {self.training} pushes drawn"
-                " from the other folds. Errors are of the object's last pose. What is made small is the mean size of"
-                " the error, a turn counting with the radius of gyration. Pushes are played at"
-                f" {1e3 * PLAYED_SPEED:.0f} mm/s with ticks of"
+                " from the other folds. Errors are of the object's last pose. The objective is the mean size of"
+                " the error, with rotations multiplied by the radius of gyration. Pushes are played at"
+                f" {1e3 * PLAYED_SPEED:.0f} mm/s with time steps of"
                 f" {1e3 * TICK:.0f} ms."
             ),
             tables=tuple(tables),

@@ -93,7 +93,7 @@ class MotionPrediction:
         best = [float(trials.misfits[:count].min()) for count in counts]
         return {
             "theta": trials.best_after(self.budget).tolist(),
-            "sigmas": [math.exp(b) for b in best],
+            "sigma": [math.exp(b) for b in best],
             "mm": [row["mm"] for row in rows],
             "deg": [row["deg"] for row in rows],
         }
@@ -116,11 +116,11 @@ class MotionPrediction:
             Panel(
                 title=title, x_label="trials", y_label=label,
                 series=tuple(self._curve(records, method, unit) for method in methods),
-                level=("true theta in the cell", truth) if unit == "mm" else None,
+                level=("true parameters in the cell", truth) if unit == "mm" else None,
             )
             for title, label, unit in (
                 ("test pushes: place", "error of the end [mm]", "mm"),
-                ("training pushes", "rms residual [sigma]", "sigmas"),
+                ("training pushes", "rms residual [sigma]", "sigma"),
             )
         )  # fmt: skip
         pushes = Panel(
@@ -132,7 +132,8 @@ class MotionPrediction:
             setting=(
                 f"{len(records)} hidden worlds (MuJoCo) with an eraser of {1e3 * ERASER.size[0]:.0f} x"
                 f" {1e3 * ERASER.size[1]:.0f} mm, mass 0.1 to 0.9 kg, support friction {FRICTIONS[0]:g} to"
-                f" {FRICTIONS[1]:g}, hand friction 0.15 to 0.4, scatter of friction 2 %, noise 0.3 mm and 3 mrad."
+                f" {FRICTIONS[1]:g}, hand friction 0.15 to 0.4, friction scatter between pushes 2 %, noise 0.3 mm"
+                " and 3 mrad."
                 f" {self.pushes} random pushes each at {SPEEDS[0]:g} to {SPEEDS[1]:g} m/s, {self.training} for"
                 f" training, {self.testing} for testing. Unknown: mass, support friction, hand friction."
             ),
@@ -152,13 +153,13 @@ class MotionPrediction:
                 found = [r["methods"][method] for r in records]
                 rows.append((method, count, *mean_and_deviation([f["mm"][count - 1] for f in found]),
                              *mean_and_deviation([f["deg"][count - 1] for f in found]),
-                             *mean_and_deviation([f["sigmas"][count - 1] for f in found])))  # fmt: skip
-        for name, key in (("nominal theta", "nominal_theta"), ("true theta in the cell", "true_theta")):
+                             *mean_and_deviation([f["sigma"][count - 1] for f in found])))  # fmt: skip
+        for name, key in (("nominal parameters", "nominal_theta"), ("true parameters in the cell", "true_theta")):
             rows.append((name, None, *mean_and_deviation([r[key]["mm"] for r in records]),
                          *mean_and_deviation([r[key]["deg"] for r in records]), None, None))  # fmt: skip
         return Table(
             name="budget", title=f"{self.testing} test pushes, by trials (mean and deviation over worlds)",
-            columns=("method", "trials", "mm", "+- mm", "deg", "+- deg", "training sigma", "+- sigma"),
+            columns=("method", "trials", "mm", "+- mm", "deg", "+- deg", "training [sigma]", "+- [sigma]"),
             rows=tuple(rows),
         )  # fmt: skip
 

@@ -132,8 +132,8 @@ class NextPush:
         return Result(
             setting=(
                 f"{len(records)} hidden worlds (MuJoCo) with an eraser, as in motion_prediction; the mass is known."
-                f" Each push is chosen among {self.candidates} random ones, the same for both; theta is fitted by"
-                " least squares from its nominal value after every push, and"
+                f" Each push is chosen among {self.candidates} random ones, the same for both; the parameters are"
+                " fitted by least squares from their nominal values after every push, and"
                 f" {self.testing} other pushes are predicted."
             ),
             tables=(
@@ -147,7 +147,8 @@ class NextPush:
             panels=tuple(
                 Panel(title=title, x_label="pushes", y_label=kinds[kind],
                       series=tuple(series_of(name, counts, [r[name][kind] for r in records]) for name in CHOOSERS))
-                for kind, title in (("support_friction", "theta"), ("hand_friction", "theta"), ("mm", "test pushes"))
+                for kind, title in (("support_friction", "parameters"), ("hand_friction", "parameters"),
+                                    ("mm", "test pushes"))
             ),
         )  # fmt: skip
 

@@ -38,7 +38,7 @@ OBLIQUE: Final = math.radians(30.0)
 """Of the way to the goal against the normal of the long face, to each side."""
 NEAR: Final = 0.01  # m: a success
 GRAVITY: Final = 9.81
-NOMINAL, TRUTH = "nominal theta", "true theta in the cell"
+NOMINAL, TRUTH = "nominal parameters", "true parameters in the cell"
 COMPARED: Final = (GREEDY, RANDOM)
 
 

@@ -180,11 +180,11 @@ class PushSpeeds:
         return Result(
             setting=(
                 f"{len(records)} hidden bottles (MuJoCo, standing, pushed at half their height): mass 0.1 to 0.9 kg,"
-                f" support friction {FRICTIONS[0]:g} to {FRICTIONS[1]:g}, scatter of friction 2 %. Start at -0.5 m,"
-                " goal at 0.5 m; the table ends at 0.6 m, and Baxter reaches it from 0.109 m on. The model learns"
-                f" from slow pushes ({SLOW[0]:g} to {SLOW[1]:g} m/s, within the Motoman's reach, nobody resets the"
-                f" bottle) with {self.budget} trials, and {self.polish_budget} more of least squares where it says"
-                " polished; then one fast push is made. PoWER and its peer learn by fast pushes alone"
+                f" support friction {FRICTIONS[0]:g} to {FRICTIONS[1]:g}, friction scatter between pushes 2 %."
+                " Start at -0.5 m, goal at 0.5 m; the table ends at 0.6 m, and Baxter reaches it from 0.109 m on. The"
+                f" model learns from slow pushes ({SLOW[0]:g} to {SLOW[1]:g} m/s, within the Motoman's reach, nobody"
+                f" resets the bottle) with {self.budget} trials, and {self.polish_budget} more of least squares where"
+                " it says polished; then one fast push is made. PoWER and its peer learn by fast pushes alone"
                 f" ({self.rollouts} an update, reward exp(-2 distance), a fall counts as {LOST:g} m). Fast pushes are"
                 f" read off a spline through {_SPEED_KNOTS * len(_FACTOR_KNOTS)} simulated ones of each bottle, by"
                 f" speed and friction factor; its worst error in {2 * len(records)} checks is {worst:.1f} mm."

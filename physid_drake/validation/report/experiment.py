@@ -46,7 +46,7 @@ def result_markdown(result: Result, name: str, command: str) -> str:
         lines += ["", f"**{table.title}**", "", _markdown_row(table.columns),
                   _markdown_row(["---"] * len(table.columns))]  # fmt: skip
         lines += [_markdown_row([_text(v) for v in row]) for row in table.rows]
-    lines += ["", *[f"Left out: {reason}" for reason in result.skipped]] if result.skipped else []
+    lines += ["", *[f"Skipped: {reason}" for reason in result.skipped]] if result.skipped else []
     return "\n".join(lines) + "\n"
 
 

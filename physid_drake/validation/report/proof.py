@@ -15,12 +15,14 @@ from physid_drake.validation.scoring.figures import Figures, decimals, held_out_
 from physid_drake.validation.scoring.score import HeldOut, Outcome, number
 
 FORMAT = "physid-proof/1"
-MAIN = ("", "figure", "95 % interval", "asked for")
-POWER = ("size [sigma]", "found", "95 % interval", "named rightly", "95 % interval")
-HELD_OUT = ("median of worlds with", "worlds", "mm before", "after", "at best", "deg before", "after", "at best",
-            "sigmas before", "after", "at best")  # fmt: skip
+MAIN = ("", "result", "95 % interval", "target")
+POWER = ("size [sigma]", "found", "95 % interval", "named correctly", "95 % interval")
+HELD_OUT = ("median of worlds with", "worlds", "baseline mm", "diagnosed mm", "true mm", "baseline deg",
+            "diagnosed deg", "true deg", "baseline sigma", "diagnosed sigma", "true sigma")  # fmt: skip
 AT_BEST = (
-    "At best: what the true world leaves, with all its physics but not the friction of the push that is left out."
+    "Baseline: identified without effects. Diagnosed: with the effects found. True: the true model with all its"
+    " physics, but without the friction of the held-out push. Sigma: in units of tracker noise (one standard"
+    " deviation)."
 )
 
 
@@ -161,20 +163,20 @@ def proof_markdown(proof: Proof) -> str:
         _markdown(MAIN, table(figures)),
         "## Power against the size of the effect",
         _markdown(POWER, power_table(figures)),
-        "## Pushes predicted while left out (root mean square)",
+        "## Prediction error of held-out pushes (root mean square)",
         _markdown(HELD_OUT, held_out_table(figures)),
         AT_BEST,
         "## Stated probabilities",
         _markdown(
-            ("stated", "mean", "came true"),
+            ("stated", "mean", "correct"),
             [
                 (f"{b.low:g} to {b.high:g}", decimals(b.stated), f"{b.right.count} of {b.right.of}")
                 for b in figures.reliability
             ],
         ),
-        f"## Answers that are not right ({len(proof.faults)})",
+        f"## Wrong answers ({len(proof.faults)})",
         _markdown(
-            ("world", "what", "truth", "sigma", "said"),
+            ("world", "error", "truth", "size [sigma]", "diagnosis"),
             [(o.id, o.fault or "", truth_of(o), f"{o.size:.1f}", said_of(o)) for o in proof.faults],
         ),
     ]
@@ -185,7 +187,7 @@ def _hidden(proof: Proof) -> list[str]:
     """What hid the truth from the diagnoses; nothing of a proof that does not say so."""
     worlds = sum(proof.hidden_by.values())
     parts = [f"{what}, {count} of {worlds}" for what, count in proof.hidden_by.items()]
-    return [f"What hid the truth from the diagnoses: {'; '.join(parts)}."] if parts else []
+    return [f"The truth was hidden from the diagnoses by: {'; '.join(parts)}."] if parts else []
 
 
 def _worlds(proof: Proof) -> str:
@@ -193,7 +195,7 @@ def _worlds(proof: Proof) -> str:
     some = f" of {proof.sealed} that were sealed" if len(proof.outcomes) < proof.sealed else ""
     return (
         f"{len(proof.outcomes)} worlds{some}: {kinds['none']} without an effect, {kinds['effect']} with one of the"
-        f" catalogue, {kinds['pair']} with two, {kinds['other']} with one that is in no catalogue"
+        f" catalogue, {kinds['pair']} with two, {kinds['other']} with one that is not in the catalogue"
     )
 
 

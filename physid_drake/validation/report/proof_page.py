@@ -27,9 +27,11 @@ def proof_page(proof: Proof) -> str:
     """
     with drawn():
         pictures = {
-            "confusion": _picture(confusion_picture(proof.figures), "what was said of what"),
+            "confusion": _picture(confusion_picture(proof.figures), "diagnosis against truth"),
             "power": _picture(power_picture(proof.figures), "power against the size of the effect"),
-            "calibration": _picture(calibration_picture(proof.figures), "stated probabilities and what came true"),
+            "calibration": _picture(
+                calibration_picture(proof.figures), "stated probabilities against the share that is correct"
+            ),
         }
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True, lstrip_blocks=True)
     return environment.from_string(_PAGE).render(_content(proof, pictures)) + "\n"
@@ -95,32 +97,33 @@ _PAGE = """<!DOCTYPE html>
 {% endfor %}
 </table></div>
 {% endmacro %}
-<h1>What the diagnosis finds on worlds that it has not seen</h1>
+<h1>Diagnosis of worlds that it has not seen</h1>
 <p>{{ proof.outcomes | length }} worlds
 {{ "of " ~ proof.sealed ~ " that were sealed, " if (proof.outcomes | length) < proof.sealed }}of another simulator:
 {{ worlds.none }} without an effect, {{ worlds.effect }}
-with one of the catalogue, {{ worlds.pair }} with two, {{ worlds.other }} with one that is in no catalogue. Truth and
-recordings were made and sealed first; the diagnosis was given the recordings alone.</p>
+with one of the catalogue, {{ worlds.pair }} with two, {{ worlds.other }} with one that is not in the catalogue.
+Truth and recordings were made and sealed first; the diagnosis was given the recordings only.</p>
 <p class="note">Seed {{ proof.seed }}. Seal, written down before the diagnosis: <code>sha256 {{ proof.seal }}</code>.
 {% for name, version in proof.versions.items() %}{{ name }} {{ version }}{{ ". " if loop.last else ", " }}{% endfor %}
 A diagnosis took {{ seconds }} on this machine.</p>
 {{ rows(main) }}
-<p class="note">A world without a diagnosis counts as nothing found; where there is no effect, as a false alarm.</p>
-<h2>What was said of what</h2>
+<p class="note">Sigma: in units of tracker noise (one standard deviation); the size of an effect is the motion that it
+causes. A world without a diagnosis counts as nothing found; without an effect, as a false alarm.</p>
+<h2>Diagnosis against truth</h2>
 {{ pictures.confusion }}
-<p class="note">Worlds with one effect or none. Framed: the right answer. Colour: share of the row.</p>
+<p class="note">Worlds with one effect or none. Framed: the correct answer. Colour: share of the row.</p>
 <h2>Power against the size of the effect</h2>
 {{ pictures.power }}
 {{ rows(power) }}
 <h2>Stated probabilities</h2>
 {{ pictures.calibration }}
-<p class="note">Each dot: the names that were given with such a probability, how many, and a 95 % interval.
+<p class="note">Each dot: the names stated with such a probability, their number, and a 95 % interval.
 Brier score {{ brier }}.</p>
-<h2>Pushes predicted while left out</h2>
+<h2>Prediction of held-out pushes</h2>
 {{ rows(held_out) }}
 <p class="note">Root mean square. {{ at_best }}</p>
-<h2>Every answer that is not right ({{ faults | length }})</h2>
-<div class="wide"><table><tr><th>world</th><th>what</th><th>truth</th><th>sigma</th><th>said</th></tr>
+<h2>Wrong answers ({{ faults | length }})</h2>
+<div class="wide"><table><tr><th>world</th><th>error</th><th>truth</th><th>size [sigma]</th><th>diagnosis</th></tr>
 {% for f in faults %}
 <tr><td>{% if f.page %}<a href="{{ f.page }}">{{ f.id }}</a>{% else %}{{ f.id }}{% endif %}</td><td>{{ f.fault }}</td>
 <td>{{ f.truth }}</td><td>{{ f.size }}</td><td>{{ f.said }}</td></tr>

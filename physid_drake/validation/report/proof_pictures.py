@@ -36,7 +36,7 @@ def confusion_picture(figures: Figures) -> Figure:
         axes.text(j, i, str(counts[i, j]), ha="center", va="center", color="white" if share > 0.6 else INK)
     axes.set_xticks(range(len(columns)), [_spoken(c) for c in columns], rotation=60, ha="right")
     axes.set_yticks(range(len(rows)), [f"{_spoken(r)} ({n})" for r, n in zip(rows, totals[:, 0], strict=True)])
-    axes.set_xlabel("said first")
+    axes.set_xlabel("first name of the diagnosis")
     axes.set_ylabel("truth (worlds)")
     for k, name in enumerate(rows):
         axes.add_patch(_frame(columns.index(RIGHT.get(name, name)), k))
@@ -63,9 +63,9 @@ def power_picture(figures: Figures) -> Figure:
     axes = figure.add_subplot()
     bins = figures.power
     _bars(axes, [p.found for p in bins], -0.2, FOUND, "found")
-    _bars(axes, [p.right for p in bins], 0.2, NAMED, "named rightly, or in a class of two")
+    _bars(axes, [p.right for p in bins], 0.2, NAMED, "named correctly, alone or in a class of two")
     axes.set_xticks(range(len(bins)), [f"{size_words(p.low, p.high)}\n({p.found.of})" for p in bins])
-    axes.set_xlabel("motion that the effect makes, in standard deviations of the tracker (worlds)")
+    axes.set_xlabel("motion that the effect causes [sigma] (number of worlds)")
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(0.0, 1.17), ncols=2)
     return figure
 
@@ -105,8 +105,8 @@ def calibration_picture(figures: Figures) -> Figure:
     )
     for x, y, share in zip(stated, right, shares, strict=True):
         axes.annotate(f"{share.of}", (x, y), xytext=(4, -9), textcoords="offset points", color=MUTED)
-    axes.set_xlabel("probability that was stated [%]")
-    axes.set_ylabel("names that were right [%]")
+    axes.set_xlabel("stated probability [%]")
+    axes.set_ylabel("correct names [%]")
     axes.set_xlim(-2.0, 104.0)
     axes.set_ylim(-2.0, 104.0)
     axes.grid()

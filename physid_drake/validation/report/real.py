@@ -16,9 +16,9 @@ from physid_drake.validation.scoring.figures import decimals
 from physid_drake.validation.scoring.real_score import NEAR, Pressure, RealOutcome
 
 FORMAT = "physid-proof-real/1"
-COLUMNS = ("case", "pushes", "chi2 plain", "after", "verdict", "names", "held out mm", "deg", "N", "fresh mm", "deg",
-           "ellipsoid mm", "deg", "4th order mm", "deg", "weight near the points",
-           "mean arm of the weight mm")  # fmt: skip
+COLUMNS = ("case", "pushes", "chi2 baseline", "chi2 diagnosed", "verdict", "names", "held-out mm", "held-out deg",
+           "held-out N", "unseen mm", "unseen deg", "ellipsoid mm", "ellipsoid deg", "4th order mm", "4th order deg",
+           "weight near the points", "mean arm of the weight mm")  # fmt: skip
 _LEG, _CORNER = 150.0, 50.0  # mm
 
 
@@ -51,13 +51,14 @@ def _change(values: Sequence[float]) -> str:
 
 
 NOTES = (
-    "Held out: pushes of the diagnosis, each predicted while left out of the fit, baseline model to model with"
-    " what was found. Fresh: end points of pushes that the diagnosis did not get."
+    "Held-out: each diagnosed push, predicted by a model that was fitted to the others; baseline model to model with"
+    " the effects found. Unseen: end points of pushes that the diagnosis did not get."
     " Ellipsoid, 4th order: the publishers' models"
     f" on the diagnosed pushes. Weight near the points: share of the pressure found within {1e3 * NEAR:g} mm of the"
-    " points that the object stood on. Mean arm of the weight about the centre of mass: what friction feels of it."
-    " All errors are root mean squares. chi2: over noise, which is taken to be as loud as what the baseline model"
-    " leaves (only the cube's recording shows its own), so that 1 or less does not mean that nothing is missing."
+    " points that the object stood on. Mean arm of the weight about the centre of mass: it sets the friction torque."
+    " All errors are root mean squares. chi2: reduced chi-square, with a noise as large as the errors of the baseline"
+    " model (only the cube's recording shows its own noise), so that 1 or less does not mean that no physics is"
+    " missing."
 )
 
 

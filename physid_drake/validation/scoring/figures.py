@@ -233,23 +233,28 @@ def table(figures: Figures) -> list[tuple[str, str, str, str]]:
     """Rows for people: what, the figure with its counts, its 95 % interval, what was asked for."""
     error, ratio = figures.parameter_error, figures.held_out_ratio
     return [
-        _row("no effect: called a mismatch", figures.false_alarms, "at most 1 %"),
-        ("  left-out pushes of the others: error over the true world's, median", _times(ratio["none"]), "", ""),
+        _row("no effect: false alarms", figures.false_alarms, "at most 1 %"),
+        ("  otherwise: held-out error over that of the true model, median", _times(ratio["none"]), "", ""),
         *_naming_rows(f"effect of {CLEAR:g} sigma or more", figures.clear, ("95 %", "90 %")),
-        ("  error of its amplitudes, median", _percent(error), "", "10 %"),
-        ("  error of its amplitudes, 90th percentile", _percent(error, tail=True), "", ""),
-        ("  left-out pushes of those named: error over the true world's, median", _times(ratio["effect"]), "", "1.2"),
+        ("  amplitude error, median", _percent(error), "", "10 %"),
+        ("  amplitude error, 90th percentile", _percent(error, tail=True), "", ""),
+        (
+            "  if named correctly: held-out error over that of the true model, median",
+            _times(ratio["effect"]),
+            "",
+            "1.2",
+        ),
         *_naming_rows(f"effect below {CLEAR:g} sigma", figures.faint, ("", "")),
-        _row("amplitudes, of pairs, too: 90 % intervals that hold the truth", figures.coverage, "85 to 95 %"),
-        _row("  of their places, angles, speeds and the like", figures.others_coverage, "85 to 95 %"),
+        _row("amplitudes (pairs included): coverage of the 90 % intervals", figures.coverage, "85 to 95 %"),
+        _row("  coverage for places, angles, speeds and the like", figures.others_coverage, "85 to 95 %"),
         ("error of friction and mass, median", _percent(figures.theta_error), "", ""),
         ("  90th percentile", _percent(figures.theta_error, tail=True), "", ""),
-        _row("  90 % intervals that hold the truth", figures.theta_coverage, "85 to 95 %"),
+        _row("  coverage of the 90 % intervals", figures.theta_coverage, "85 to 95 %"),
         _row("not in the catalogue: unexplained", figures.abstained, "90 %"),
-        _row("  a wrong name", figures.others_named, "at most 3 %"),
+        _row("  wrong name", figures.others_named, "at most 3 %"),
         _row("two effects: both named", figures.pairs["both"], "70 %"),
         _row("  one named", figures.pairs["one"], ""),
-        _row("  a wrong name", figures.pairs["wrong"], ""),
+        _row("  wrong name", figures.pairs["wrong"], ""),
         ("Brier score of the stated probabilities", decimals(figures.brier), "", ""),
         _row("no diagnosis", figures.failed, ""),
     ]
@@ -260,11 +265,11 @@ def _naming_rows(what: str, naming: Naming, asked: tuple[str, str]) -> list[tupl
     sizes = f"{size.median:g} (90 %: {size.p90:g})" if size.count else "-"
     return [
         _row(f"{what}: found", naming.found, asked[0]),
-        _row("  named rightly, or in a class of two", naming.right, asked[1]),
-        _row("  the first name is right", naming.first, ""),
-        _row("  the truth is in the class", naming.in_class, ""),
-        ("  names in such a class, median", sizes, "", ""),
-        _row("  a wrong name", naming.wrong, ""),
+        _row("  named correctly, alone or in a class of two", naming.right, asked[1]),
+        _row("  first name correct", naming.first, ""),
+        _row("  true effect in the class", naming.in_class, ""),
+        ("  class size, median", sizes, "", ""),
+        _row("  wrong name", naming.wrong, ""),
     ]
 
 
@@ -277,7 +282,7 @@ def power_table(figures: Figures) -> list[tuple[str, ...]]:
 
 def held_out_table(figures: Figures) -> list[tuple[str, ...]]:
     """Rows for people: worlds, how many, mm before, after and at best, degrees likewise, sigmas likewise."""
-    words = {"none": "no effect", "effect": "one effect, clear and named rightly", "other": NOT_CATALOGUED,
+    words = {"none": "no effect", "effect": "one clear effect, named correctly", "other": NOT_CATALOGUED,
              "pair": "two effects"}  # fmt: skip
     return [
         (words[kind], str(e.worlds), *(decimals(1e3 * v) for v in e.position),
