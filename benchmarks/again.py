@@ -32,7 +32,7 @@ class Stages:
         self.rollouts, self.seconds = Counter(), Counter()
         self._stage, self._since = "ready", time.perf_counter()
 
-    def tick(self, stage, done, total):
+    def progress(self, stage, done, total):
         """As diagnoses tell how far they are."""
         now = time.perf_counter()
         self.seconds[self._stage] += now - self._since
@@ -41,9 +41,9 @@ class Stages:
     def counting(self, run):
         """``RolloutPool.run`` that counts for the stage under way."""
 
-        def counted(pool, tasks, tick=None):
+        def counted(pool, tasks, progress=None):
             before = len(pool.kept)
-            made = run(pool, tasks, tick)
+            made = run(pool, tasks, progress)
             self.rollouts[self._stage] += len(pool.kept) - before
             return made
 
@@ -77,10 +77,10 @@ def diagnosed(folder, jobs, effects):
     stages, run = Stages(), RolloutPool.run
     RolloutPool.run = stages.counting(run)
     try:
-        diagnosis, _ = diagnose(case, effects=effects, tick=stages.tick)
+        diagnosis, _ = diagnose(case, effects=effects, progress=stages.progress)
     finally:
         RolloutPool.run = run
-    stages.tick("done", 0, 0)
+    stages.progress("done", 0, 0)
     motion = sum(problem.end - problem.begin for problem in case.problems)
     return json.loads(diagnosis_json(diagnosis)), len(case.problems), motion, stages
 

@@ -1,7 +1,7 @@
 """Whether intervals hold what they say: calibration.py [--worlds N] [--effects NAME ...] [--seed S] [--out FILE].
 
 Simulation-based calibration (S. Talts et al., arXiv 1804.06788, 2018) on worlds of the twin: theta, an effect and
-each push's own unknowns are drawn, the pushes of a shipped recording are made with them and with noise as the
+each push's nuisance parameters are drawn, the pushes of a shipped recording are made with them and with noise as the
 objective has it, and the hypothesis with that effect is fitted as a diagnosis fits it. If intervals are right, the
 rank of the truth in what the fit believes is uniform. For every effect and coordinate: in how many worlds the 90 %
 interval holds the truth, the same of those in which the effect was confirmed, and the p-value of a uniform rank
@@ -22,7 +22,7 @@ from scipy import stats
 from physid_drake.diagnose.hypotheses import with_one_more
 from physid_drake.diagnose.proposals import with_part
 from physid_drake.effects import applicable
-from physid_drake.identify.baseline import baseline, fitter_of, plain, with_tolerances
+from physid_drake.identify.baseline import baseline, baseline_hypothesis, fitter_of, with_tolerances
 from physid_drake.identify.estimates import t_factor
 from physid_drake.inference.fit import Fitter
 from physid_drake.inference.predictions import Predictor
@@ -104,7 +104,7 @@ def world(case, kind, rng):
 
 def drawn(case, kind, rng):
     """A hypothesis with the effect at all of its coordinates, and its truth z."""
-    base = plain(case)
+    base = baseline_hypothesis(case)
     family = kind.families(case.around)[rng.integers(len(kind.families(case.around)))]
     chart, point = kind.chart(case.around), np.array(family.point)
     size = np.exp(rng.uniform(*np.log(SIZES)))

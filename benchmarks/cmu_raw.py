@@ -114,8 +114,8 @@ def radius_of_points(name):
 
 def radius_if_even():
     """Mean distance of the triangle's points from its centre of mass [m]."""
-    ticks = (np.arange(600) + 0.5) / 600 * LEG
-    x, y = np.meshgrid(ticks, ticks)
+    time_steps = (np.arange(600) + 0.5) / 600 * LEG
+    x, y = np.meshgrid(time_steps, time_steps)
     inside = x + y < LEG
     return float(np.hypot(x - CORNER, y - CORNER)[inside].mean())
 

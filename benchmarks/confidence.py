@@ -2,7 +2,7 @@
 
     python benchmarks/confidence.py [--worlds N] [--seed S] [--state FILE] [--without PART ...]
 
-Every world of the planar integrator draws an object, both frictions, friction's scatter from push to push, and a
+Every world of the planar integrator draws an object, both frictions, friction scatter between pushes, and a
 goal. Three to five pushes with the tracker's noise are identified and a push is planned. The world makes it several
 times: each time friction is drawn anew, and the object stands where the tracker sees it but for the tracker's error.
 What the plan states is drawn last; ``--without`` leaves a part of the belief out of it. With ``--state`` worlds are
@@ -38,7 +38,7 @@ from physid_drake.model import Model
 from physid_drake.model_reading import load_model
 from physid_drake.plan import DistanceToGoal, Situation, plan
 from physid_drake.plan.draws import draws_of, scatter_freedom
-from physid_drake.plan.story import Spread, spread_of
+from physid_drake.plan.pipeline import Spread, spread_of
 from physid_drake.plan.system import identified_model
 from physid_drake.plan.task import policy_for
 from physid_drake.pushes.config import ThetaConfig
@@ -46,7 +46,7 @@ from physid_drake.pushes.config import ThetaConfig
 NAMES = ("eraser", "box", "book")
 RADIUS, AFTER = 0.010, 2.0  # m; s
 TRIALS, DRAWS, MADE = 24, 32, 20
-# Twice the usual ticks; fewer points under the object would turn slow pushes by 20 mrad and bias the frictions.
+# Twice the usual time steps; fewer points under the object would turn slow pushes by 20 mrad and bias the frictions.
 CELL = config_of("point", time_step_s=2e-3, slide_time_step_s=4e-3)
 PARTS = ("correlation", "freedom", "start")
 SEEN = 20  # samples of the object at rest, over which its start is averaged

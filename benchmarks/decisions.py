@@ -1,11 +1,11 @@
 """What is decided of opened worlds, and what each constant is worth: decisions.py PROOF [...] [--worlds ID ...].
 
 PROOF is a folder of ``python -m physid_drake.validation.worlds.make`` whose truth lies open. For each world: the
-p-value, what is said and whether that is right, the best hypotheses with their gain on held-out pushes in nats, their
-best push's part of it and their loudness (1 where noise explains what is left), and CPU seconds. At the end how many
-answers are not right, by kind of world, as it is and with one constant of ``diagnose/decide.py`` left out.
-``--chance`` takes only worlds without an effect, fits no effect, and says how often p is below some values: as often
-as they say, at best.
+p-value, what is said and whether that is right, the best hypotheses with their gain on held-out pushes in log
+likelihood, their best push's part of it and their noise scale (1 where noise explains what is left), and CPU seconds.
+At the end how many answers are not right, by kind of world, as it is and with one constant of ``diagnose/decide.py``
+left out. ``--chance`` takes only worlds without an effect, fits no effect, and says how often p is below some values:
+as often as they say, at best.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 from physid_drake.diagnose import decide
-from physid_drake.diagnose.decide import decided, loudest
+from physid_drake.diagnose.decide import decided, most_noise_scale
 from physid_drake.diagnose.search import searched
 from physid_drake.effects import applicable
 from physid_drake.identify.baseline import baseline, fitter_of, with_tolerances
@@ -37,7 +37,7 @@ SHOWN = 3
 LEVELS = (0.001, 0.01, 0.05, 0.1, 0.5)
 WITHOUT = {
     "": {}, "CONFIRMED": {"CONFIRMED": 1.0}, "MARGIN": {"MARGIN": 0.0}, "ADEQUATE": {"ADEQUATE": 0.0},
-    "LITTLE": {"LITTLE": 0.0}, "LOUD": {"LOUD": math.inf}, "DOUBTS": {"DOUBTS": 0.0},
+    "LITTLE": {"LITTLE": 0.0}, "MOST_NOISE_SCALE": {"MOST_NOISE_SCALE": math.inf}, "DOUBTS": {"DOUBTS": 0.0},
 }  # fmt: skip
 
 
@@ -85,11 +85,11 @@ def answered(folder, truth):
     begin = time.process_time()
     finder, plain = identified_in(folder)
     case = finder.case
-    found = searched(finder, plain, applicable(case.around), seed=0, alpha=0.01, tick=lambda *_: None)
+    found = searched(finder, plain, applicable(case.around), seed=0, alpha=0.01, progress=lambda *_: None)
     faults = {}
     for name, changes in WITHOUT.items():
         with patch.multiple(decide, **changes) if changes else nullcontext():
-            said = decided(found, most=loudest(case.noise))
+            said = decided(found, most=most_noise_scale(case.noise))
         faults[name] = outcome_of(truth, said).fault
         if not name:
             first = said
@@ -118,7 +118,7 @@ def outcome_of(truth, said):
 
 
 def one_line(one):
-    return f"{one.name} {one.gain:.1f}, {one.gains.max():.1f} of it ({one.fit.loudness:.2f})"
+    return f"{one.name} {one.gain:.1f}, {one.gains.max():.1f} of it ({one.fit.noise_scale:.2f})"
 
 
 def table(faults):

@@ -59,13 +59,13 @@ def timed(recording, jobs, effects):
     case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=jobs, most=len(recording.pushes))
     spent, now = defaultdict(lambda: np.zeros(2)), ["", time.process_time(), time.perf_counter()]
 
-    def tick(stage, done, total):
+    def progress(stage, done, total):
         cpu, wall = time.process_time(), time.perf_counter()
         spent[now[0]] += (cpu - now[1], wall - now[2])
         now[:] = stage, cpu, wall
 
-    diagnose(case, effects=effects, tick=tick)
-    tick("", 0, 0)
+    diagnose(case, effects=effects, progress=progress)
+    progress("", 0, 0)
     spent.pop("", None)
     return spent
 

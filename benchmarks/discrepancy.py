@@ -2,10 +2,11 @@
 
 Each PROOF is a folder of ``python -m physid_drake.validation.worlds.make`` whose truth lies open; of its worlds those
 without an effect are taken. The baseline is fitted to each, and the numbers of the discrepancy's covariance are those
-under which what it leaves of all pushes is likeliest, each push's own unknowns and theta refitted: an error of the
-pose that wanders along the object's way (standard deviations of place and yaw, the way over which it is the same), a
-white one, and frictions with table and tip that wander along the way. Prints them, the log likelihood without and
-with each kind, and quantiles over pushes of what is left, in squared deviations per number. Ten CPU seconds a world.
+under which what it leaves of all pushes is likeliest, each push's nuisance parameters and theta refitted: an error of
+the pose that wanders along the object's way (standard deviations of place and yaw, the way over which it is the
+same), a white one, and frictions with table and tip that wander along the way. Prints them, the log likelihood
+without and with each kind, and quantiles over pushes of what is left, in squared deviations per number. Ten CPU
+seconds a world.
 """
 
 import argparse
@@ -70,14 +71,14 @@ def left_of(folder):
     fitter = Fitter(case, predictor)
     fit = baseline(fitter, Hypothesis(space=case.thetas.space, around=case.around), np.random.default_rng(0))
     physics = Physics(fit.hypothesis.theta(fit.point.z))
-    of_path = predictor.path_errors(fit.point.own, physics)
+    of_path = predictor.path_errors(fit.point.nuisance, physics)
     fit, _ = with_tolerances(fitter, fit)
-    wanders = predictor.wanders(fit.point.own, physics)
+    wanders = predictor.wanders(fit.point.nuisance, physics)
     pushes = []
     for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(fit.scatter), strict=True)):
         features, problem = case.features[i], case.problems[i]
         back = np.linalg.inv(predictor.whitening[i])
-        own, table, tip = (back @ columns for columns in (push.own * prior, *wanders[i]))
+        own, table, tip = (back @ columns for columns in (push.nuisance * prior, *wanders[i]))
         pushes.append({
             "residual": back @ push.residual, "shared": back @ push.shared,
             "table": table @ table.T, "tip": tip @ tip.T,

@@ -1,4 +1,4 @@
-"""How well left-out pushes can be predicted at best, and who could: floor.py PROOF_FOLDER [--worlds 20].
+"""How well held-out pushes can be predicted at best, and who could: floor.py PROOF_FOLDER [--worlds 20].
 
 The proof's floor is what the true world leaves of pushes whose own friction it is not told. It is told the start of
 the object exactly, which nobody is: a push may move its end by thirty times a difference of its start. Here the true

@@ -30,7 +30,7 @@ def main() -> int:
     arguments = parser.parse_args()
     indices = arguments.only or range(arguments.first, arguments.first + arguments.inputs)
     scratch = Path(tempfile.mkdtemp(prefix="fuzz_")) if arguments.keep else None
-    tally = run(indices, seed=arguments.seed, keep=arguments.keep, scratch=scratch, tick=_tell)
+    tally = run(indices, seed=arguments.seed, keep=arguments.keep, scratch=scratch, progress=_tell)
     console = Console(width=110)
     console.print(table_of(tally))
     for line in tally.lines():

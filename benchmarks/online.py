@@ -46,7 +46,9 @@ def main() -> None:
     console.print(table)
     if result.cells is not None:
         told = [f"{c.left:.3f}" for c in result.cells.combinations]
-        console.print(f"{result.cells.told} combinations told; share of the prior's spread left: {', '.join(told)}")
+        console.print(
+            f"{result.cells.identifiable} combinations told; share of the prior's spread left: {', '.join(told)}"
+        )
 
 
 if __name__ == "__main__":

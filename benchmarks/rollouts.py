@@ -73,7 +73,7 @@ def truth_of_pushes() -> Truth:
 
 
 def drake_rows() -> list[Row]:
-    """The Cell: two contact models, three choices of ticks, and rebuilt for every push."""
+    """The Cell: two contact models, three choices of time steps, and rebuilt for every push."""
     rows = []
     for model in ("hydroelastic", "point"):
         for label, near, slide, rebuilt in (

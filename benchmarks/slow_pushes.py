@@ -1,4 +1,4 @@
-"""What longer ticks do to slow pushes: python benchmarks/slow_pushes.py [--pushes 8] [--speed 0.002]."""
+"""What longer time steps do to slow pushes: python benchmarks/slow_pushes.py [--pushes 8] [--speed 0.002]."""
 
 import argparse
 import sys
@@ -22,13 +22,13 @@ def main() -> None:
     parser.add_argument("--pushes", type=int, default=8)
     parser.add_argument("--speed", type=float, default=0.002, help="of the hand [m/s]")
     arguments = parser.parse_args()
-    found = {tick: [] for tick in TICKS}
+    found = {time_step: [] for time_step in TICKS}
     for k in track(range(arguments.pushes), console=Console(stderr=True)):
         body, theta, push = drawn(k, arguments.speed)
         want = simulate(body, theta, push)
-        for tick in TICKS:
-            motion = twin(body, theta, push, want.times[-1], "point", solver(tick))
-            found[tick].append((motion.planar_at(want.times), parting(motion, want.times, want.poses)))
+        for time_step in TICKS:
+            motion = twin(body, theta, push, want.times[-1], "point", solver(time_step))
+            found[time_step].append((motion.planar_at(want.times), parting(motion, want.times, want.poses)))
     Console(width=110).print(table(arguments, found))
 
 
@@ -41,8 +41,8 @@ def drawn(k, speed):
     return body, Theta(support_friction=0.3, hand_friction=0.4), push
 
 
-def solver(tick):
-    return (("time_step_s", tick), ("slide_time_step_s", tick))
+def solver(time_step):
+    return (("time_step_s", time_step), ("slide_time_step_s", time_step))
 
 
 def table(arguments, found):
@@ -50,11 +50,11 @@ def table(arguments, found):
     for column in ("tick [ms]", "sigma off the reference", "worst mm off 1 ms", "worst mrad off 1 ms"):
         result.add_column(column, justify="right")
     shortest = [poses for poses, _ in found[TICKS[0]]]
-    for tick, pushes in found.items():
+    for time_step, pushes in found.items():
         apart = np.concatenate([poses - short for (poses, _), short in zip(pushes, shortest, strict=True)])
         reference = rms(np.concatenate([errors for _, errors in pushes]))
         worst = 1e3 * np.abs(apart).max(axis=0)
-        result.add_row(f"{1e3 * tick:g}", f"{reference:.3f}", f"{worst[:2].max():.4f}", f"{worst[2]:.3f}")
+        result.add_row(f"{1e3 * time_step:g}", f"{reference:.3f}", f"{worst[:2].max():.4f}", f"{worst[2]:.3f}")
     return result
 
 

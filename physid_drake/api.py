@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -128,16 +129,15 @@ def diagnose(
         alpha: false-alarm rate of the detection.
         effects: names of the catalogue to look at; None for all.
         jobs: processes; 0 takes the machine's cores.
-        progress: told the stage, steps done and steps in all; None shows a bar, or lines where there is no terminal.
+        progress: called with the stage, steps done and steps in all; None shows a bar, or lines where there is no
+            terminal.
 
     Raises:
         RecordingError: if the recording cannot be compared with a simulation; one line that says why.
         ConfigError: if there is no effect of such a name.
     """
     case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=jobs)
-    if progress is not None:
-        diagnosis, evidence = diagnose_case(case, seed=seed, alpha=alpha, effects=effects, tick=progress)
-    else:
-        with progress_bar(terminal(), DIAGNOSIS_STAGES) as tick:
-            diagnosis, evidence = diagnose_case(case, seed=seed, alpha=alpha, effects=effects, tick=tick)
+    shown = progress_bar(terminal(), DIAGNOSIS_STAGES) if progress is None else nullcontext(progress)
+    with shown as called:
+        diagnosis, evidence = diagnose_case(case, seed=seed, alpha=alpha, effects=effects, progress=called)
     return Answer(diagnosis=diagnosis, evidence=evidence)

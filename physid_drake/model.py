@@ -139,12 +139,12 @@ class Model:
         """The Drake cell with theta in its Context and the effects at their seams.
 
         Args:
-            time_step: of the diagram's plant [s]; None for the cell's tick, of a millisecond as a rule. Rollouts keep
-                the cell's.
+            time_step: of the diagram's plant [s]; None for the cell's time step, of a millisecond as a rule. Rollouts
+                keep the cell's.
         """
         return ModelCell(self, time_step=time_step)
 
-    def plain(self) -> Model:
+    def baseline(self) -> Model:
         """The same without its effects: what is lost without them is what they are worth."""
         return dc.replace(self, effects=())
 

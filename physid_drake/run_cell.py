@@ -22,9 +22,9 @@ from physid_drake.plan import Hindsight, Plan, caveat_of, outcome_under
 from physid_drake.plan.system import Planner, PolicySystem, identified_model, planner_of
 from physid_drake.progress import Progress
 from physid_drake.pushes.case import UNIT_SCATTER
-from physid_drake.pushes.doubts import doubts
 from physid_drake.pushes.kept_rollouts import KeptRollouts
 from physid_drake.pushes.problem import HandUse
+from physid_drake.pushes.push_warnings import doubts
 from physid_drake.recording import Recording, digest_of, read_recording, recording_folder
 from physid_drake.report.acts import acts_of, acts_of_plan, setting_of, unit_force_of
 from physid_drake.report.cells import cells_table
@@ -266,16 +266,16 @@ class Work:
         if not self._diagnosing:
             self._say(f"identified: {', '.join(e.name for e in known.estimates if e.identifiable)}")
             return Examined(known=known)
-        diagnosis, evidence = diagnose_from(known, seed=self._scenario.seed, alpha=ALPHA, tick=bar)
+        diagnosis, evidence = diagnose_from(known, seed=self._scenario.seed, alpha=ALPHA, progress=bar)
         self._say(f"{diagnosis.verdict}: {diagnosis.sentence}")
         return Examined(known=evidence.known, diagnosis=diagnosis, evidence=evidence)
 
     def _planned(self, planner: Planner, examined: Examined, bar: Progress) -> Plan:
         """The plan with the model that leaves; what the baseline model's would have been, where that is another."""
         model, evidence, diagnosis = self.model(examined), examined.evidence, examined.diagnosis
-        fit = examined.known.fit if evidence is None else evidence.leaving
+        fit = examined.known.fit if evidence is None else evidence.corrected
         scatter, pushes = UNIT_SCATTER * fit.scatter, len(fit.pushes)
-        plan = planner.with_model(model, friction_scatter=scatter, pushes=pushes, tick=bar)
+        plan = planner.with_model(model, friction_scatter=scatter, pushes=pushes, progress=bar)
         self._say(f"planned: miss {1e3 * plan.cost:.1f} mm")
         if diagnosis is not None:
             self._hindsight = self._with_plain(planner, examined, diagnosis, model, bar)
@@ -303,7 +303,7 @@ class Work:
             return Hindsight(caveat=caveat) if caveat else None
         # Its own search and sweep are one stage of the job.
         plain = planner.run(examined.known, lambda _, done, total: bar(HINDSIGHT, done, total))
-        return Hindsight(plain=plain, outcome=outcome_under(plain, model), caveat=caveat)
+        return Hindsight(baseline=plain, outcome=outcome_under(plain, model), caveat=caveat)
 
 
 def _show(result: Identification, recording: Recording, console: Console, *, alone: bool) -> None:

@@ -97,8 +97,8 @@ def run_case(
     kept: KeptRollouts | None = None,
 ) -> tuple[Diagnosis, Evidence]:
     """Diagnose with a progress bar."""
-    with progress_bar(console, DIAGNOSIS_STAGES) as tick:
-        return diagnose(case, seed=seed, alpha=alpha, effects=effects, tick=tick, kept=kept)
+    with progress_bar(console, DIAGNOSIS_STAGES) as progress:
+        return diagnose(case, seed=seed, alpha=alpha, effects=effects, progress=progress, kept=kept)
 
 
 def show(console: Console, diagnosis: Diagnosis) -> None:

@@ -9,8 +9,8 @@ from pathlib import Path
 from physid_drake.doctor import examined
 from physid_drake.door import say_error
 from physid_drake.errors import RecordingError
-from physid_drake.pushes.doubts import doubts
-from physid_drake.pushes.refusals import refusals
+from physid_drake.pushes.push_checks import refusals
+from physid_drake.pushes.push_warnings import doubts
 from physid_drake.recording import Recording, read_recording, recording_folder
 from physid_drake.report.inspection import alike_as_one, draw_pushes, inspection_table, warnings_by_kind
 from physid_drake.report.picture import check_picture, write_picture
@@ -35,8 +35,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"drawn: {picture}")
     refused = look(recording)
     if not arguments.no_fit:
-        with progress_bar(console) as tick:
-            finding = examined(recording, tick)
+        with progress_bar(console) as progress:
+            finding = examined(recording, progress)
         for line in finding.lines():
             warnings.warn(line, UserWarning, stacklevel=1)
         console.print(f"{finding.sentence()}.")

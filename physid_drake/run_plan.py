@@ -19,8 +19,8 @@ from physid_drake.model_reading import load_model
 from physid_drake.plan import DistanceToGoal, Ending, Hindsight, Outcome, Plan, Situation, caveat_of, plan
 from physid_drake.plan.costs import Cost
 from physid_drake.plan.draws import scatter_freedom, uncertain_names
+from physid_drake.plan.pipeline import outcome_under
 from physid_drake.plan.reach import goal_within
-from physid_drake.plan.story import outcome_under
 from physid_drake.plan.task import Choices, policy_for
 from physid_drake.plan.trajectory import tip_height_of
 from physid_drake.policies import Policy, push_csv
@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     model, learnt = _read(arguments)
     full = model
     if arguments.baseline:
-        model = model.plain()
+        model = model.baseline()
     start, goal, cost = _places(arguments, model)
     choices = Choices(
         speed=arguments.speed, travel=arguments.travel,
@@ -80,13 +80,13 @@ def run(arguments: argparse.Namespace) -> int:
     out = arguments.out or Path("plans") / named_after(model.recording)
     RunFolder.check(out, COMMAND, inputs=[one for one in (arguments.run_folder,) if one is not None])
     console = terminal()
-    with progress_bar(console) as tick:
+    with progress_bar(console) as progress:
         made = plan(
             model, policy, cost, situation=Situation(start=start, order=learnt.pushes),
             rng=np.random.default_rng(_seed(arguments.seed)),
             budget=_trials(arguments, policy),
             search=arguments.search, draws=arguments.draws, risk=arguments.risk, tolerance=arguments.tolerance,
-            friction_scatter=learnt.friction_scatter, scatter_freedom=learnt.scatter_freedom, tick=tick,
+            friction_scatter=learnt.friction_scatter, scatter_freedom=learnt.scatter_freedom, progress=progress,
         )  # fmt: skip
     if not math.isfinite(made.cost):
         raise ConfigError(f"model '{model.recording}': every rollout diverged: no push was found.")
@@ -129,11 +129,11 @@ def _miss(
     nearest: tuple[float, str] = made.cost, ""
     for name in WIDER.get(arguments.policy, ()):
         policy = policy_for(name, model, situation.start, goal, dc.replace(choices, direction=None))
-        with progress_bar(console) as tick:
+        with progress_bar(console) as progress:
             other = plan(
                 model, policy, made.cost_function, situation=situation,
                 rng=np.random.default_rng(_seed(arguments.seed)), budget=_trials(arguments, policy), draws=0, sweep=0,
-                tolerance=made.tolerance, tick=tick,
+                tolerance=made.tolerance, progress=progress,
             )  # fmt: skip
         if other.predicted.ending is Ending.AT_REST and other.cost < nearest[0]:
             nearest = other.cost, name

@@ -17,7 +17,7 @@ from physid_drake.recording import Box
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """How the Cell is set: contact model, and its two ticks [s] (hand near, free slide)."""
+    """How the Cell is set: contact model, and its two time steps [s] (hand near, free slide)."""
 
     model: str
     near: float = 1e-3

@@ -23,7 +23,7 @@ class AppliedLaws:
         self._largest = Frictions(tuple(frictions)).largest
 
     def act(self, state: PlantState, time: float, span: float) -> None:
-        """Add the laws' impulses over a tick [s] to the object's velocities, and what the contact has too much."""
+        """Add the laws' impulses over a time step [s] to the object's velocities, less what the contact overdoes."""
         state.give_back_lift(span, self._largest)
         if not (self._laws or self._frictions or state.turns()):
             return
@@ -34,7 +34,7 @@ class AppliedLaws:
                 state.rock(seen.yaw, span * wrench.tip_x, span * wrench.tip_y)
 
     def are_held(self, state: PlantState, time: float, span: float) -> bool:
-        """Whether friction surely holds a resting object against the laws' forces over a tick [s]."""
+        """Whether friction surely holds a resting object against the laws' forces over a time step [s]."""
         if not self._laws:
             return True
         seen = state.object_state(time, span)

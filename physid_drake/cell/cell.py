@@ -96,8 +96,8 @@ class Cell:
             ApplySimulatorConfig(
                 SimulatorConfig(
                     integration_scheme="cenic",
-                    # A hair above the tick: rounding would else split every other tick in two. Never a part of it:
-                    # what laws give for a tick would act in its first step.
+                    # A hair above the time_step: rounding would else split every other time step in two. Never a part
+                    # of it: what laws give for a time step would act in its first step.
                     max_step_size=1.001 * max(solver.slide_time_step_s, solver.time_step_s),
                     use_error_control=False,
                 ),

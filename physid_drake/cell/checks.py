@@ -9,7 +9,7 @@ from physid_drake.wording import shown
 
 MODELS = ("hydroelastic", "point")
 SCHEMES = ("cenic", "lagged", "similar", "sap", "tamsi")
-SHORTEST_TICK, LONGEST_TICK = 1e-5, 0.05  # s
+SHORTEST_TIME_STEP, LONGEST_TIME_STEP = 1e-5, 0.05  # s
 MOST_DISSIPATION = 1e4  # s/m
 MOST_FREQUENCY = 1e6  # rad/s
 MOST_CELLS = 10  # along a side
@@ -58,14 +58,14 @@ def _contact_rules(config: CellConfig) -> list[Rule]:
 
 def _solver_rules(config: CellConfig) -> list[Rule]:
     solver = config.solver
-    tick, slide = solver.time_step_s, solver.slide_time_step_s
-    ticks = Range(least=SHORTEST_TICK, most=LONGEST_TICK)
+    step, slide = solver.time_step_s, solver.slide_time_step_s
+    steps = Range(least=SHORTEST_TIME_STEP, most=LONGEST_TIME_STEP)
     switches = {name: getattr(solver, name) for name in ("impact_law", "drift_feedforward", "trapezoid_slide")}
     return [
         ("solver.scheme", solver.scheme, solver.scheme in SCHEMES, f"one of {', '.join(SCHEMES)}"),
-        ("solver.time_step_s", tick, _in(tick, ticks), f"from {SHORTEST_TICK:g} to {LONGEST_TICK:g} s"),
-        ("solver.slide_time_step_s", slide, _in(slide, ticks) and (not _in(tick, ticks) or tick <= slide),
-         f"between time_step_s and {LONGEST_TICK:g} s"),
+        ("solver.time_step_s", step, _in(step, steps), f"from {SHORTEST_TIME_STEP:g} to {LONGEST_TIME_STEP:g} s"),
+        ("solver.slide_time_step_s", slide, _in(slide, steps) and (not _in(step, steps) or step <= slide),
+         f"between time_step_s and {LONGEST_TIME_STEP:g} s"),
         *((f"solver.{key}", value, isinstance(value, bool), "true or false") for key, value in switches.items()),
     ]  # fmt: skip
 

@@ -38,8 +38,8 @@ class SolverConfig:
     Attributes:
         scheme: ``cenic``, or a discrete contact approximation of Drake (``lagged``, ``similar``, ``sap``,
             and ``tamsi`` where Drake still has it) for comparison.
-        time_step_s: tick while the hand is near the object.
-        slide_time_step_s: tick of a free slide, cut to a multiple of ``time_step_s``, which discrete schemes use
+        time_step_s: time step while the hand is near the object.
+        slide_time_step_s: time step of a free slide, cut to a multiple of ``time_step_s``, which discrete schemes use
             throughout.
         impact_law: Routh's impact at every fast touch, instead of the solver's own.
         drift_feedforward: correct the contact for the turning of the face in a step, and for creep where it sticks.
@@ -54,7 +54,7 @@ class SolverConfig:
     trapezoid_slide: bool = True
 
     def scaled(self, factor: float) -> Self:
-        """The same with all ticks ``factor`` times as long."""
+        """The same with all time steps ``factor`` times as long."""
         return dc.replace(
             self, time_step_s=factor * self.time_step_s, slide_time_step_s=factor * self.slide_time_step_s
         )

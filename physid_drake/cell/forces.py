@@ -1,8 +1,8 @@
 """Force laws: physics beyond weight, Coulomb friction and the hand, as functions of the object's state.
 
-A law is written once. The stepper adds its impulse to the velocities at the start of a tick, which is where
+A law is written once. The stepper adds its impulse to the velocities at the start of a time step, which is where
 Drake's solver would add the force of an input port, without the solver's linearisation of that port; friction
-holds against it as against any force, since the tick's contact is solved after it.
+holds against it as against any force, since the time step's contact is solved after it.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class ForceLaw(Protocol):
     """Anything that pushes the object."""
 
     def wrench(self, state: ObjectState) -> Wrench:
-        """The mean force over the tick that begins at a state, if nothing else acts on the object."""
+        """The mean force over the time step that begins at a state, if nothing else acts on the object."""
         ...
 
 
@@ -58,12 +58,12 @@ class Braking(Protocol):
     """A law like dry friction, which holds what rests: what it does depends on what the others do."""
 
     def brake(self, state: ObjectState, others: Sequence[Wrench]) -> Wrench:
-        """The mean force over the tick that begins at a state, beside the wrenches of all other laws."""
+        """The mean force over the time step that begins at a state, beside the wrenches of all other laws."""
         ...
 
 
 def brakes(law: ForceLaw) -> TypeGuard[Braking]:
-    """Whether a law is ``Braking``; it is asked in every tick, and looking a protocol up is slow."""
+    """Whether a law is ``Braking``; it is asked in every time step, and looking a protocol up is slow."""
     return _has(type(law), Braking)
 
 

@@ -26,7 +26,7 @@ CLOSEST_ATTRACTION = 1e-6  # m
 
 
 def _mean_decay(share: float) -> float:
-    """Mean of exp(-share t) over t in 0..1: what is left, on the average of a tick, of a speed that decays so."""
+    """Mean of exp(-share t) over t in 0..1: the mean over a time step of a speed that decays from 1."""
     return -math.expm1(-share) / share if share > 0.0 else 1.0
 
 
@@ -38,7 +38,7 @@ class Tilt:
     y: float
 
     def wrench(self, state: ObjectState) -> Wrench:
-        """The mean force over a tick."""
+        """The mean force over a time step."""
         return Wrench(fx=state.weight * self.x, fy=state.weight * self.y, torque=0.0)
 
 
@@ -50,7 +50,7 @@ class Viscous:
     polar: float
 
     def wrench(self, state: ObjectState) -> Wrench:
-        """The mean over the tick of the exact decay, v exp(-c t / m): never drives backwards, however strong."""
+        """The mean over the time step of the exact decay, v exp(-c t / m): never drives backwards, however strong."""
         turning = self.coefficient * self.polar
         force = self.coefficient * _mean_decay(self.coefficient * state.span / state.mass)
         torque = turning * _mean_decay(turning * state.span / state.inertia)
@@ -82,7 +82,7 @@ class Spring:
     rest_length: float
 
     def wrench(self, state: ObjectState) -> Wrench:
-        """The force midway through the tick."""
+        """The force midway through the time step."""
         px, py = state.p_WBcm_held.tolist()
         dx, dy = self.x - px, self.y - py
         if self.rest_length == 0.0:
@@ -102,7 +102,7 @@ class Attraction:
     core: float
 
     def wrench(self, state: ObjectState) -> Wrench:
-        """The force midway through the tick."""
+        """The force midway through the time step."""
         px, py = state.p_WBcm_held.tolist()
         dx, dy = self.x - px, self.y - py
         square = dx * dx + dy * dy
@@ -134,7 +134,7 @@ class Ellipse:
 
     Attributes:
         axes: largest over least friction [-].
-        angle: of the slippery axis [rad], in W, or in B where it is ``fixed_in_object``.
+        angle: of the low-friction axis [rad], in W, or in B where it is ``fixed_in_object``.
     """
 
     axes: float
@@ -149,7 +149,8 @@ class Ellipse:
     def ratio(self, state: ObjectState) -> Array | Complex:
         """The factor (n,) of the support points; its imaginary part turns friction to the left."""
         angle = self.angle + (state.yaw if self.fixed_in_object else 0.0)
-        # M^2 v of a plane vector v = x + iy with the slippery axis at an angle a is mean v + half e^(2ia) conj(v).
+        # M^2 v of a plane vector v = x + iy with the low-friction axis at an angle a is mean v + half e^(2ia)
+        # conj(v).
         mean, half = 0.5 * (1.0 / self.axes + self.axes), 0.5 * (1.0 / self.axes - self.axes)
         slips = state.slips
         moving = slips != 0.0
@@ -300,7 +301,7 @@ class ForceTable:
     places: Places
 
     def wrench(self, state: ObjectState) -> Wrench:
-        """The force midway through the tick."""
+        """The force midway through the time step."""
         px, py = state.p_WBcm_held.tolist()
         force = complex(self.places.between(self.numbers, np.array([complex(px, py)]))[0])
         return Wrench(fx=force.real, fy=force.imag, torque=0.0)
@@ -329,7 +330,7 @@ class MotionTable:
     speeds: Speeds
 
     def wrench(self, state: ObjectState) -> Wrench:
-        """The mean force over the tick: of a speed that grows evenly or, below the slowest, by its own size.
+        """The mean force over the time_step: of a speed that grows evenly or, below the slowest, by its own size.
 
         The velocity turns by what the force across says and keeps its size; a brake never drives backwards.
         """

@@ -22,7 +22,7 @@ class Lift:
 
     It goes with slip and is a few per cent of the friction: four points that are together as rough as all of them,
     with the same mean and covariance, tell it to a thousandth of the friction, unless some of them leave the table.
-    Plain floats, since a rollout asks at every tick.
+    Plain floats, since a rollout asks at every time step.
     """
 
     def __init__(self, underside: Underside, stiffness: float) -> None:
@@ -43,10 +43,10 @@ class Lift:
     def excess(
         self, span: float, lean: tuple[float, float, float], velocity: complex, spin: float
     ) -> tuple[complex, float]:
-        """Force on the table's plane, x + iy in B [N], and moment about Bo [N m], that are given back over a tick.
+        """Force on the table's plane, x + iy in B [N], and moment about Bo [N m], given back over a time step.
 
         Args:
-            span: of the tick [s].
+            span: of the time step [s].
             lean: depth of Bo's foot in the table [m], and how it grows along x and y of B [-].
             velocity: of Bo, x + iy in B [m/s].
             spin: rad/s.

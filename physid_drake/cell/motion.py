@@ -30,13 +30,13 @@ class Start:
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """What a rollout returns, at the ticks.
+    """What a rollout returns, at the time steps.
 
     Attributes:
         times: (n,) s.
         poses: (n, 7) quaternion wxyz and position of B in W.
-        forces: (n, 3) mean force of the hand on the object over the tick that ends at each time, in W [N]; without
-            the impulse of a rigid tip's impact, which takes no time.
+        forces: (n, 3) mean force of the hand on the object over the time step that ends at each time, in W [N];
+            without the impulse of a rigid tip's impact, which takes no time.
         outcome: how it ended.
         impacts: times of the impacts [s].
     """
@@ -72,7 +72,7 @@ class Log:
     impacts: list[float] = field(default_factory=list)
 
     def add(self, time: float, pose: Array, force: tuple[float, float, float]) -> None:
-        """Append a tick: time [s], pose (7,), hand force [N]."""
+        """Append a time_step: time [s], pose (7,), hand force [N]."""
         self.times.append(time)
         self.poses.append(pose)
         self.forces.append(force)

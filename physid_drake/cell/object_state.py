@@ -48,14 +48,14 @@ class Underside:
 
 @dataclass(kw_only=True)
 class ObjectState:
-    """The object at the start of a tick, seen from above.
+    """The object at the start of a time step, seen from above.
 
-    What concerns the support points is computed when a law asks for it: most laws do not, and ticks are many. Plane
-    vectors of points are complex numbers x + iy inside, for one numpy call instead of several.
+    What concerns the support points is computed when a law asks for it: most laws do not, and time steps are many.
+    Plane vectors of points are complex numbers x + iy inside, for one numpy call instead of several.
 
     Attributes:
         time: since the rollout's start [s].
-        span: how long the tick is [s]: what a law gives is held for so long.
+        span: how long the time step is [s]: what a law gives is held for so long.
         p_WBo: x + iy [m].
         v_WBo: x + iy [m/s].
         p_BoBcm_W: from Bo to the centre of mass, x + iy in W [m].
@@ -71,7 +71,7 @@ class ObjectState:
         lifted: whether the contact takes friction from depths that are larger than the loads (``lifts``).
         v_rolling: of the underside against Bo, in an object that rolls, x + iy [m/s].
         rolling_mass: what a force across its axis sets in motion [kg]; 0 of what does not roll.
-        lead: how far ahead a force by the object's place is taken, in ticks [-].
+        lead: how far ahead a force by the object's place is taken, in time steps [-].
         edge: lower and upper corner of a table that ends, x + iy [m]; None where it does not.
     """
 
@@ -109,12 +109,12 @@ class ObjectState:
 
     @property
     def p_WBcm_held(self) -> Array:
-        """Centre of mass (2,) where a force by its place is taken, that is held over the tick [m].
+        """Centre of mass (2,) where a force by its place is taken, that is held over the time step [m].
 
-        A rollout's slide moves by the mean velocity. With the force of where a tick begins, the map of an oscillator
-        over a tick has the determinant 1 + (w dt)^2 / 2, and energy is fed in; half a tick later it is 1. Drake's own
-        step moves by the velocity at its end: there it is 1 with the force of where the tick begins, and half a tick
-        later 1 - (w dt)^2 / 2.
+        A rollout's slide moves by the mean velocity. With the force of where a time step begins, the map of an
+        oscillator over a time step has the determinant 1 + (w dt)^2 / 2, and energy is fed in; half a time step later
+        it is 1. Drake's own step moves by the velocity at its end: there it is 1 with the force of where the time
+        step begins, and half a time step later 1 - (w dt)^2 / 2.
         """
         return np.asarray(self.p_WBcm + self.lead * self.span * self.v_WBcm)
 
@@ -245,7 +245,7 @@ class StateReader:
         rolling_radius: of a lying cylinder [m]; None of what does not roll.
         rolling_mass: its mass, and its inertia about the axis over the radius squared [kg].
         edge: lower and upper corner of a table that ends, x + iy [m]; None where it does not.
-        lead: how far ahead a force by the object's place is taken, in ticks [-]: half of one in a rollout.
+        lead: how far ahead a force by the object's place is taken, in time steps [-]: half of one in a rollout.
         lifted: whether the contact takes friction from depths that are larger than the loads.
     """
 
@@ -267,7 +267,7 @@ class StateReader:
 
         Args:
             time: since the rollout's start [s].
-            span: how long the tick is that begins then [s].
+            span: how long the time step is that begins then [s].
             X_WB: (7,) quaternion wxyz and position [m].
             V_WB: (6,) angular and linear velocity in W.
         """
@@ -344,7 +344,7 @@ def lifts_of(points: Complex, slips: Complex, span: float, lean: tuple[float, fl
     Args:
         points: x + iy in B [m].
         slips: their velocities, x + iy in B [m/s].
-        span: of the tick [s].
+        span: of the time step [s].
         lean: depth of Bo's foot in the table [m], and how it grows along x and y of B [-].
     """
     foot, along_x, along_y = lean

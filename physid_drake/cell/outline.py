@@ -1,6 +1,6 @@
 """The object seen from above: its outline, and how near a round hand tip is to it.
 
-Everything here is plain floats, since the rollout asks once per tick and numpy's overhead on
+Everything here is plain floats, since the rollout asks once per time step and numpy's overhead on
 two-vectors would cost more than Drake's own step.
 """
 

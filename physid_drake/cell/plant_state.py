@@ -24,7 +24,7 @@ PARKED = (0.0, 0.0, 10.0)  # m: a hand that takes no part
 class PlantState:
     """Positions and velocities of the plant: sent to Drake before a step, fetched after it.
 
-    Answers are plain floats, since a rollout asks at every tick.
+    Answers are plain floats, since a rollout asks at every time step.
     """
 
     def __init__(self, scene: Scene, root: Context) -> None:
@@ -122,7 +122,7 @@ class PlantState:
         return (px, py, pose[2]), (vx + wy * above, vy - wx * above, wz)
 
     def object_state(self, time: float, span: float) -> ObjectState:
-        """The object as force laws see it when a tick of ``span`` [s] begins, ``time`` [s] after the start."""
+        """The object as force laws see it when a time step of ``span`` [s] begins, ``time`` [s] after the start."""
         q, v = self._q, self._v
         X_WB, V_WB = self._x[q : q + 7].tolist(), self._x[v : v + 6].tolist()
         return self._reader.at(time, span, X_WB, V_WB)
@@ -207,7 +207,8 @@ class PlantState:
         c, s = math.cos(yaw), math.sin(yaw)
         about_x, about_y = (c * hx + s * hy) / ix, (c * hy - s * hx) / iy
         if self._round:
-            # A rate across the axis, which the contact takes back within the tick, would turn what rolls meanwhile.
+            # A rate across the axis, which the contact takes back within the time step, would turn what rolls
+            # meanwhile.
             about_x = 0.0
         wx, wy = c * about_x - s * about_y, s * about_x + c * about_y
         self._x[self._v] += wx
@@ -216,10 +217,10 @@ class PlantState:
         self._x[self._v + 5] += wy * (c * cx - s * cy) - wx * (s * cx + c * cy)
 
     def give_back_lift(self, span: float, largest: float) -> None:
-        """Add what the contact's friction has too much over a tick [s], where it follows depths beyond the loads.
+        """Give back the friction of depths beyond the loads, over a time step [s].
 
         Args:
-            span: of the tick.
+            span: of the time step.
             largest: of the contact's friction over the cell's, where laws reach so much [-].
         """
         if self._lift is None:

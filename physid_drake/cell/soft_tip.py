@@ -38,7 +38,7 @@ class Mount:
 
 
 class TipImpulse(NamedTuple):
-    """Impulse of the tip on the object over a tick in W [N s], and its angular one about Bcm [N m s]."""
+    """Impulse of the tip on the object over a time step in W [N s], and its angular one about Bcm [N m s]."""
 
     jx: float
     jy: float
@@ -48,8 +48,8 @@ class TipImpulse(NamedTuple):
 class SoftTip:
     """The tip's own motion over a rollout.
 
-    Over a tick the object is taken to keep the acceleration that everything but the tip gave it in the tick before,
-    friction with the table above all; the tip's impulse then acts at the tick's start.
+    Over a time step the object is taken to keep the acceleration that everything but the tip gave it in the time step
+    before, friction with the table above all; the tip's impulse then acts at the time step's start.
     """
 
     def __init__(self, mount: Mount, tip: Tip, body: Body, inertia: float) -> None:
@@ -76,7 +76,7 @@ class SoftTip:
 
     @property
     def held(self) -> bool:
-        """Whether the tip pressed on the object at the end of the last tick."""
+        """Whether the tip pressed on the object at the end of the last time step."""
         return self._held
 
     def gap(self, pose: Planar) -> float:
@@ -84,11 +84,11 @@ class SoftTip:
         return self._tip.gap(*pose, *self.place)[0]
 
     def arrives(self, pose: Planar, span: float) -> bool:
-        """Whether it may meet an object at rest within a few ticks of ``span`` [s]."""
+        """Whether it may meet an object at rest within a few time steps of ``span`` [s]."""
         return self.gap(pose) < HAIR + NEAR * span * math.hypot(*self.velocity)
 
     def coast(self, goal: list[float], velocity: Plane, span: float) -> None:
-        """Move freely over a tick, at the end of which the mount is at ``goal`` [m]."""
+        """Move freely over a time step, at the end of which the mount is at ``goal`` [m]."""
         self._held, self._last = False, None
         ex, ey = self._stretch(goal, velocity, span)
         flow = _Flow(self._mount, span)
@@ -97,13 +97,13 @@ class SoftTip:
         self.place, self.velocity = [goal[0] - ex, goal[1] - ey], (ux, uy)
 
     def step(self, touch: Touch, goal: list[float], velocity: Plane, span: float) -> TipImpulse | None:
-        """Move over a tick beside the object; returns what it gives to the object, if it touches.
+        """Move over a time step beside the object; returns what it gives to the object, if it touches.
 
         Args:
             touch: of object and tip as they are.
             goal: where the mount is at the end [m].
             velocity: of the mount [m/s].
-            span: of the tick [s].
+            span: of the time step [s].
         """
         pull = self._pull(touch)
         touch = self._mended(touch)
@@ -147,11 +147,11 @@ class SoftTip:
         return TipImpulse(jx, jy, spin) if jn > 0.0 else None
 
     def _stretch(self, goal: list[float], velocity: Plane, span: float) -> Plane:
-        """From the tip to the mount at the start of a tick [m]."""
+        """From the tip to the mount at the start of a time step [m]."""
         return goal[0] - span * velocity[0] - self.place[0], goal[1] - span * velocity[1] - self.place[1]
 
     def _pull(self, touch: Touch) -> Planar:
-        """Acceleration of the object in the tick before, less what the tip gave it."""
+        """Acceleration of the object in the time step before, less what the tip gave it."""
         if self._last is None:
             return 0.0, 0.0, 0.0
         span, before, given = self._last
@@ -189,7 +189,7 @@ class _Flow:
         return self._keep * tip + self._spring * stretch + self._drag * mount
 
     def free(self, stretch: float, tip: float, mount: float) -> tuple[float, float]:
-        """Stretch [m] and velocity, over the tick, of a tip that meets nothing."""
+        """Stretch [m] and velocity, over the time step, of a tip that meets nothing."""
         for _ in range(self.count):
             after = self.velocity(stretch, tip, mount)
             stretch += self.step * (mount - self.way(tip, after))
@@ -203,7 +203,7 @@ class _Flow:
 
 @dataclass(kw_only=True)
 class _Meeting:
-    """Tip and object over a tick, along the normal into the object and the tangent, n turned by +90 degrees.
+    """Tip and object over a time step, along the normal into the object and the tangent, n turned by +90 degrees.
 
     Attributes:
         gap: m.
@@ -231,7 +231,7 @@ class _Meeting:
     held: bool = False
 
     def run(self, flow: _Flow) -> Plane:
-        """Advance over the tick; returns the impulse on the object [N s]."""
+        """Advance over the time step; returns the impulse on the object [N s]."""
         h, tip_yields = flow.step, flow.yields
         (en, et), (un, ut), (vn, vt), (cn, ct) = self.stretch, self.tip, self.face, self.mount
         normal, tangent, cross = self.yields

@@ -25,10 +25,10 @@ from physid_drake.cell.touch import HandMove, Planar, Tip, Touch, blow
 Array = NDArray[np.float64]
 
 REST_SPEED = 2e-4  # m/s of any point: Drake's regularised friction lets a stopped object creep below this
-NEAR = 3  # ticks: the hand is near when it could arrive within so many
+NEAR = 3  # time steps: the hand is near when it could arrive within so many
 SMALLEST_STEP = 1e-7  # s
-# s: a sprung tip knows the table's friction from the tick before. In ticks of 20 ms, which suit a slow hand, a stiff
-# tip was 6 standard deviations off in yaw; in these as far as in ticks of 1 ms.
+# s: a sprung tip knows the table's friction from the time step before. In time steps of 20 ms, which suit a slow
+# hand, a stiff tip was 6 standard deviations off in yaw; in these as far as in time steps of 1 ms.
 SOFT_TICK = 2e-3
 # Longer ones will do for a slow hand on a spring that is soft enough: within 0.03 mm and 0.4 mrad for 40 mm.
 SOFT_TRAVEL = 1e-4  # m: of the hand in one
@@ -36,9 +36,10 @@ SOFT_SWING = 2.0  # times the root of mass over stiffness
 SLOWEST_HAND = 1e-6  # m/s: no path moves slower
 FALLEN = 0.05  # m below the table top: it does not come back
 FASTEST = 50.0  # m/s: beyond it a rollout has diverged
-# Of the hand's speed: what friction with the table takes of it in a tick. A contact that sticks creeps by as much:
-# with 100 kg, ticks of 10 ms and a hand of 2 mm/s, forces turned by 5 deg. A hand far heavier than this one hides the
-# contact, as solvers' tolerances are relative to all momenta: 1e5 kg at 0.4 m/s hid three quarters of a push's force.
+# Of the hand's speed: what friction with the table takes of it in a time step. A contact that sticks creeps by as
+# much: with 100 kg, time steps of 10 ms and a hand of 2 mm/s, forces turned by 5 deg. A hand far heavier than this
+# one hides the contact, as solvers' tolerances are relative to all momenta: 1e5 kg at 0.4 m/s hid three quarters of a
+# push's force.
 SLOWED = 1e-6
 LIGHTEST_HAND = 100.0  # times the object's mass: where there is no friction, nothing slows a hand
 
@@ -104,7 +105,7 @@ class Stepper:
         try:
             self._begin_at(start, rest)
             while k < count:
-                k = self._skip_rest(k, count) if self._resting(k) else self._tick(k, count)
+                k = self._skip_rest(k, count) if self._resting(k) else self._time_step(k, count)
                 if self._state.height < -FALLEN:
                     return self._log.motion(Outcome.FELL)
         except (RuntimeError, SystemExit, ArithmeticError):
@@ -120,7 +121,7 @@ class Stepper:
         return min(HAND_MASS, max(unslowed, LIGHTEST_HAND * body.mass))
 
     def _soft_tick_of(self, body: Body, speed: float) -> float:
-        """The longest tick of a sprung tip whose mount goes at most so fast [s]."""
+        """The longest time step of a sprung tip whose mount goes at most so fast [s]."""
         swing = math.sqrt(body.mass / self._mount.stiffness) if self._mount is not None else 0.0
         return max(SOFT_TICK, min(SOFT_SWING * swing, SOFT_TRAVEL / speed))
 
@@ -166,7 +167,7 @@ class Stepper:
         return self._tip.touch(pose, twist, hand, velocity)
 
     def _move(self, k: int, m: int) -> HandMove:
-        """The hand's way from tick ``k`` to tick ``m``."""
+        """The hand's way from time step ``k`` to time step ``m``."""
         assert self._hand is not None
         start, goal, span = self._hand[k], self._hand[m], (m - k) * self._solver.time_step_s
         return HandMove(start, goal, ((goal[0] - start[0]) / span, (goal[1] - start[1]) / span))
@@ -185,7 +186,7 @@ class Stepper:
         return self._laws.are_held(self._state, k * dt, dt)
 
     def _skip_rest(self, k: int, count: int) -> int:
-        """Nothing happens until the hand comes: go to the last tick before it touches."""
+        """Nothing happens until the hand comes: go to the last time step before it touches."""
         pose, _ = self._state.section(self._height)
         m = count
         if self._soft is not None:
@@ -200,10 +201,10 @@ class Stepper:
             self._restart(m * self._solver.time_step_s)
             if m == count:
                 return count
-        return self._tick(m, count)
+        return self._time_step(m, count)
 
     def _coast(self, soft: SoftTip, pose: Planar, k: int, count: int) -> int:
-        """Move a sprung tip beside an object at rest; returns the tick at which it may meet it."""
+        """Move a sprung tip beside an object at rest; returns the time step at which it may meet it."""
         dt = self._solver.time_step_s
         while k < count and not soft.arrives(pose, dt):
             move = self._move(k, k + 1)
@@ -211,13 +212,13 @@ class Stepper:
             k += 1
         return k
 
-    # Ticks.
+    # Time steps.
 
-    def _tick(self, k: int, count: int) -> int:
-        """Advance by one tick, or by a few in a free slide; returns the new tick."""
-        dt, ticks = self._solver.time_step_s, self._slide_ticks
+    def _time_step(self, k: int, count: int) -> int:
+        """Advance by one time step, or by a few in a free slide; returns the new time step."""
+        dt, time_steps = self._solver.time_step_s, self._slide_ticks
         if self._hand is None:
-            m = min(k + ticks, count)
+            m = min(k + time_steps, count)
             self._step_free(m * dt, k * dt)
             return m
         if self._soft is not None:
@@ -225,8 +226,8 @@ class Stepper:
         m = k + 1
         move = self._move(k, m)
         touch = self._touch(move.start, move.velocity)
-        if k + ticks <= count and self._apart(touch, k, count):
-            m = k + ticks
+        if k + time_steps <= count and self._apart(touch, k, count):
+            m = k + time_steps
             move = self._move(k, m)
             touch = self._touch(move.start, move.velocity)
         self._cross(k * dt, m * dt, move, touch)
@@ -251,7 +252,7 @@ class Stepper:
         return m
 
     def _apart(self, touch: Touch, k: int, count: int) -> bool:
-        """Whether hand and object do not meet within the next few ticks."""
+        """Whether hand and object do not meet within the next few time steps."""
         assert self._hand is not None
         reach = self._solver.time_step_s * NEAR * self._slide_ticks
         if touch.gap + min(touch.rate, 0.0) * reach <= 0.0:
@@ -260,7 +261,7 @@ class Stepper:
         return self._tip.gap(*touch.pose, *self._hand[ahead])[0] > 0.0
 
     def _cross(self, begin: float, end: float, move: HandMove, touch: Touch) -> None:
-        """Advance over one tick, stopping at a touch to apply the impact law."""
+        """Advance over one time step, stopping at a touch to apply the impact law."""
         time, velocity = begin, move.velocity
         seen: Touch | None = touch  # valid until the object or the hand has moved
         for _ in range(3):

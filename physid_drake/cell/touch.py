@@ -36,7 +36,7 @@ class HandMove(NamedTuple):
 
 
 class Tip:
-    """The hand's round tip beside the object's outline. Plain floats throughout, since a rollout asks every tick."""
+    """The hand's round tip beside the object's outline; plain floats, since a rollout asks in every time step."""
 
     def __init__(self, outline: Outline, radius: float) -> None:
         """``radius`` of the tip [m]."""

@@ -2,7 +2,7 @@
 
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.exported import model_of
-from physid_drake.diagnose.story import diagnose, diagnose_from
+from physid_drake.diagnose.pipeline import diagnose, diagnose_from
 from physid_drake.diagnose.system import DiagnosisSystem, Examined
 from physid_drake.diagnose.values import Diagnosis
 from physid_drake.pushes.case import Case, case_of, cell_config

@@ -8,15 +8,15 @@ import math
 import numpy as np
 from scipy import stats
 
-from physid_drake.diagnose.decide import FEWEST_PUSHES, is_own_error, kinds_of, loudest, probability
+from physid_drake.diagnose.decide import FEWEST_PUSHES, is_own_error, kinds_of, most_noise_scale, probability
 from physid_drake.diagnose.estimates import parameters_of, smallest, theta_of
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.frictions import friction_trend
-from physid_drake.diagnose.looks import locate
 from physid_drake.diagnose.ranking import ranking_of
 from physid_drake.diagnose.regimes import regime_gains, standard_error
 from physid_drake.diagnose.sentence import sentence
 from physid_drake.diagnose.values import Detectable, Diagnosis, EffectFinding, FitQuality, Location, Partly
+from physid_drake.diagnose.wrench_patterns import locate
 from physid_drake.identify.accuracy import accuracy_of
 from physid_drake.inference.replicates import p_value, without_best
 from physid_drake.pushes.case import UNIT_SCATTER
@@ -28,7 +28,7 @@ VISIBLE = 10.0  # standard deviations of motion: pushes that would not show such
 
 def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
     """The verdict and all figures, from evidence; no rollouts."""
-    case, found, plain, after = evidence.case, evidence.found, evidence.plain, evidence.leaving
+    case, found, plain, after = evidence.case, evidence.found, evidence.baseline, evidence.corrected
     detectable = smallest(found)
     verdict = evidence.decision.verdict
     if verdict == "consistent" and _blind(evidence, detectable):
@@ -84,9 +84,9 @@ def p_value_of(evidence: Evidence, alpha: float) -> float:
         return found.p_value
     whole = {kinds_of(one)[0].name: float(without_best(one.gains)) for one in found.named if len(kinds_of(one)) == 1}
     looks = [found.p_value, p_value(whole, found.by_chance), found.alike]
-    if found.plain.loudness > loudest(noise):
-        squares = sum(one.square for one in found.plain.weighed) / loudest(noise) ** 2
-        looks.append(float(stats.chi2.sf(squares, found.plain.degrees)))
+    if found.baseline.noise_scale > most_noise_scale(noise):
+        squares = sum(one.square for one in found.baseline.weighed) / most_noise_scale(noise) ** 2
+        looks.append(float(stats.chi2.sf(squares, found.baseline.degrees)))
     return float(-np.expm1(len(looks) * np.log1p(-min(*looks, 1.0 - 1e-16))))
 
 
@@ -112,7 +112,7 @@ def _location(evidence: Evidence, seed: int) -> Location | None:
     if evidence.decision.verdict in ("consistent", "underpowered"):
         return None
     frame = evidence.decision.effects[0].frame if evidence.named else None
-    found = locate(evidence.fitter, evidence.plain, evidence.wrenches, np.random.default_rng(seed), frame)
+    found = locate(evidence.fitter, evidence.baseline, evidence.wrenches, np.random.default_rng(seed), frame)
     return found if frame is None else dc.replace(found, frame=frame)
 
 
@@ -145,7 +145,7 @@ def _partly(evidence: Evidence) -> Partly | None:
 
 
 def _quality(evidence: Evidence) -> FitQuality:
-    case, plain, after = evidence.case, evidence.plain, evidence.leaving
+    case, plain, after = evidence.case, evidence.baseline, evidence.corrected
     gains = evidence.fitter.held_out(after) - evidence.fitter.held_out(plain)
     old, new = (accuracy_of(case, errors) for errors in (evidence.errors_before, evidence.errors_after))
     return FitQuality(
@@ -163,7 +163,7 @@ def _left(evidence: Evidence) -> str:
     """What the model that leaves does not account for, in words."""
     if is_own_error(accuracy_of(evidence.case, evidence.errors_before)):
         return "no more than the difference between two simulators"
-    after = evidence.leaving
+    after = evidence.corrected
     scatter = 100.0 * UNIT_SCATTER * after.scatter
     trend = friction_trend(evidence.fitter, after)
     friction = f"friction scatter between pushes {scatter:.0f} %" + ("" if trend is None else f", {trend}")
@@ -171,6 +171,6 @@ def _left(evidence: Evidence) -> str:
     if not rough.is_none:
         friction += f", within a push {100 * rough.table:.0f} % ({100 * rough.tip:.0f} % at the tip)"
     nameless = "" if evidence.named or evidence.best is None else "beside an unnamed force, "
-    if after.loudness <= loudest(evidence.case.noise):
+    if after.noise_scale <= most_noise_scale(evidence.case.noise):
         return f"{nameless}no more than noise; {friction}"
-    return f"{nameless}{after.loudness:.1f} times the noise and the simulator's own error; {friction}"
+    return f"{nameless}{after.noise_scale:.1f} times the noise and the simulator's own error; {friction}"

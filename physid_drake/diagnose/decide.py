@@ -1,6 +1,6 @@
 """The decision: from hypotheses that were fitted to what is said, by a few constants.
 
-All comparisons are of pushes that were left out, and no push decides alone: the one that speaks most for a
+All comparisons are of pushes that were held out, and no push decides alone: the one that speaks most for a
 hypothesis does not count for it. docs/method.md lists the constants; `benchmarks/decisions.py` leaves out each.
 """
 
@@ -22,11 +22,11 @@ Array = NDArray[np.float64]
 
 CONFIRMED = 1e-4  # chance that the gain of an effect, its best push not counted, is none
 MARGIN = 8.0  # nats: by which one is surely better than another, likewise
-FEWEST_PUSHES = 3  # less cannot confirm anything on pushes that are left out
+FEWEST_PUSHES = 3  # less cannot confirm anything on pushes that are held out
 ADEQUATE = 0.01  # p-value of what a hypothesis leaves: of the catalogue beside it, of the scatter of frictions
 LITTLE = 0.03  # of the gain of a hypothesis: two honest implementations of one effect differ by a tenth of it or more
-LOUD = 1.25  # times the noise: more is not noise
-OWN_ERROR = (2e-4, 2e-3)  # m, rad: of pushes left out, by which two honest simulators differ
+MOST_NOISE_SCALE = 1.25  # times the noise: more is not noise
+OWN_ERROR = (2e-4, 2e-3)  # m, rad: of held-out pushes, by which two honest simulators differ
 DOUBTS = 1.5  # times the doubt about the noise's variance: three deviations of its root
 
 
@@ -64,9 +64,9 @@ class Decision:
         return tuple(map(tuple, found))
 
 
-def loudest(noise: TrackerNoise) -> float:
+def most_noise_scale(noise: TrackerNoise) -> float:
     """Times the noise that errors may be and still be noise; of one that short rests told, a little more."""
-    return LOUD * math.exp(DOUBTS * noise.doubt) if noise.known else math.inf
+    return MOST_NOISE_SCALE * math.exp(DOUBTS * noise.doubt) if noise.known else math.inf
 
 
 def decided(found: Found, *, most: float) -> Decision:
@@ -76,13 +76,13 @@ def decided(found: Found, *, most: float) -> Decision:
         found: all hypotheses.
         most: times the noise that errors may be and still be noise.
     """
-    if len(found.plain.pushes) < FEWEST_PUSHES:
+    if len(found.baseline.pushes) < FEWEST_PUSHES:
         return Decision(verdict="underpowered")
     every = [*found.named, *found.unnamed]
     missing = found.odd and any(confirmed(found, one) for one in every)
-    quiet = found.plain.loudness <= most and found.alike >= ADEQUATE
+    quiet = found.baseline.noise_scale <= most and found.alike >= ADEQUATE
     if not missing and quiet:
-        # So much is left by chance more seldom than was asked for, and yet left-out pushes confirm nothing.
+        # So much is left by chance more seldom than was asked for, and yet held-out pushes confirm nothing.
         return Decision(verdict="underpowered" if found.rare else "consistent")
     nameless = next((one for one in found.unnamed if confirmed(found, one)), None)
     best = simplest(found)
@@ -90,7 +90,7 @@ def decided(found: Found, *, most: float) -> Decision:
         return Decision(verdict="unexplained", best=nameless)
     beaten = any(surely_better(one.gains - best.gains) for one in found.unnamed)
     little = found.left >= ADEQUATE or found.left_gain < LITTLE * best.gain
-    enough = little and best.fit.loudness <= most and best.alike >= ADEQUATE
+    enough = little and best.fit.noise_scale <= most and best.alike >= ADEQUATE
     if beaten or not enough:
         return Decision(verdict="unexplained", best=nameless, partly=best)
     alike = tuple(one for one in found.named if _in_class(one, best))
@@ -104,7 +104,7 @@ def is_own_error(left_out: Accuracy) -> bool:
 
 
 def confirmed(found: Found, one: Weighed, beside: Weighed | None = None) -> bool:
-    """Whether pushes that were left out confirm what a hypothesis has beside another, or beside the baseline.
+    """Whether pushes that were held out confirm what a hypothesis has beside another, or beside the baseline.
 
     Its gain is compared with what such an effect gains by chance; that of what has no name with the effect that
     gains most. Two effects gain more by chance than one, so that of two one alone has to be confirmed, too.

@@ -157,7 +157,7 @@ def smallest(found: Found) -> tuple[Detectable, ...]:
     The gain that it takes, one push not counted, is that of its replicates' tail; half the information times the
     square of the effect, it comes at even odds.
     """
-    pushes = len(found.plain.pushes)
+    pushes = len(found.baseline.pushes)
     counted = max(1, pushes - 1) / pushes
     best: dict[str, Detectable] = {}
     for column, information in zip(found.columns, _informations(found), strict=True):
@@ -172,14 +172,14 @@ def smallest(found: Found) -> tuple[Detectable, ...]:
 
 
 def _informations(found: Found) -> list[float]:
-    """Of each column's amplitude: its precision, what theta and the pushes' own unknowns imitate taken out."""
-    fitter, fit = found.fitter, found.plain
+    """Of each column's amplitude: its precision, what theta and the per-push parameters imitate taken out."""
+    fitter, fit = found.fitter, found.baseline
     n, count = fit.hypothesis.dimension, len(found.columns)
     precision = np.zeros((n + count,) * 2)
     precision[:n, :n] = fit.hypothesis.precision
     for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(fit.scatter), strict=True)):
         shared = np.column_stack([push.shared, *(c.pushes[i] for c in found.columns)])
-        precision += weighed(push.residual, shared, push.own, prior, fit.loudness, fit.tail).precision
+        precision += weighed(push.residual, shared, push.nuisance, prior, fit.noise_scale, fit.tail).precision
     imitated = np.linalg.pinv(precision[:n, :n])
     return [
         float(precision[n + k, n + k] - precision[n + k, :n] @ imitated @ precision[:n, n + k]) for k in range(count)

@@ -51,7 +51,7 @@ class Evidence:
         return self.known.case
 
     @property
-    def plain(self) -> Fit:
+    def baseline(self) -> Fit:
         """The baseline in the cell."""
         return self.known.fit
 
@@ -66,12 +66,12 @@ class Evidence:
         return self.decision.verdict in ("explained", "ambiguous")
 
     @property
-    def leaving(self) -> Fit:
+    def corrected(self) -> Fit:
         """The model that leaves: with what was found, under a name or without one, else the baseline."""
-        return self.plain if self.best is None else self.best
+        return self.baseline if self.best is None else self.best
 
 
 def predicted(evidence: Evidence, errors: tuple[Array, ...], push: int) -> Array:
-    """Window means (w, 3) [m, m, rad] of a push that was left out, of ``errors_before`` or ``errors_after``."""
+    """Window means (w, 3) [m, m, rad] of a push that was held out, of ``errors_before`` or ``errors_after``."""
     features = evidence.case.features[push]
     return features.poses(features.recorded - errors[push])

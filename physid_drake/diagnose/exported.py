@@ -17,7 +17,7 @@ SAME = 0.9  # determinant of the mean of frames: they lie within about 25 degree
 
 def model_of(evidence: Evidence) -> Model:
     """The model that leaves, as ``model.yaml`` has it: with what was found, under a name or without one."""
-    case, fit, fitter = evidence.case, evidence.leaving, evidence.fitter
+    case, fit, fitter = evidence.case, evidence.corrected, evidence.fitter
     h, spec = fit.hypothesis, case.pool.spec
     # Also of what these pushes do not tell: a drag is known over a mass, and belief in one goes with the other.
     intervals: dict[str, object] = {f"theta.{e.name}": list(e.ci90) for e in estimates_of(fitter, fit)}

@@ -61,7 +61,7 @@ def each_alone(fitter: Fitter, pair: Fit) -> list[Fit]:
         kept = dc.replace(h, parts=h.parts[:k] + h.parts[k + 1 :])
         begin = h.space.dimension + sum(len(part.free) for part in h.parts[:k])
         shorter = np.delete(z, range(begin, begin + len(h.parts[k].free)))
-        point = fitter.points([kept], [shorter], [pair.point.own])[0]
+        point = fitter.points([kept], [shorter], [pair.point.nuisance])[0]
         if point is not None:
             fits += fitter.fitted(fitter.started([kept], [point], [None], TAIL), LAST)
     return fits
@@ -79,7 +79,7 @@ def unnamed(fitter: Fitter, fit: Fit) -> list[Fit]:
         z = fit.point.z + score.dz
         starts = [np.concatenate([z[:n], moved, z[n:]]), np.concatenate([fit.point.z[:n], nothing, fit.point.z[n:]])]
         zs = [np.clip(one, *h.bounds) for one in starts]
-        points = [p for p in fitter.points([h] * 2, zs, [fit.point.own] * 2) if p is not None]
+        points = [p for p in fitter.points([h] * 2, zs, [fit.point.nuisance] * 2) if p is not None]
         best = min(points, key=fitter.roughly)
         fits += fitter.fitted(fitter.started([h], [best], [fit], TAIL), SECOND)
     return fits
@@ -90,7 +90,7 @@ def halved(fitter: Fitter, near: Fit, found: Sequence[Proposal], of_each: int = 
 
     Args:
         fitter: fits.
-        near: whose derivatives by the pushes' own unknowns will do at first.
+        near: whose derivatives by the per-push parameters will do at first.
         found: the proposals.
         of_each: hypothesis so many proposals are kept at the first halving; none of a pair's at later ones.
     """

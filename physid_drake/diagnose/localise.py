@@ -74,7 +74,7 @@ def missing_wrenches(fitter: Fitter, plain: Fit) -> tuple[MissingWrench, ...]:
     units = np.array([force, force, force * 0.5 * case.around.radius])
     windows = [_windows(case, i) for i in range(len(case.problems))]
     physics = h.physics(point.z)
-    asks = [Ask(i, physics, point.own[i]) for i in range(len(windows))]
+    asks = [Ask(i, physics, point.nuisance[i]) for i in range(len(windows))]
     for i, mine in enumerate(windows):
         for spell in mine:
             c, s = PULSE * math.cos(spell.heading), PULSE * math.sin(spell.heading)
@@ -138,12 +138,12 @@ def _windows(case: Case, i: int) -> list[_Spell]:
 def _solved(
     fitter: Fitter, plain: Fit, i: int, windows: Sequence[_Spell], columns: Array, units: Array
 ) -> list[MissingWrench]:
-    """Least squares with a wide prior, the push's own unknowns integrated out, theta held.
+    """Least squares with a wide prior, the push's nuisance parameters integrated out, theta held.
 
     Errors are what is missing, and not as loud as the model leaves them.
     """
     push, prior = plain.pushes[i], fitter.priors(plain.scatter)[i]
-    one = weighed(push.residual, columns, push.own, prior, 1.0, NO_TAIL)
+    one = weighed(push.residual, columns, push.nuisance, prior, 1.0, NO_TAIL)
     covariance = np.linalg.inv(one.precision + np.eye(columns.shape[1]) / LARGEST**2)
     values = covariance @ one.right
     stds = np.sqrt(np.diag(covariance))

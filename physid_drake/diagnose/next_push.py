@@ -18,7 +18,7 @@ from physid_drake.diagnose.values import NextPush
 from physid_drake.inference.rollouts import Ask, Physics, Rollouts
 from physid_drake.model import turned
 from physid_drake.pushes.case import Case
-from physid_drake.pushes.frames import reach_of
+from physid_drake.pushes.frame_checks import reach_of
 from physid_drake.pushes.problem import PushProblem
 from physid_drake.pushes.rollouts import RolloutPool
 
@@ -30,7 +30,7 @@ OFFSETS = (-0.3, 0.3)  # of the object's half width
 TRAVEL = 0.12  # m of the hand after the touch
 RUN_UP, RAMP, BRAKE = 0.02, 0.05, 0.05  # m, s, s
 AFTER = 1.0  # s
-LONGEST_TICK = 2e-3  # s, for hands as fast as these, which a recording's may not be
+LONGEST_TIME_STEP = 2e-3  # s, for hands as fast as these, which a recording's may not be
 REPEATS = 0.02  # of the motion: how well a push repeats
 
 
@@ -73,7 +73,7 @@ def next_push(case: Case, models: Sequence[Physics]) -> NextPush | None:
 def brisk_pool(case: Case) -> RolloutPool:
     """A pool like the case's, for a fast hand."""
     spec = case.pool.spec
-    share = min(1.0, LONGEST_TICK / spec.config.solver.time_step_s)
+    share = min(1.0, LONGEST_TIME_STEP / spec.config.solver.time_step_s)
     config = dc.replace(spec.config, solver=spec.config.solver.scaled(share))
     return case.pool.of(dc.replace(spec, config=config))
 

@@ -24,7 +24,7 @@ def ranking_of(evidence: Evidence, classes: Sequence[Sequence[str]]) -> tuple[Ra
     """
     found = evidence.found
     alone = {kinds_of(one)[0].name: one for one in found.named if len(kinds_of(one)) == 1}
-    scored = {score.kind.name: score.gain for score in reversed(scores(found.fitter, found.plain, found.columns))}
+    scored = {score.kind.name: score.gain for score in reversed(scores(found.fitter, found.baseline, found.columns))}
     named = {kind.name for kind in evidence.decision.effects} if evidence.named else set()
     alike = {name for names in classes for name in names}
     gains = found.linearly | {name: one.gain for name, one in alone.items()}

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from physid_drake.diagnose.location import headings_of, speeds_of
 from physid_drake.diagnose.values import RegimeGain
-from physid_drake.diagnose.whereabouts import headings_of, speeds_of
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.pushes.case import Case
 from physid_drake.pushes.problem import push_speed

@@ -29,12 +29,12 @@ SINGLES = 4  # effects, beside each of which a second one is looked for
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Weighed:
-    """A fitted hypothesis and how likely it makes pushes that were left out.
+    """A fitted hypothesis and how likely it makes pushes that were held out.
 
     Attributes:
         fit: at its best.
         alike: p-value of "the pushes' own frictions differ by no more than those of surfaces do".
-        gains: (n,) log predictive density of each push, given the others, over that of the baseline [nats].
+        gains: (n,) log predictive density of each push, given the others, over that of the baseline [log likelihood].
     """
 
     fit: Fit
@@ -48,7 +48,7 @@ class Weighed:
 
     @property
     def gain(self) -> float:
-        """Of all pushes [nats]."""
+        """Of all pushes [log likelihood]."""
         return float(self.gains.sum())
 
 
@@ -58,22 +58,22 @@ class Found:
 
     Attributes:
         fitter: that did it.
-        plain: the baseline, with tolerances.
+        baseline: with tolerances.
         alike: of the baseline, as of ``Weighed``.
         columns: of the catalogue beside it.
-        linearly: what each effect gains by these columns, its best push not counted, by its name [nats].
+        linearly: what each effect gains by these columns, its best push not counted, by its name [log likelihood].
         p_value: that the best gain of the catalogue over the baseline is chance.
         by_chance: (r,) the same in replicates of this recording in which the baseline is true, by name.
         rare: whether the p-value is below what was asked for.
         odd: whether that is so, or friction scatters by much.
         named: hypotheses of the catalogue, best first; empty where none was looked for.
         left: that the best gain of the catalogue over the first of them is chance; 1 where none was looked for.
-        left_gain: that gain, linearly [nats].
+        left_gain: that gain, linearly [log likelihood].
         unnamed: hypotheses of smooth forces and frictions without a name, best first.
     """
 
     fitter: Fitter
-    plain: Fit
+    baseline: Fit
     alike: float
     columns: tuple[Column, ...]
     linearly: dict[str, float]
@@ -90,12 +90,12 @@ class Found:
     def richest(self) -> Fit:
         """The likeliest fit of all that was looked at."""
         return max(
-            [self.plain, *(one.fit for one in (*self.named, *self.unnamed))], key=lambda fit: fit.log_likelihood
+            [self.baseline, *(one.fit for one in (*self.named, *self.unnamed))], key=lambda fit: fit.log_likelihood
         )
 
 
 def searched(
-    fitter: Fitter, plain: Fit, kinds: Sequence[type[Effect]], *, seed: int, alpha: float, tick: Progress
+    fitter: Fitter, plain: Fit, kinds: Sequence[type[Effect]], *, seed: int, alpha: float, progress: Progress
 ) -> Found:
     """Fit effects, pairs of them where one leaves something, and physics without a name.
 
@@ -105,21 +105,21 @@ def searched(
         kinds: of effects that may be in it.
         seed: of all that is drawn.
         alpha: a p-value below which something is missing.
-        tick: told the stage.
+        progress: called with the stage.
     """
     search = _Search(fitter, plain, kinds, np.random.default_rng(seed), alpha)
-    tick("test for missing physics", 0, 0)
+    progress("test for missing physics", 0, 0)
     found = search.begun()
-    if found.odd or plain.loudness > 1.0:
-        tick("single effects", 0, 0)
+    if found.odd or plain.noise_scale > 1.0:
+        progress("single effects", 0, 0)
         found = search.with_singles(found)
     if not found.odd or not found.named:
         return found
     found = search.with_left(found)
     if found.left < alpha or found.named[0].fit.scatter > ODD_SCATTER:
-        tick("pairs of effects", 0, 0)
+        progress("pairs of effects", 0, 0)
         found = search.with_pairs(found)
-    tick("unnamed force", 0, 0)
+    progress("unnamed force", 0, 0)
     return dc.replace(found, unnamed=search.ranked(unnamed(fitter, plain)))
 
 
@@ -140,7 +140,8 @@ class _Search:
         seen, by_chance = gains_by_chance(fitter, plain, found, self._rng)
         p = p_value(seen, by_chance)
         return Found(
-            fitter=fitter, plain=plain, alike=_alike(fitter, plain), columns=tuple(found), linearly=seen, p_value=p,
+            fitter=fitter, baseline=plain,
+            alike=_alike(fitter, plain), columns=tuple(found), linearly=seen, p_value=p,
             by_chance=by_chance, rare=p < self._alpha, odd=p < self._alpha or plain.scatter > ODD_SCATTER,
         )  # fmt: skip
 

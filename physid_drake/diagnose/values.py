@@ -41,9 +41,9 @@ class Partly:
     """What takes a good part of an unexplained mismatch away, and leaves more than it may.
 
     Attributes:
-        effects: names; confirmed by pushes that were left out.
-        share: of the mean square error of pushes left out that they take away, in standard deviations.
-        position, rotation: root mean square errors of pushes left out with them [m, rad].
+        effects: names; confirmed by pushes that were held out.
+        share: of the mean square error of held-out pushes that they take away, in standard deviations.
+        position, rotation: root mean square errors of held-out pushes with them [m, rad].
     """
 
     effects: tuple[str, ...]
@@ -105,14 +105,15 @@ class RegimeGain:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class FitQuality:
-    """How well pushes are predicted that were left out of the fit, by the baseline model and with what was found.
+    """How well pushes are predicted that were held out of the fit, by the baseline model and with what was found.
 
     Attributes:
         rms_before, rms_after: root mean square errors, in standard deviations of the measurement.
         position_before, position_after: of the place of B [m].
         rotation_before, rotation_after: of its yaw [rad].
-        log_score_gain: gain in log predictive density over all pushes [nats], and its standard error over pushes.
-        log_score_gain_se: that standard error [nats].
+        log_score_gain: gain in log predictive density over all pushes [log likelihood], and its standard error over
+            pushes.
+        log_score_gain_se: that standard error [log likelihood].
         per_push: name, error before and after in standard deviations, of each.
         regimes: gains where fit and test are of different kinds of pushes.
         force_before, force_after: of the hand's force [N]; None where none was compared.
@@ -239,7 +240,7 @@ class Diagnosis:
         alpha: false-alarm rate that was asked for.
         effects: that were found, in the order in which they were; empty unless explained or ambiguous.
         location: of the mismatch; None where there is none.
-        fit: of pushes that were left out.
+        fit: of pushes that were held out.
         theta: by parameter.
         next_push: None where none would help, or nothing pushes.
         seed: of all that is drawn.

@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 LATEST: Final = 1.0
 """s between the clocks of hand and object, at most, that are looked for; in steps of ``TICK``."""
-TICK: Final = 0.01
+TIME_STEP: Final = 0.01
 MOVING: Final = 0.02
 """m/s of the object: faster, and the hand is at it, or has let go."""
 LEAST_LATE: Final = 0.015
@@ -265,7 +265,7 @@ def _other_shapes(shape: Shape) -> Iterator[tuple[str, Shape]]:
 
 def _clocks(recording: Recording) -> Iterator[Convention]:
     """The clock of the hand's stream beside the object's, which brings the tip to the object as that moves."""
-    lates = np.arange(-LATEST, LATEST + TICK, TICK)
+    lates = np.arange(-LATEST, LATEST + TIME_STEP, TIME_STEP)
     rows = [_driven(push) for push in recording.pushes]
     if not sum(map(len, rows)):
         return

@@ -16,7 +16,7 @@ from physid_drake.doctor.conventions import (
 )
 from physid_drake.doctor.forces import conventions_of_forces, without_forces
 from physid_drake.errors import PhysidError
-from physid_drake.identify.baseline import plain
+from physid_drake.identify.baseline import baseline_hypothesis
 from physid_drake.inference.fit import Fitter
 from physid_drake.inference.predictions import Predictor
 from physid_drake.progress import Progress
@@ -84,12 +84,12 @@ class Finding:
         return f"{left}; no other unit or convention that was tested fits better"
 
 
-def examined(recording: Recording, tick: Progress | None = None) -> Finding:
+def examined(recording: Recording, progress: Progress | None = None) -> Finding:
     """Whether the pushes speak for other conventions than what is said.
 
     Args:
         recording: the pushes.
-        tick: told the stage, steps done and steps in all.
+        progress: called with the stage, steps done and steps in all.
     """
     few = _few(recording)
     before, refused = _left(few)
@@ -104,11 +104,11 @@ def examined(recording: Recording, tick: Progress | None = None) -> Finding:
         before, tried = placed, _likely(list(conventions_of(unforced)))
     # To be fitted at all is worth much, where it is refused as it is.
     enough = MUCH * FAR if before is None else before / MUCH
-    found = _fitted("other conventions", tried, tick)
+    found = _fitted("other conventions", tried, progress)
     least = min((left for left, _ in found), default=np.inf)
     if not least < FAR and gap_of(unforced) > NEAR:
         # No physics leaves the tip elsewhere than at what it pushes.
-        pairs = _fitted("two at once", _likely(list(pairs_of(unforced))), tick, most=MOST_PAIRS)
+        pairs = _fitted("two at once", _likely(list(pairs_of(unforced))), progress, most=MOST_PAIRS)
         both = min((left for left, _ in pairs), default=np.inf)
         if both < min(least, enough) / MUCH:
             found, least = pairs, both
@@ -119,15 +119,15 @@ def examined(recording: Recording, tick: Progress | None = None) -> Finding:
 
 
 def _fitted(
-    stage: str, conventions: Sequence[Convention], tick: Progress | None, most: int | None = None
+    stage: str, conventions: Sequence[Convention], progress: Progress | None, most: int | None = None
 ) -> list[tuple[float, Convention]]:
     """What the baseline leaves by each of the first conventions that are not refused."""
     found: list[tuple[float, Convention]] = []
     for convention in conventions:
         if len(found) == most:
             break
-        if tick is not None:
-            tick(stage, len(found), most or len(conventions))
+        if progress is not None:
+            progress(stage, len(found), most or len(conventions))
         left, _ = _left(convention.recording)
         if left is not None:
             found.append((left, convention))
@@ -160,7 +160,7 @@ def _left(recording: Recording) -> tuple[float | None, str]:
         case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=1)
         case = replace(case, noise=replace(case.noise, known=True))
         fitter = Fitter(case, Predictor(case))
-        hypothesis = plain(case)
+        hypothesis = baseline_hypothesis(case)
         rng = np.random.default_rng(0)
         drawn = hypothesis.space.sample(rng, STARTS, from_prior=True)
         zs = [hypothesis.mean, *(np.clip(hypothesis.space.to_unit(theta), *hypothesis.bounds) for theta in drawn)]
@@ -169,6 +169,6 @@ def _left(recording: Recording) -> tuple[float | None, str]:
         if not best:
             return None, "no push can be simulated"
         fits = fitter.fitted(fitter.started([hypothesis] * len(best), best, [None] * len(best)), STEPS)
-        return float(max(fits, key=lambda fit: fit.log_likelihood).loudness), ""
+        return float(max(fits, key=lambda fit: fit.log_likelihood).noise_scale), ""
     except PhysidError as error:
         return None, str(error)

@@ -98,7 +98,7 @@ class RollingResistance(Effect):
 
 @dc.dataclass(frozen=True)
 class _RollingLaw:
-    """Coulomb's law: as much as stops the roll within a tick, other forces included, up to ``share`` of the weight.
+    """Coulomb's law: as much as stops the roll within a time step, up to ``share`` of the weight.
 
     A force that fades with speed instead would let a cylinder creep down a tilt on which it rests.
     """

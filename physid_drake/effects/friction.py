@@ -64,7 +64,7 @@ class StribeckFriction(Effect):
 class _Anisotropic(Effect):
     """An elliptic limit curve: force = -N M^2 v / |M v|, M with mu sqrt(ratio) and mu / sqrt(ratio) on its axes.
 
-    ``angle`` is that of the slippery axis; the geometric mean of the two coefficients is the cell's. The force
+    ``angle`` is that of the low-friction axis; the geometric mean of the two coefficients is the cell's. The force
     maximises dissipation. Source: S. Goyal, A. Ruina, J. Papadopoulos, Wear 143, 1991.
     """
 

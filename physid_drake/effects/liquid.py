@@ -88,7 +88,7 @@ class Sloshing(Effect):
 class Swing:
     """Swinging mass: its place and velocity are the law's own state.
 
-    Over a tick the object is taken to keep its velocity and spin, on which the oscillator's motion is exact; the
+    Over a time step the object is taken to keep its velocity and spin, on which the oscillator's motion is exact; the
     object gets the momentum and the angular momentum that the oscillator loses. The spring's anchor is the centre of
     mass, and the damper opposes the motion that is seen from the turning object. Vectors are x + iy in W.
     """
@@ -96,7 +96,7 @@ class Swing:
     def __init__(self, mass: float, frequency: float, damping: float, load: float) -> None:
         """``mass`` kg, ``frequency`` rad/s, ``damping`` ratio, ``load`` on the base that moves with the mass [N]."""
         self.mass, self.frequency, self.damping, self.load = mass, frequency, damping, load
-        self._time, self._span = math.inf, 0.0  # of the tick that was looked at last; before any call
+        self._time, self._span = math.inf, 0.0  # of the time step that was looked at last; before any call
         # Of the swinging mass: place [m], velocity [m/s]; of the object at the last call: place, velocity, spin.
         self._place = self._velocity = self._from = self._anchor = 0j
         self._spin = 0.0
@@ -104,7 +104,7 @@ class Swing:
         self._wrench = Wrench(fx=0.0, fy=0.0, torque=0.0)
 
     def wrench(self, state: ObjectState) -> Wrench:
-        """The mean force over a tick, and what it shifts of the pressure."""
+        """The mean force over a time step, and what it shifts of the pressure."""
         if state.time < self._time:  # a rollout begins
             self._place, self._velocity = complex(*state.p_WBcm), complex(*state.v_WBcm)
         elif state.time > self._time:
@@ -122,7 +122,7 @@ class Swing:
 
     def _advance(self, state: ObjectState, span: float) -> None:
         """Move by what has passed since the last look."""
-        if span > 1.001 * self._span:  # more than its tick: the object stood still, and the rollout skipped it
+        if span > 1.001 * self._span:  # more than its time_step: the object stood still, and the rollout skipped it
             start = complex(*state.p_WBcm)
             offset, self._velocity = self._flow(self._place - start, self._velocity, 0.0, span)
             self._place = start + offset
@@ -132,7 +132,7 @@ class Swing:
         self._velocity -= span * self._force / self.mass
 
     def _look_ahead(self, state: ObjectState) -> None:
-        """The mean wrench of the next tick."""
+        """The mean wrench of the next time step."""
         self._from, self._anchor, self._spin = complex(*state.p_WBcm), complex(*state.v_WBcm), state.yaw_rate
         offset, rate = self._place - self._from, self._velocity - self._anchor
         later, slower = self._flow(offset, rate, self._spin, self._span)

@@ -30,7 +30,7 @@ class Pulse(Effect):
     width: float = 1.0
 
     def laws(self, facts: PushFacts) -> tuple[ForceLaw, ...]:
-        """The wrench at a tick's beginning."""
+        """The wrench at a time step's beginning."""
         del facts
         return (_PulseLaw(self),)
 

@@ -1,7 +1,7 @@
 """The effects' forces as a system of the cell's diagram, for users who simulate the diagram themselves.
 
-It calls the same laws as ``Cell.rollout``, and like it once for every tick, with the state that the tick begins with:
-a Python law that the solver evaluated and linearised within its steps would cost many times as much.
+It calls the same laws as ``Cell.rollout``, and like it once for every time step, with the state that the time step
+begins with: a Python law that the solver evaluated and linearised within its steps would cost many times as much.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class EffectForces(LeafSystem):
         self,
         scene: Scene,
         reader: StateReader,
-        tick: float,
+        time_step: float,
         laws: Sequence[ForceLaw],
         frictions: Sequence[FrictionLaw],
     ) -> None:
@@ -44,19 +44,19 @@ class EffectForces(LeafSystem):
         Args:
             scene: whose object is pushed.
             reader: sees the object's state.
-            tick: s.
+            time_step: s.
             laws: forces.
             frictions: friction laws; the contact must hold their largest friction.
         """
         LeafSystem.__init__(self)
         self.set_name(NAME)
-        self._reader, self._tick, self._laws, self._frictions = reader, tick, tuple(laws), tuple(frictions)
+        self._reader, self._time_step, self._laws, self._frictions = reader, time_step, tuple(laws), tuple(frictions)
         # A liquid has a motion of its own: it is the Context's, whose clones copy it; each simulation begins anew.
         self.DeclareAbstractState(AbstractValue.Make(self._fresh()))
         self.DeclareInitializationUnrestrictedUpdateEvent(self._begin)
         self._body = scene.object.index()
         self.DeclareVectorInputPort("object.state_estimated", 13)
-        self.DeclarePeriodicUnrestrictedUpdateEvent(tick, 0.0, self._advance)
+        self.DeclarePeriodicUnrestrictedUpdateEvent(time_step, 0.0, self._advance)
         # Of the state when the plant's step begins: held from the step before, a spring would gain energy.
         self.DeclareAbstractOutputPort(
             "object.force_commanded",
@@ -73,13 +73,13 @@ class EffectForces(LeafSystem):
         state.get_mutable_abstract_state(0).set_value(self._fresh())
 
     def _advance(self, context: Context, state: State) -> None:
-        """Let what moves with the laws move on by a tick."""
+        """Let what moves with the laws move on by a time step."""
         self._total(context, state.get_mutable_abstract_state(0).get_mutable_value())
 
     def _total(self, context: Context, laws: list[ForceLaw]) -> list[float]:
-        """Sum of the laws' wrenches over the next tick, of which laws with a motion of their own take a step."""
+        """Sum of the laws' wrenches over the next time step, of which laws with a motion of their own take a step."""
         x = self.get_input_port().Eval(context).tolist()
-        seen = self._reader.at(context.get_time(), self._tick, x[:7], x[7:])
+        seen = self._reader.at(context.get_time(), self._time_step, x[:7], x[7:])
         wrenches = total_wrenches(seen, laws, self._frictions)
         return [sum(parts) for parts in zip(*map(dc.astuple, wrenches), strict=True)]
 
@@ -97,7 +97,7 @@ def add_effect_forces(
     builder: DiagramBuilder,
     scene: Scene,
     body: Body,
-    tick: float,
+    time_step: float,
     laws: Sequence[ForceLaw],
     frictions: Sequence[FrictionLaw],
 ) -> EffectForces:
@@ -107,7 +107,7 @@ def add_effect_forces(
         builder: of the cell's diagram.
         scene: the cell's.
         body: the object's parameters, without the friction laws' surplus.
-        tick: s.
+        time_step: s.
         laws: forces.
         frictions: friction laws.
     """
@@ -115,7 +115,7 @@ def add_effect_forces(
     # Drake's step moves by the velocity at its end, not as a rollout does: see ``ObjectState.p_WBcm_held``. And it
     # is Drake's own, with the friction of its contact as it is.
     reader = dc.replace(reader_of(body, scene), lead=0.0, lifted=False)
-    system: EffectForces = builder.AddSystem(EffectForces(scene, reader, tick, laws, frictions))
+    system: EffectForces = builder.AddSystem(EffectForces(scene, reader, time_step, laws, frictions))
     builder.Connect(plant.get_state_output_port(scene.object.model_instance()), system.get_input_port())
     builder.Connect(system.get_output_port(), plant.get_applied_spatial_force_input_port())
     return system

@@ -1,8 +1,8 @@
 """The first story: theta from recorded pushes."""
 
 from physid_drake.identify.accuracy import Accuracy as Accuracy
-from physid_drake.identify.cells import CellsTold as CellsTold
 from physid_drake.identify.cells import Combination as Combination
+from physid_drake.identify.cells import IdentifiableCells as IdentifiableCells
 from physid_drake.identify.config import SearchConfig as SearchConfig
 from physid_drake.identify.estimates import Estimate as Estimate
 from physid_drake.identify.identify import Identification as Identification

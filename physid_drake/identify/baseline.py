@@ -12,11 +12,11 @@ from physid_drake.effects import tolerated
 from physid_drake.errors import RecordingError
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.hypothesis import Hypothesis
+from physid_drake.inference.multistart import reseated
 from physid_drake.inference.predictions import Predictor
 from physid_drake.inference.push import TAIL
 from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.inference.scores import columns
-from physid_drake.inference.seats import reseated
 from physid_drake.inference.unknown_noise import as_loud_as_left
 from physid_drake.pushes.case import Case
 
@@ -50,8 +50,8 @@ def _rolled_by(case: Case) -> tuple[Case, tuple[int, ...]]:
 
     def lost(predictor: Predictor, pushes: Sequence[int]) -> list[int]:
         for theta in thetas:
-            own = [np.zeros(len(n.names)) for n in case.nuisances]
-            asks = [Ask(i, Physics(np.asarray(theta)), own[i]) for i in pushes]
+            nuisance = [np.zeros(len(n.names)) for n in case.nuisances]
+            asks = [Ask(i, Physics(np.asarray(theta)), nuisance[i]) for i in pushes]
             pushes = [i for i, vector in zip(pushes, predictor.vectors(asks), strict=True) if vector is None]
         return list(pushes)
 
@@ -63,7 +63,7 @@ def _rolled_by(case: Case) -> tuple[Case, tuple[int, ...]]:
     return case, tuple(i for i, problem in enumerate(case.problems) if problem.name in names)
 
 
-def plain(case: Case) -> Hypothesis:
+def baseline_hypothesis(case: Case) -> Hypothesis:
     """The hypothesis without effects."""
     return Hypothesis(space=case.thetas.space, around=case.around)
 
@@ -74,7 +74,7 @@ def baseline(fitter: Fitter, rng: np.random.Generator, starts: Sequence[Array] =
     Raises:
         RecordingError: if none of them can be rolled out.
     """
-    hypothesis = plain(fitter.case)
+    hypothesis = baseline_hypothesis(fitter.case)
     space = hypothesis.space
     drawn = [*starts, *space.sample(rng, CANDIDATES - 1, from_prior=True)]
     zs = [hypothesis.mean, *(np.clip(space.to_unit(theta), *hypothesis.bounds) for theta in drawn)]
@@ -114,7 +114,7 @@ def with_tolerances(fitter: Fitter, fit: Fit) -> Fit:
     centre and clocks.
     """
     h, predictor = fit.hypothesis, fitter.predictor
-    predictor.with_directions(predictor.path_errors(fit.point.own, h.physics(fit.point.z)))
+    predictor.with_directions(predictor.path_errors(fit.point.nuisance, h.physics(fit.point.z)))
     fit = fitted_at(fitter, h, fit.point.z, fit)
     found = columns(fitter, fit, tolerated(fitter.case.around))
     slight = [c for c in found if c.coordinate.tolerance > 0.0 and c.family.size == 1.0]
@@ -127,7 +127,7 @@ def with_tolerances(fitter: Fitter, fit: Fit) -> Fit:
 
 
 def fitted_at(fitter: Fitter, h: Hypothesis, z: Array, near: Fit) -> Fit:
-    """A hypothesis fitted from a point that can be rolled out, with the pushes' unknowns of another fit."""
-    point = fitter.points([h], [z], [near.point.own])[0]
+    """A hypothesis fitted from a point that can be rolled out, with the per-push parameters of another fit."""
+    point = fitter.points([h], [z], [near.point.nuisance])[0]
     assert point is not None
     return fitter.fitted(fitter.started([h], [point], [None], TAIL), LAST)[0]

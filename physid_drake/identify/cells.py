@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from physid_drake.identify.estimates import TOLD
+from physid_drake.identify.estimates import MOST_PRIOR_LEFT
 from physid_drake.pushes.theta import ThetaMap, friction_names
 
 Array = NDArray[np.float64]
@@ -31,13 +31,13 @@ class Combination:
     left: float
 
     @property
-    def told(self) -> bool:
+    def identifiable(self) -> bool:
         """Whether the pushes halve what the prior leaves open."""
-        return self.left < TOLD
+        return self.left < MOST_PRIOR_LEFT
 
 
 @dc.dataclass(frozen=True, kw_only=True)
-class CellsTold:
+class IdentifiableCells:
     """What pushes tell about the friction of the cells.
 
     Attributes:
@@ -45,8 +45,8 @@ class CellsTold:
         names: (n,) of the cells that are unknowns.
         friction: (n,) estimates [-].
         left: (n,) share of the prior's standard deviation of ln friction that is left of each cell.
-        combinations: n of them, independent of one another, told best first.
-        apart: pairs of neighbouring cells whose ratio of frictions is told.
+        combinations: n of them, independent of one another, best identified first.
+        apart: pairs of neighbouring cells whose ratio of frictions is identifiable.
         not_apart: pairs whose ratio is not.
     """
 
@@ -59,12 +59,12 @@ class CellsTold:
     not_apart: tuple[tuple[str, str], ...]
 
     @property
-    def told(self) -> int:
-        """Number of combinations that are told."""
-        return sum(c.told for c in self.combinations)
+    def identifiable(self) -> int:
+        """Number of combinations that are identifiable."""
+        return sum(c.identifiable for c in self.combinations)
 
 
-def cells_told(thetas: ThetaMap, theta: Array, prior: Array, posterior: Array) -> CellsTold | None:
+def identifiable_cells(thetas: ThetaMap, theta: Array, prior: Array, posterior: Array) -> IdentifiableCells | None:
     """What a fit tells about the cells; None without a grid.
 
     Args:
@@ -92,9 +92,9 @@ def cells_told(thetas: ThetaMap, theta: Array, prior: Array, posterior: Array) -
         if _neighbours(grid[a], grid[b]):
             way = np.zeros(len(grid))
             way[a], way[b] = 1.0, -1.0
-            told = math.sqrt((way @ posterior @ way) / (way @ prior @ way)) < TOLD
-            (apart if told else not_apart).append((grid[a], grid[b]))
-    return CellsTold(
+            identifiable = math.sqrt((way @ posterior @ way) / (way @ prior @ way)) < MOST_PRIOR_LEFT
+            (apart if identifiable else not_apart).append((grid[a], grid[b]))
+    return IdentifiableCells(
         grid=thetas.cells,
         names=tuple(grid),
         friction=np.asarray(theta[at]),

@@ -16,7 +16,7 @@ from physid_drake.space import Parameter, ParameterSpace
 Array = NDArray[np.float64]
 
 Z90 = float(stats.norm.ppf(0.95))
-TOLD = 0.5  # share of the prior's standard deviation that may be left of what counts as told
+MOST_PRIOR_LEFT = 0.5  # share of the prior's standard deviation that may be left of what counts as identifiable
 AT_BOUND = 2e-3  # of the unit cube
 
 
@@ -27,8 +27,8 @@ class Estimate:
     Attributes:
         name, unit: which.
         value: best estimate.
-        ci90: 90 % interval; of what is not told, no wider than the prior's.
-        identifiable: whether the pushes leave at most half of the prior's spread (``TOLD``).
+        ci90: 90 % interval; of what is not identifiable, no wider than the prior's.
+        identifiable: whether the pushes leave at most half of the prior's spread (``MOST_PRIOR_LEFT``).
         prior: its value before.
         at_bound: whether it ran into a bound that is none of physics: the truth may lie beyond.
     """
@@ -49,7 +49,7 @@ def t_factor(fit: Fit) -> float:
 
 
 def estimates_of(fitter: Fitter, fit: Fit) -> tuple[Estimate, ...]:
-    """Theta under a model: by the curvature of its likelihood, the pushes' own unknowns integrated out.
+    """Theta under a model: by the curvature of its likelihood, the per-push parameters integrated out.
 
     As wide as a Student t of so few pushes has it, and no narrower than the cell's own error, which pushes share.
     """
@@ -58,15 +58,15 @@ def estimates_of(fitter: Fitter, fit: Fit) -> tuple[Estimate, ...]:
     stds = np.sqrt(np.diag(fitter.covariance(fit)))
     made = []
     for j, parameter in enumerate(space.parameters):
-        told = bool(stds[j] < TOLD * h.std[j])
-        if told or parameter.prior_std is not None:
+        narrowed = bool(stds[j] < MOST_PRIOR_LEFT * h.std[j])
+        if narrowed or parameter.prior_std is not None:
             reach = Z90 * min(math.hypot(t_factor(fit) * stds[j], cell_error(space, here, j)), h.std[j])
             ends = max(0.0, u[j] - reach), min(1.0, u[j] + reach)
         else:
             ends = min(0.05, u[j]), max(0.95, u[j])  # of a uniform prior, and where the value is
         low, high = (_moved(space, u, j, end) for end in ends)
         made.append(Estimate(
-            name=parameter.name, unit=parameter.unit, value=float(here[j]), ci90=(low, high), identifiable=told,
+            name=parameter.name, unit=parameter.unit, value=float(here[j]), ci90=(low, high), identifiable=narrowed,
             prior=parameter.prior_mean, at_bound=_may_lie_beyond(parameter, float(u[j])),
         ))  # fmt: skip
     return tuple(made)

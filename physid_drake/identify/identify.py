@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import CellConfig
 from physid_drake.identify.accuracy import Accuracy, accuracy_of
 from physid_drake.identify.baseline import baseline, fitter_of, with_tolerances
-from physid_drake.identify.cells import CellsTold, cells_told
+from physid_drake.identify.cells import IdentifiableCells, identifiable_cells
 from physid_drake.identify.config import SearchConfig
 from physid_drake.identify.estimates import Estimate, estimates_of
 from physid_drake.identify.judge import Judge
@@ -30,7 +30,7 @@ from physid_drake.search import SearchResult
 Array = NDArray[np.float64]
 
 EXPLAINED = 1.5  # reduced chi-square below which the baseline model leaves no more than noise and its own error
-MOST_SCATTER = 0.08  # of friction from push to push: pushes that differ by more differ in something that is left out
+MOST_SCATTER = 0.08  # of friction from push to push: pushes that differ by more differ in something that is held out
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,7 +40,7 @@ class Identification:
     Attributes:
         case: the pushes.
         fitter: whose predictions they are judged by.
-        fit: theta, and each push's own unknowns.
+        fit: theta, and each push's nuisance parameters.
         found: the same where it was found, on the twin; a diagnosis goes on from it.
         finder: that found it.
         search: the search's result, whose belief holds P_min; None where there was none.
@@ -88,11 +88,11 @@ class Identification:
         return np.asarray(self.covariance / np.outer(stds, stds))
 
     @cached_property
-    def cells(self) -> CellsTold | None:
+    def cells(self) -> IdentifiableCells | None:
         """What the pushes tell about friction cells; None without a grid of them."""
         d, h = self.fit.hypothesis.space.dimension, self.fit.hypothesis
         prior = np.linalg.inv(h.precision[:d, :d])
-        return cells_told(self.case.thetas, self.theta, np.asarray(prior), self.covariance)
+        return identifiable_cells(self.case.thetas, self.theta, np.asarray(prior), self.covariance)
 
     @property
     def pushes(self) -> tuple[str, ...]:
@@ -123,7 +123,7 @@ class Identification:
 
     @cached_property
     def fitted(self) -> Accuracy:
-        """Accuracy of the fit, each push's own unknowns at their likeliest."""
+        """Accuracy of the fit, each push's nuisance parameters at their likeliest."""
         predictor = self.fitter.predictor
         pairs = zip(predictor.recorded, self.fit.point.predicted, predictor.whitening, strict=True)
         return accuracy_of(self.case, [np.asarray(np.linalg.solve(w, y - f)) for y, f, w in pairs])
@@ -160,13 +160,13 @@ class Identification:
 
 
 def unknowns_of(case: Case, fit: Fit) -> dict[str, dict[str, float]]:
-    """Each push's own unknowns, by its name, in their units."""
-    triples = zip(case.problems, case.nuisances, fit.point.own, strict=True)
-    return {push.name: dict(zip(n.names, (own * n.stds).tolist(), strict=True)) for push, n, own in triples}
+    """Each push's nuisance parameters, by its name, in their units."""
+    triples = zip(case.problems, case.nuisances, fit.point.nuisance, strict=True)
+    return {push.name: dict(zip(n.names, (nuisance * n.stds).tolist(), strict=True)) for push, n, nuisance in triples}
 
 
 def identified(
-    case: Case, *, seed: int, search: ThetaSearch | None = None, tick: Progress | None = None
+    case: Case, *, seed: int, search: ThetaSearch | None = None, progress: Progress | None = None
 ) -> Identification:
     """Identify theta: search, many starts of a fit on the twin, and what the Drake cell says of the best.
 
@@ -174,12 +174,12 @@ def identified(
         case: the pushes.
         seed: of the starts.
         search: whose best theta is a start, too; None goes without.
-        tick: told stage, steps done, steps in all.
+        progress: called with the stage, steps done, steps in all.
 
     Raises:
         RecordingError: if no push can be rolled out.
     """
-    say: Progress = tick or (lambda stage, done, total: None)
+    say: Progress = progress or (lambda stage, done, total: None)
     say("parameter fit" if search is None else "parameter search", 0, 0)  # what is compiled, is compiled here
     finder = fitter_of(case, seed)
     best = None if search is None else search.run(finder)
@@ -189,7 +189,7 @@ def identified(
 
 
 def identified_with(
-    known: Identification, rough: ProcessNoise, added: Sequence[Array], *, seed: int, tick: Progress
+    known: Identification, rough: ProcessNoise, added: Sequence[Array], *, seed: int, progress: Progress
 ) -> Identification:
     """The same with process noise beside the sensors'.
 
@@ -198,10 +198,10 @@ def identified_with(
         rough: the process noise.
         added: what it adds to each push's noise, as ``process_noise.learned`` has it.
         seed: of the starts.
-        tick: told the stage.
+        progress: called with the stage.
     """
     finder = Fitter(known.case, known.finder.predictor.noisier(added))
-    again = _identified(finder, seed, [known.theta], known.search, rough, tick)
+    again = _identified(finder, seed, [known.theta], known.search, rough, progress)
     return dc.replace(again, before=known.before, foreseen=known.foreseen)
 
 
@@ -211,10 +211,10 @@ def _identified(
     starts: Sequence[Array],
     search: SearchResult | None,
     rough: ProcessNoise,
-    tick: Progress,
+    progress: Progress,
 ) -> Identification:
     found = with_tolerances(finder, baseline(finder, np.random.default_rng(seed), starts))
-    tick("refit in the Drake cell", 0, 0)
+    progress("refit in the Drake cell", 0, 0)
     return in_the_cell(Identification(
         case=finder.case, fitter=finder, fit=found, found=found, finder=finder, search=search, rough=rough,
     ))  # fmt: skip
@@ -264,7 +264,7 @@ class Identifier:
             most: pushes to look at; of more, so many are taken at equal distances.
 
         Raises:
-            RecordingError: if the recording cannot be identified from; ``pushes/refusals.py`` has all reasons.
+            RecordingError: if the recording cannot be identified from; ``pushes/push_checks.py`` has all reasons.
         """
         self.case = case_of(recording, cell, theta, jobs=search.jobs, most=most)
         self._search, self._seed, self._state = search, seed, state
@@ -273,7 +273,7 @@ class Identifier:
         """Search, fit, judge.
 
         Args:
-            progress: told stage, steps done, steps in all.
+            progress: called with the stage, steps done, steps in all.
 
         Raises:
             KeyboardInterrupt: when interrupted; the search's state is kept, and a new run goes on from it.
@@ -281,4 +281,4 @@ class Identifier:
         say: Progress = progress or (lambda stage, done, total: None)
         rng = np.random.default_rng(np.random.SeedSequence(self._seed).spawn(2)[1])
         search = ThetaSearch(self._search, rng, self._state, say)
-        return with_prior(identified(self.case, seed=self._seed, search=search, tick=say))
+        return with_prior(identified(self.case, seed=self._seed, search=search, progress=say))

@@ -20,7 +20,7 @@ from physid_drake.pushes.problem import spec_of
 
 Array = NDArray[np.float64]
 
-TICK, LONGEST_TICK = 5e-4, 1e-3  # s: of the judge; of a hand that is not slow
+TIME_STEP, LONGEST_TIME_STEP = 5e-4, 1e-3  # s: of the judge; of a hand that is not slow
 HAND_FREQUENCY, REST_DEPTH, STICTION = 3000.0, 3e-7, 1e-5  # rad/s, m, m/s: a contact that hardly gives
 STEPS, SETTLED = 2, 0.3  # at most; of log likelihood: a step that gained less is the last
 
@@ -40,13 +40,13 @@ class Judge:
 
     def judged(self, fit: Fit) -> Fit:
         """The fit where the cell likes it best, with what the cell predicts there."""
-        h, point = fit.hypothesis, self.fitter.points([fit.hypothesis], [fit.point.z], [fit.point.own])[0]
+        h, point = fit.hypothesis, self.fitter.points([fit.hypothesis], [fit.point.z], [fit.point.nuisance])[0]
         if point is None:  # the cell cannot roll it out: what the twin says stands
             return fit
         best = self.fitter.seen_at(fit, point)
         for _ in range(STEPS):
-            z, own = self.fitter.step(best)
-            moved = self.fitter.points([h], [z], [own])[0]
+            z, nuisance = self.fitter.step(best)
+            moved = self.fitter.points([h], [z], [nuisance])[0]
             if moved is None:
                 break
             other = self.fitter.seen_at(best, moved)
@@ -79,14 +79,16 @@ class Judge:
 
 
 def stiff(config: CellConfig) -> CellConfig:
-    """A cell whose contacts hardly give; of a hand so slow that ticks are long, the cell as it is."""
+    """A cell whose contacts hardly give; of a hand so slow that time steps are long, the cell as it is."""
     solver, contact = config.solver, config.contact
-    if solver.time_step_s > LONGEST_TICK:
+    if solver.time_step_s > LONGEST_TIME_STEP:
         return config
-    tick = min(TICK, solver.time_step_s)
+    time_step = min(TIME_STEP, solver.time_step_s)
     return dc.replace(
         config,
-        solver=dc.replace(solver, time_step_s=tick, slide_time_step_s=min(2.0 * tick, solver.slide_time_step_s)),
+        solver=dc.replace(
+            solver, time_step_s=time_step, slide_time_step_s=min(2.0 * time_step, solver.slide_time_step_s)
+        ),
         contact=dc.replace(
             contact, hand_frequency_rad_s=HAND_FREQUENCY, rest_depth_m=REST_DEPTH, stiction_tolerance_mps=STICTION
         ),

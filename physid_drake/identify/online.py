@@ -21,7 +21,7 @@ from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.progress import Progress
 from physid_drake.pushes.case import Case, case_of, theta_space
 from physid_drake.pushes.config import ThetaConfig
-from physid_drake.pushes.refusals import refuse
+from physid_drake.pushes.push_checks import refuse
 from physid_drake.pushes.theta import ThetaMap
 from physid_drake.recording import Push, Recording
 from physid_drake.search import SearchResult, search_minimum, search_named
@@ -43,7 +43,7 @@ class OnlineBelief:
         space: of theta.
         pushes: so far.
         finder: fits them; None before a push in which the object moves.
-        fit: theta, and each push's own unknowns.
+        fit: theta, and each push's nuisance parameters.
         search: of the newest push, over candidates drawn from P_{t-1}. None before the first push.
         foreseen: recorded less predicted of each push before it was learned from; by its name.
         rollouts: made so far.
@@ -118,10 +118,10 @@ class OnlineIdentifier:
             search: its method and number of processes; the other numbers are those of the batch search.
             seed: of everything random.
             budget: trials of the search on a new push.
-            progress: told stage, steps done, steps in all.
+            progress: called with the stage, steps done, steps in all.
 
         Raises:
-            RecordingError: if the recording cannot be learned from; ``pushes/refusals.py`` has all reasons.
+            RecordingError: if the recording cannot be learned from; ``pushes/push_checks.py`` has all reasons.
         """
         refuse(recording)
         self.thetas: ThetaMap = theta_space(recording.object, solid_of(recording.object.shape), cell, theta)
@@ -198,12 +198,12 @@ class OnlineIdentifier:
         last, before = belief.fit, belief.finder
         if last is None or before is None:
             return baseline(finder, rng, trials)
-        known = {p.name: own for p, own in zip(before.case.problems, last.point.own, strict=True)}
+        known = {p.name: nuisance for p, nuisance in zip(before.case.problems, last.point.nuisance, strict=True)}
         rests = finder.at_rest()
-        owns = tuple(known.get(p.name, rest) for p, rest in zip(finder.case.problems, rests, strict=True))
+        nuisances = tuple(known.get(p.name, rest) for p, rest in zip(finder.case.problems, rests, strict=True))
         h = dc.replace(last.hypothesis, around=finder.case.around, tolerances=0)
         zs = [belief.mean, *(np.clip(belief.space.to_unit(theta), *h.bounds) for theta in trials)]
-        points = [p for p in finder.points([h] * len(zs), zs, [owns] * len(zs)) if p is not None]
+        points = [p for p in finder.points([h] * len(zs), zs, [nuisances] * len(zs)) if p is not None]
         if not points:
             return baseline(finder, rng, trials)
         begun = finder.robust(finder.started([h] * len(points), points, [None] * len(points)))

@@ -30,17 +30,19 @@ class ThetaSearch:
     physics engines with application to robotic manipulation", 2017, section III.
     """
 
-    def __init__(self, config: SearchConfig, rng: np.random.Generator, state: Path | None, tick: Progress) -> None:
+    def __init__(
+        self, config: SearchConfig, rng: np.random.Generator, state: Path | None, progress: Progress
+    ) -> None:
         """Prepare.
 
         Args:
             config: of the search.
             rng: draws the candidates, and the search's own numbers.
             state: where its belief is kept; None keeps it nowhere.
-            tick: told stage, trials done, trials in all.
+            progress: called with the stage, trials done, trials in all.
         """
         self._config, self._chooser = config, search_named(config.method)
-        self._rng, self._state, self._tick = rng, state, tick
+        self._rng, self._state, self._progress = rng, state, progress
 
     def run(self, fitter: Fitter) -> SearchResult:
         """The theta with the least log of the rms misfit: its minimum is the misfit's, and it spans decades."""
@@ -59,7 +61,7 @@ class ThetaSearch:
 
     def _keep(self, belief: Belief) -> None:
         """Written beside and renamed, so that an interruption leaves the last whole one; a full disk ends no run."""
-        self._tick("parameter search", belief.n_trials, self._config.budget)
+        self._progress("parameter search", belief.n_trials, self._config.budget)
         if self._state is None:
             return
         try:
@@ -82,12 +84,12 @@ class ThetaSearch:
         return belief if begun else None
 
 
-def log_misfits(predictor: Predictor, pushes: Sequence[int], owns: Sequence[Array], thetas: Array) -> Array:
+def log_misfits(predictor: Predictor, pushes: Sequence[int], nuisances: Sequence[Array], thetas: Array) -> Array:
     """Log of the rms error (k,) of some pushes at thetas (k, d), in standard deviations.
 
     Of what came to an end, if most did: a push that diverges at every theta must not hide the others.
     """
-    vectors = iter(predictor.vectors([Ask(i, Physics(theta), owns[i]) for theta in thetas for i in pushes]))
+    vectors = iter(predictor.vectors([Ask(i, Physics(theta), nuisances[i]) for theta in thetas for i in pushes]))
     costs = []
     for _ in thetas:
         found = [(predictor.recorded[i], next(vectors)) for i in pushes]

@@ -1,4 +1,4 @@
-"""Fits of many hypotheses at once: bounded Levenberg-Marquardt over z and all pushes' own unknowns."""
+"""Fits of many hypotheses at once: bounded Levenberg-Marquardt over z and all per-push parameters."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from physid_drake.inference.push import (
     Weighed,
     cost_of,
     held_out,
-    loudness_of,
+    noise_scale_of,
     weighed,
     without,
 )
 from physid_drake.inference.rollouts import Ask
 from physid_drake.inference.scatter import SCATTERS, log_prior_of_scatter
-from physid_drake.inference.slopes import own_slopes, own_steps, slope
+from physid_drake.inference.slopes import nuisance_slopes, nuisance_steps, slope
 from physid_drake.pushes.case import Case
 
 Array = NDArray[np.float64]
-Own = tuple[Array, ...]
+Nuisances = tuple[Array, ...]
 
 MOST_OWN, MOST_FRICTION = 3.0, 8.0  # standard deviations: unknowns go no further out
 MOST_THETA_MOVE = 0.25  # of the unit cube in one step
@@ -46,12 +46,12 @@ class Point:
 
     Attributes:
         z: (n,).
-        own: each push's unknowns (k,).
+        nuisance: each push's nuisance parameters (k,).
         predicted: each push's whitened features (m,).
     """
 
     z: Array
-    own: Own
+    nuisance: Nuisances
     predicted: tuple[Array, ...]
 
 
@@ -64,10 +64,10 @@ class Fit:
         point: where.
         pushes: linearised at it.
         scatter: of friction, push to push, in units of the columns'.
-        loudness: how many times as large as noise errors are; 1 of a hypothesis that explains the pushes.
+        noise_scale: how many times as large as noise errors are; 1 of a hypothesis that explains the pushes.
         tail: degrees of freedom of a push's errors.
         weighed: the pushes with their unknowns integrated out.
-        cost: of the point: twice the negative log posterior of z and the pushes' unknowns, but for a constant.
+        cost: of the point: twice the negative log posterior of z and the per-push parameters, but for a constant.
         damping: of the next step.
         done: whether steps gain nothing any more.
     """
@@ -76,7 +76,7 @@ class Fit:
     point: Point
     pushes: tuple[LinearPush, ...]
     scatter: float
-    loudness: float
+    noise_scale: float
     tail: float
     weighed: tuple[Weighed, ...]
     cost: float
@@ -85,7 +85,7 @@ class Fit:
 
     @property
     def log_likelihood(self) -> float:
-        """Marginal over the pushes' unknowns, with the priors of z and scatter."""
+        """Marginal over the per-push parameters, with the priors of z and scatter."""
         z, h = self.point.z, self.hypothesis
         prior = -0.5 * h.surprise(z) + log_prior_of_scatter(self.scatter)
         return sum(one.log_density for one in self.weighed) + prior
@@ -123,44 +123,48 @@ class Fitter:
         self.tolerances = tuple(columns)
 
     def priors(self, scatter: float) -> list[Array]:
-        """Standard deviations (k,) of each push's unknowns."""
+        """Standard deviations (k,) of each push's nuisance parameters."""
         return [np.where(np.array(n.names) == "friction", scatter, 1.0) for n in self.case.nuisances]
 
-    def at_rest(self) -> Own:
-        """All pushes' unknowns at zero."""
+    def at_rest(self) -> Nuisances:
+        """All per-push parameters at zero."""
         return tuple(np.zeros(len(n.names)) for n in self.case.nuisances)
 
     def points(
-        self, hypotheses: Sequence[Hypothesis], zs: Sequence[Array], owns: Sequence[Own]
+        self, hypotheses: Sequence[Hypothesis], zs: Sequence[Array], nuisances: Sequence[Nuisances]
     ) -> list[Point | None]:
-        """What hypotheses predict at z with the pushes' unknowns; None where the twin cannot say it of a push."""
+        """What hypotheses predict at z with the per-push parameters; None where the twin cannot say it of a push."""
         asks = []
-        for h, z, own in zip(hypotheses, zs, owns, strict=True):
+        for h, z, nuisance in zip(hypotheses, zs, nuisances, strict=True):
             physics = h.physics(z)
-            asks += [Ask(i, physics, own[i]) for i in range(self.count)]
+            asks += [Ask(i, physics, nuisance[i]) for i in range(self.count)]
         vectors = iter(self.predictor.vectors(asks))
         points: list[Point | None] = []
-        for h, z, own in zip(hypotheses, zs, owns, strict=True):
+        for h, z, nuisance in zip(hypotheses, zs, nuisances, strict=True):
             found = [next(vectors) for _ in range(self.count)]
             predicted = tuple(
                 vector + more @ z[h.simulated :]
                 for vector, more in zip(found, self.tolerances, strict=True)
                 if vector is not None
             )
-            points.append(Point(z=z, own=own, predicted=predicted) if len(predicted) == self.count else None)
+            points.append(
+                Point(z=z, nuisance=nuisance, predicted=predicted) if len(predicted) == self.count else None
+            )
         return points
 
-    def cost(self, hypothesis: Hypothesis, point: Point, scatter: float, loudness: float, tail: float) -> float:
-        """Twice the negative log posterior of z and the pushes' unknowns, but for a constant."""
+    def cost(self, hypothesis: Hypothesis, point: Point, scatter: float, noise_scale: float, tail: float) -> float:
+        """Twice the negative log posterior of z and the per-push parameters, but for a constant."""
         total = hypothesis.surprise(point.z)
         for i, prior in enumerate(self.priors(scatter)):
-            total += self.cost_of_push(i, point.own[i], point.predicted[i], prior, loudness, tail)
+            total += self.cost_of_push(i, point.nuisance[i], point.predicted[i], prior, noise_scale, tail)
         return total
 
-    def cost_of_push(self, i: int, own: Array, predicted: Array, prior: Array, loudness: float, tail: float) -> float:
+    def cost_of_push(
+        self, i: int, nuisance: Array, predicted: Array, prior: Array, noise_scale: float, tail: float
+    ) -> float:
         """The part of the cost that is push i's."""
         error = self.predictor.recorded[i] - predicted
-        return cost_of(float(error @ error), len(error), loudness, tail) + float(np.sum((own / prior) ** 2))
+        return cost_of(float(error @ error), len(error), noise_scale, tail) + float(np.sum((nuisance / prior) ** 2))
 
     def roughly(self, point: Point) -> float:
         """How far a point is from the recording, for rankings: pushes that are far off count by their logarithm."""
@@ -185,14 +189,14 @@ class Fitter:
         Args:
             hypotheses: of each point.
             points: where.
-            like: fits whose derivatives by the pushes' own unknowns are near enough; None takes them anew.
+            like: fits whose derivatives by the per-push parameters are near enough; None takes them anew.
             tail: degrees of freedom of a push's errors.
             theta: take derivatives by theta anew beside such a fit, too.
         """
         asks: list[Ask] = []
         kept = [0 if theta or near is None else h.space.dimension for h, near in zip(hypotheses, like, strict=True)]
         for h, point, near, skipped in zip(hypotheses, points, like, kept, strict=True):
-            asks += self._asks(h, point, skipped, own=near is None)
+            asks += self._asks(h, point, skipped, nuisance=near is None)
         vectors = iter(self.predictor.vectors(asks))
         return [
             self._found(h, point, self._linear(h, point, vectors, near, skipped), near, tail)
@@ -208,8 +212,8 @@ class Fitter:
         """The fits with pushes that have heavy tails."""
         return [self._found(fit.hypothesis, fit.point, fit.pushes, fit, TAIL) for fit in fits]
 
-    def _asks(self, h: Hypothesis, point: Point, skipped: int, *, own: bool) -> list[Ask]:
-        """One rollout per push for a step of each coordinate that is simulated, and for each of its own unknowns.
+    def _asks(self, h: Hypothesis, point: Point, skipped: int, *, nuisance: bool) -> list[Ask]:
+        """One rollout per push for a step of each coordinate that is simulated, and of each per-push parameter.
 
         Not for the first coordinates, so many of which are skipped.
         """
@@ -221,8 +225,8 @@ class Fitter:
         here = h.physics(point.z)
         asks = []
         for i in range(self.count):
-            asks += [Ask(i, physics, point.own[i]) for physics in moved]
-            asks += [Ask(i, here, seat) for seat in own_steps(point.own[i])] if own else []
+            asks += [Ask(i, physics, point.nuisance[i]) for physics in moved]
+            asks += [Ask(i, here, seat) for seat in nuisance_steps(point.nuisance[i])] if nuisance else []
         return asks
 
     def _linear(
@@ -235,31 +239,35 @@ class Fitter:
             moved = [slope(base, next(vectors), size) for size in h.steps(point.z)[skipped:]]
             known = [] if near is None else [near.pushes[i].shared[:, :skipped]]
             shared = np.column_stack([*known, *moved, more])
-            own = near.pushes[i].own if near is not None else own_slopes(base, point.own[i], vectors)
-            residual = self.predictor.recorded[i] - whole + own @ point.own[i]
-            pushes.append(LinearPush(residual=residual, shared=shared, own=own))
+            nuisance = (
+                near.pushes[i].nuisance if near is not None else nuisance_slopes(base, point.nuisance[i], vectors)
+            )
+            residual = self.predictor.recorded[i] - whole + nuisance @ point.nuisance[i]
+            pushes.append(LinearPush(residual=residual, shared=shared, nuisance=nuisance))
         return tuple(pushes)
 
     def _found(
         self, h: Hypothesis, point: Point, pushes: tuple[LinearPush, ...], near: Fit | None, tail: float
     ) -> Fit:
-        """The fit with its scatter, searched for from that of a fit that is near, and its loudness."""
+        """The fit with its scatter, searched for from that of a fit that is near, and its noise scale."""
         counts = [len(push.residual) for push in pushes]
-        errors = [push.residual - push.own @ own for push, own in zip(pushes, point.own, strict=True)]
-        loudness = loudness_of([float(e @ e) for e in errors], counts, self.least, tail)
+        errors = [
+            push.residual - push.nuisance @ nuisance for push, nuisance in zip(pushes, point.nuisance, strict=True)
+        ]
+        noise_scale = noise_scale_of([float(e @ e) for e in errors], counts, self.least, tail)
         best = MIDDLE if near is None else SCATTERS.index(near.scatter)
         for _ in range(2):
-            best, found = self._scattered(h, point, pushes, best, loudness, tail)
-            loudness = loudness_of([one.square for one in found], counts, self.least, tail)
+            best, found = self._scattered(h, point, pushes, best, noise_scale, tail)
+            noise_scale = noise_scale_of([one.square for one in found], counts, self.least, tail)
         scatter = SCATTERS[best]
         return Fit(
-            hypothesis=h, point=point, pushes=pushes, scatter=scatter, loudness=loudness, tail=tail,
-            weighed=self._weighed(pushes, scatter, loudness, tail),
-            cost=self.cost(h, point, scatter, loudness, tail),
+            hypothesis=h, point=point, pushes=pushes, scatter=scatter, noise_scale=noise_scale, tail=tail,
+            weighed=self._weighed(pushes, scatter, noise_scale, tail),
+            cost=self.cost(h, point, scatter, noise_scale, tail),
         )  # fmt: skip
 
     def _scattered(
-        self, h: Hypothesis, point: Point, pushes: Sequence[LinearPush], start: int, loudness: float, tail: float
+        self, h: Hypothesis, point: Point, pushes: Sequence[LinearPush], start: int, noise_scale: float, tail: float
     ) -> tuple[int, tuple[Weighed, ...]]:
         """The likeliest scatter's place in the grid, uphill from a start, and the pushes weighed with it."""
         values: dict[int, tuple[float, tuple[Weighed, ...]]] = {}
@@ -268,7 +276,7 @@ class Fitter:
             last = best
             for k in (best - 1, best, best + 1):
                 if 0 <= k < len(SCATTERS) and k not in values:
-                    found = self._weighed(pushes, SCATTERS[k], loudness, tail)
+                    found = self._weighed(pushes, SCATTERS[k], noise_scale, tail)
                     precision, right = normal_equations(found, h.mean - point.z, h.precision)
                     gained = 0.5 * float(right @ bounded(precision, right, None))  # when z has moved
                     likelihood = sum(one.log_density for one in found)
@@ -277,10 +285,10 @@ class Fitter:
         return best, values[best][1]
 
     def _weighed(
-        self, pushes: Sequence[LinearPush], scatter: float, loudness: float, tail: float
+        self, pushes: Sequence[LinearPush], scatter: float, noise_scale: float, tail: float
     ) -> tuple[Weighed, ...]:
         return tuple(
-            weighed(push.residual, push.shared, push.own, prior, loudness, tail)
+            weighed(push.residual, push.shared, push.nuisance, prior, noise_scale, tail)
             for push, prior in zip(pushes, self.priors(scatter), strict=True)
         )
 
@@ -292,7 +300,7 @@ class Fitter:
         Args:
             fits: where they are.
             rounds: at most.
-            roughly: keep the derivatives by theta and by the pushes' own unknowns, however far a step leads.
+            roughly: keep the derivatives by theta and by the per-push parameters, however far a step leads.
         """
         now = list(fits)
         for _ in range(rounds):
@@ -304,7 +312,7 @@ class Fitter:
     def _stepped(self, fits: Sequence[Fit], *, roughly: bool) -> list[Fit]:
         """One step of each fit: the better point, linearised, or the same fit with shorter steps to come."""
         steps = [self.step(fit) for fit in fits]
-        points = self.points([f.hypothesis for f in fits], [z for z, _ in steps], [own for _, own in steps])
+        points = self.points([f.hypothesis for f in fits], [z for z, _ in steps], [nuisance for _, nuisance in steps])
         results, better = list(fits), list[tuple[int, Point, Fit | None]]()
         for k, (fit, point) in enumerate(zip(fits, points, strict=True)):
             cost = math.inf if point is None else self._cost_as(fit, point)
@@ -324,15 +332,15 @@ class Fitter:
         return results
 
     def _cost_as(self, fit: Fit, point: Point) -> float:
-        """Of another point, with a fit's scatter and loudness."""
-        return self.cost(fit.hypothesis, point, fit.scatter, fit.loudness, fit.tail)
+        """Of another point, with a fit's scatter and noise scale."""
+        return self.cost(fit.hypothesis, point, fit.scatter, fit.noise_scale, fit.tail)
 
     def _reach(self, h: Hypothesis) -> Array:
         """How far (n,) a step goes: shapes (a place, a speed) no further than their prior says they are unsure."""
         of_theta, free = np.full(h.space.dimension, MOST_THETA_MOVE), np.full(h.tolerances, np.inf)
         return np.concatenate([of_theta, [c.std for c in h.coordinates], free])
 
-    def step(self, fit: Fit) -> tuple[Array, Own]:
+    def step(self, fit: Fit) -> tuple[Array, Nuisances]:
         """Where a damped Gauss-Newton step leads, within bounds."""
         h, point = fit.hypothesis, fit.point
         precision, right = normal_equations(fit.weighed, h.mean - point.z, h.precision)
@@ -340,11 +348,11 @@ class Fitter:
         reach = self._reach(h)
         least, most = np.maximum(h.bounds[0] - point.z, -reach), np.minimum(h.bounds[1] - point.z, reach)
         dz = bounded(damped, right, (least, most))
-        own = tuple(
-            np.clip(one.own + one.to_own @ dz, -furthest, furthest)
+        nuisance = tuple(
+            np.clip(one.nuisance + one.to_nuisance @ dz, -furthest, furthest)
             for one, furthest in zip(fit.weighed, self.most, strict=True)
         )
-        return np.clip(point.z + dz, *h.bounds), own
+        return np.clip(point.z + dz, *h.bounds), nuisance
 
     def held_out(self, fit: Fit, folds: Sequence[Sequence[int]] | None = None) -> Array:
         """Log predictive density (n,) of each push given the others, or given those outside its fold.
@@ -354,7 +362,7 @@ class Fitter:
         """
         h = fit.hypothesis
         scores = held_out(
-            fit.pushes, self.priors(fit.scatter), h.mean - fit.point.z, h.precision, fit.loudness, fit.weighed,
+            fit.pushes, self.priors(fit.scatter), h.mean - fit.point.z, h.precision, fit.noise_scale, fit.weighed,
             fit.tail, folds,
         )  # fmt: skip
         known = (h.whitening @ (fit.point.z - h.mean))[h.known]
@@ -371,17 +379,24 @@ class Fitter:
     def seen_at(self, fit: Fit, point: Point) -> Fit:
         """A fit at another point of its hypothesis, with the derivatives that it has."""
         pushes = tuple(
-            dc.replace(push, residual=y - f + push.own @ own)
-            for push, y, f, own in zip(fit.pushes, self.predictor.recorded, point.predicted, point.own, strict=True)
+            dc.replace(push, residual=y - f + push.nuisance @ nuisance)
+            for push, y, f, nuisance in zip(
+                fit.pushes, self.predictor.recorded, point.predicted, point.nuisance, strict=True
+            )
         )
         return self._found(fit.hypothesis, point, pushes, fit, fit.tail)
 
     def frictions(self, fit: Fit) -> Array:
         """Each push's own share (n,) of friction beside what all share, in units of the columns' scatter."""
-        return np.array([own[n.index("friction")] for own, n in zip(fit.point.own, self.case.nuisances, strict=True)])
+        return np.array(
+            [
+                nuisance[n.index("friction")]
+                for nuisance, n in zip(fit.point.nuisance, self.case.nuisances, strict=True)
+            ]
+        )
 
     def covariance(self, fit: Fit) -> Array:
-        """Of z (n, n), the pushes' unknowns integrated out."""
+        """Of z (n, n), the per-push parameters integrated out."""
         h = fit.hypothesis
         precision, _ = normal_equations(fit.weighed, h.mean - fit.point.z, h.precision)
         return np.asarray(np.linalg.pinv(precision))

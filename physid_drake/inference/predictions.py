@@ -88,16 +88,16 @@ class Predictor:
             for ask, one in zip(asks, self.rollouts.predictions(asks), strict=True)
         ]
 
-    def path_errors(self, owns: Sequence[Array], physics: Physics) -> list[Array]:
+    def path_errors(self, nuisances: Sequence[Array], physics: Physics) -> list[Array]:
         """Columns (m_i, e) of features, in their units: what each error that a hand's path may have changes."""
         columns = []
         for i, problem in enumerate(self.case.problems):
-            asks = [Ask(i, physics, owns[i], path_error=k) for k in range(-1, len(problem.path_errors))]
+            asks = [Ask(i, physics, nuisances[i], path_error=k) for k in range(-1, len(problem.path_errors))]
             sizes = np.array([error.stds for error in problem.path_errors])
             columns.append(np.linalg.inv(self.whitening[i]) @ self._differences(asks) / sizes)
         return columns
 
-    def wanders(self, owns: Sequence[Array], physics: Physics) -> list[tuple[Array, Array]]:
+    def wanders(self, nuisances: Sequence[Array], physics: Physics) -> list[tuple[Array, Array]]:
         """What frictions change that wander on a push's way: columns (m_i, HATS), of table and tip.
 
         In units of the noise, for a friction that differs by all of itself. The columns are independent; frictions at
@@ -106,7 +106,7 @@ class Predictor:
         made = []
         for i, problem in enumerate(self.case.problems):
             hats, root = wander_hats(problem)
-            rest = Ask(i, physics, owns[i])
+            rest = Ask(i, physics, nuisances[i])
             for_table = [dc.replace(rest, wander=Wander(middle=t, width=w, support=WANDER_STEP)) for t, w in hats]
             at_tip = [dc.replace(rest, wander=Wander(middle=t, width=w, hand=WANDER_STEP)) for t, w in hats]
             columns = self._differences([rest, *for_table, *at_tip]) / WANDER_STEP

@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from physid_drake.inference.fit import Fit, Fitter
-from physid_drake.inference.push import LinearPush, loudness_of, weighed
+from physid_drake.inference.push import LinearPush, noise_scale_of, weighed
 from physid_drake.inference.scatter import SCATTERS, log_prior_of_scatter
 
 Array = NDArray[np.float64]
 
 SHARES = (0.0, 0.02, 0.04, 0.08, 0.16, 0.32)  # of friction, standard deviation
 EVEN = 0.5  # probability beforehand that both surfaces are even
-ROUNDS = 4  # in which loudness and weights find each other
+ROUNDS = 4  # in which noise scale and weights find each other
 
 
 @dc.dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,7 @@ EVEN_SURFACES = ProcessNoise()
 
 def learned(fitter: Fitter, fit: Fit) -> tuple[ProcessNoise, list[Array]]:
     """The likeliest process noise beside a fit, and what it adds to the noise (m, m) of each push, in units of it."""
-    found = fitter.predictor.wanders(fit.point.own, fit.hypothesis.physics(fit.point.z))
+    found = fitter.predictor.wanders(fit.point.nuisance, fit.hypothesis.physics(fit.point.z))
 
     def covariances(noise: ProcessNoise) -> list[Array]:
         return [noise.table**2 * w @ w.T + noise.tip**2 * v @ v.T for w, v in found]
@@ -61,7 +61,7 @@ def learned(fitter: Fitter, fit: Fit) -> tuple[ProcessNoise, list[Array]]:
 
 
 def _log_likelihood(fitter: Fitter, fit: Fit, added: Sequence[Array]) -> float:
-    """Of the pushes where the fit is, with more noise, at the likeliest scatter of friction and loudness."""
+    """Of the pushes where the fit is, with more noise, at the likeliest scatter of friction and noise scale."""
     roots: list[Array] = [np.asarray(np.linalg.cholesky(np.eye(len(one)) + one), dtype=np.float64) for one in added]
     pushes = [_whitened(push, root) for push, root in zip(fit.pushes, roots, strict=True)]
     dets = sum(float(np.log(np.diag(root)).sum()) for root in roots)
@@ -69,17 +69,17 @@ def _log_likelihood(fitter: Fitter, fit: Fit, added: Sequence[Array]) -> float:
 
 
 def _whitened(push: LinearPush, root: Array) -> LinearPush:
-    residual, own = (solve_triangular(root, one, lower=True) for one in (push.residual, push.own))
-    return LinearPush(residual=residual, shared=np.zeros((len(residual), 0)), own=own)
+    residual, nuisance = (solve_triangular(root, one, lower=True) for one in (push.residual, push.nuisance))
+    return LinearPush(residual=residual, shared=np.zeros((len(residual), 0)), nuisance=nuisance)
 
 
 def _with_scatter(fitter: Fitter, fit: Fit, pushes: Sequence[LinearPush], scatter: float) -> float:
-    loudness, priors = fit.loudness, fitter.priors(scatter)
+    noise_scale, priors = fit.noise_scale, fitter.priors(scatter)
     for _ in range(ROUNDS):
         found = [
-            weighed(push.residual, push.shared, push.own, prior, loudness, fit.tail)
+            weighed(push.residual, push.shared, push.nuisance, prior, noise_scale, fit.tail)
             for push, prior in zip(pushes, priors, strict=True)
         ]
         squares, counts = [one.square for one in found], [len(push.residual) for push in pushes]
-        loudness = loudness_of(squares, counts, fitter.least, fit.tail)
+        noise_scale = noise_scale_of(squares, counts, fitter.least, fit.tail)
     return sum(one.log_density for one in found) + log_prior_of_scatter(scatter)

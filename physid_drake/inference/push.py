@@ -1,9 +1,9 @@
-"""A push, linearised in what all pushes share and in its own unknowns; how likely it is with these integrated out.
+"""A push, linearised in what all pushes share and in its per-push parameters, which are integrated out.
 
-In units of the noise, a push is r = X dz + J u + e with u ~ N(0, diag(prior^2)) its own unknowns and
-e ~ t_nu(0, loudness^2 I): one heavy tail for a push as a whole, so that a push about which something else is odd
-counts less, the less the further it is off. The loudness is shared by all pushes: 1 where a hypothesis explains them.
-Far from an explanation it is large; then u stays near zero and cannot imitate what is missing.
+In units of the noise, a push is r = X dz + J u + e with u ~ N(0, diag(prior^2)) its nuisance parameters and
+e ~ t_nu(0, noise scale^2 I): one heavy tail for a push as a whole, so that a push about which something else is odd
+counts less, the less the further it is off. The noise scale is shared by all pushes: 1 where a hypothesis explains
+them. Far from an explanation it is large; then u stays near zero and cannot imitate what is missing.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ class LinearPush:
     """One push at a point z.
 
     Attributes:
-        residual: (m,) recorded less predicted, as if the push's unknowns were zero.
+        residual: (m,) recorded less predicted, as if the push's nuisance parameters were zero.
         shared: (m, n) derivatives of the prediction with respect to z.
-        own: (m, k) with respect to u.
+        nuisance: (m, k) with respect to u.
     """
 
     residual: Array
     shared: Array
-    own: Array
+    nuisance: Array
 
 
-def cost_of(square: float, count: int, loudness: float, tail: float) -> float:
+def cost_of(square: float, count: int, noise_scale: float, tail: float) -> float:
     """Twice the negative log density of ``count`` errors e with e^T e = ``square``, but for a constant."""
-    return (tail + count) * math.log1p(square / (tail * loudness**2)) + 2.0 * count * math.log(loudness)
+    return (tail + count) * math.log1p(square / (tail * noise_scale**2)) + 2.0 * count * math.log(noise_scale)
 
 
-def weight_of(square: float, count: int, loudness: float, tail: float) -> float:
+def weight_of(square: float, count: int, noise_scale: float, tail: float) -> float:
     """What a push counts: 1 where its errors are as large as noise."""
-    return (tail + count) / (tail * loudness**2 + square)
+    return (tail + count) / (tail * noise_scale**2 + square)
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,7 +56,7 @@ class Weighed:
     Attributes:
         precision: (n, n) that it gives z.
         right: (n,) precision times estimate.
-        own: (k,) most likely unknowns at dz = 0.
+        nuisance: (k,) most likely unknowns at dz = 0.
         to_own: (k, n) how they change with dz.
         log_density: of the push at dz = 0.
         square: of its errors there.
@@ -65,43 +65,45 @@ class Weighed:
 
     precision: Array
     right: Array
-    own: Array
-    to_own: Array
+    nuisance: Array
+    to_nuisance: Array
     log_density: float
     square: float
     weight: float
 
 
-def weighed(residual: Array, shared: Array, own: Array, prior: Array, loudness: float, tail: float = TAIL) -> Weighed:
-    """Integrate a push's unknowns out, by Laplace's method.
+def weighed(
+    residual: Array, shared: Array, nuisance: Array, prior: Array, noise_scale: float, tail: float = TAIL
+) -> Weighed:
+    """Integrate a push's nuisance parameters out, by Laplace's method.
 
     Args:
         residual: (m,).
         shared: (m, n).
-        own: (m, k).
+        nuisance: (m, k).
         prior: (k,) standard deviations of u.
-        loudness: of all pushes.
+        noise_scale: of all pushes.
         tail: degrees of freedom of their errors.
     """
     count, total = len(residual), float(residual @ residual)
-    scaled = own * prior  # of unknowns v = u / prior ~ N(0, I); in the eigenvectors' basis all is diagonal
+    scaled = nuisance * prior  # of unknowns v = u / prior ~ N(0, I); in the eigenvectors' basis all is diagonal
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
     basis = scaled @ vectors
     moment, cross = basis.T @ residual, basis.T @ shared
-    w = loudness**-2.0
+    w = noise_scale**-2.0
     for _ in range(WEIGHINGS):
         v = w * moment / (1.0 + w * values)
-        w = weight_of(max(0.0, total - float(v @ (2.0 * moment - values * v))), count, loudness, tail)
+        w = weight_of(max(0.0, total - float(v @ (2.0 * moment - values * v))), count, noise_scale, tail)
     share = w / (1.0 + w * values)
     v = share * moment
     errors = residual - basis @ v
     square = float(errors @ errors)
     log_det = float(np.log1p(w * np.maximum(values, 0.0)).sum())
-    twice = cost_of(square, count, loudness, tail) + float(v @ v) + log_det
+    twice = cost_of(square, count, noise_scale, tail) + float(v @ v) + log_det
     return Weighed(
         precision=w * (shared.T @ shared - cross.T @ (share[:, None] * cross)),
         right=w * (shared.T @ residual - cross.T @ v),
-        own=prior * (vectors @ v), to_own=-prior[:, None] * (vectors @ (share[:, None] * cross)),
+        nuisance=prior * (vectors @ v), to_nuisance=-prior[:, None] * (vectors @ (share[:, None] * cross)),
         log_density=_log_constant(count, tail) - 0.5 * twice, square=square, weight=w,
     )  # fmt: skip
 
@@ -110,8 +112,10 @@ def _log_constant(count: int, tail: float) -> float:
     return float(gammaln(0.5 * (tail + count)) - gammaln(0.5 * tail)) - 0.5 * count * math.log(tail * math.pi)
 
 
-def loudness_of(squares: Sequence[float], counts: Sequence[int], least: float, tail: float) -> float:
-    """The likeliest loudness of pushes whose errors are known: a t distribution's scale, by expectation maximisation.
+def noise_scale_of(squares: Sequence[float], counts: Sequence[int], least: float, tail: float) -> float:
+    """The likeliest noise scale of pushes whose errors are known.
+
+    The scale of a t distribution, by expectation maximisation.
 
     Args:
         squares: of each push's errors, e^T e.
@@ -131,7 +135,7 @@ def held_out(
     priors: Sequence[Array],
     mean: Array,
     precision: Array,
-    loudness: float,
+    noise_scale: float,
     found: Sequence[Weighed],
     tail: float = TAIL,
     folds: Sequence[Sequence[int]] | None = None,
@@ -140,13 +144,13 @@ def held_out(
 
     Args:
         pushes: linearised at the fitted z.
-        priors: (k,) of each push's unknowns.
+        priors: (k,) of each push's nuisance parameters.
         mean: (n,) of the prior of dz.
         precision: (n, n) of it.
-        loudness: of the pushes.
+        noise_scale: of the pushes.
         found: the pushes, weighed.
         tail: degrees of freedom of their errors.
-        folds: indices of pushes that are left out together; each alone where None.
+        folds: indices of pushes that are held out together; each alone where None.
     """
     scores = np.zeros(len(pushes))
     for fold in [[i] for i in range(len(pushes))] if folds is None else folds:
@@ -155,8 +159,8 @@ def held_out(
             push = pushes[i]
             scores[i] = weighed(
                 push.residual - push.shared @ dz, np.zeros((len(push.residual), 0)),
-                np.column_stack([push.own, push.shared @ root]), np.concatenate([priors[i], np.ones(len(dz))]),
-                loudness, tail,
+                np.column_stack([push.nuisance, push.shared @ root]), np.concatenate([priors[i], np.ones(len(dz))]),
+                noise_scale, tail,
             ).log_density  # fmt: skip
     return scores
 

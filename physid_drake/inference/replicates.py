@@ -28,12 +28,12 @@ MOST_GAIN = 1e6  # nats
 
 
 def without_best(gains: Array) -> Array:
-    """Sum of gains (n, ...) of pushes over another hypothesis, without the largest: no push decides alone [nats]."""
+    """Sum of gains (n, ...) of pushes over another hypothesis, without the largest: no push decides alone."""
     return np.asarray(gains.sum(axis=0) - np.where(np.isfinite(gains).all(axis=0), gains.max(axis=0), 0.0))
 
 
 def of_all(gains: Array) -> Array:
-    """Sum of gains (n, ...) of pushes over another hypothesis [nats]."""
+    """Sum of gains (n, ...) of pushes over another hypothesis [log likelihood]."""
     return np.asarray(gains.sum(axis=0))
 
 
@@ -57,10 +57,10 @@ def gains_by_chance(
             model is enough, any push may.
 
     Returns:
-        Of the recording, and (REPLICATES,) where the fitted model is true [nats].
+        Of the recording, and (REPLICATES,) where the fitted model is true [log likelihood].
     """
     drawn = [
-        np.column_stack([push.residual, _drawn(push.own, prior, one.weight**-0.5, rng)])
+        np.column_stack([push.residual, _drawn(push.nuisance, prior, one.weight**-0.5, rng)])
         for push, prior, one in zip(fit.pushes, fitter.priors(fit.scatter), fit.weighed, strict=True)
     ]
     tables = [_Table(fitter, fit, found, drawn, scatter) for scatter in scatters_beside(fit.scatter)]
@@ -91,7 +91,7 @@ def surprise(values: Array, replicates: Array) -> Array:
 
 
 def gain_of(wanted: float, replicates: Array) -> float:
-    """The value whose surprise is as wanted, beyond the replicates [nats]."""
+    """The value whose surprise is as wanted, beyond the replicates [log likelihood]."""
     low, high = np.array([0.0]), np.array([1.0])
     while surprise(high, replicates)[0] < wanted and high[0] < MOST_GAIN:
         high *= 2.0
@@ -114,10 +114,10 @@ def p_value(seen: dict[str, float], by_chance: dict[str, Array]) -> float:
     return float(np.exp(-surprise(np.array([best]), of_replicates)[0]))
 
 
-def _drawn(own: Array, prior: Array, loudness: float, rng: np.random.Generator) -> Array:
+def _drawn(nuisance: Array, prior: Array, noise_scale: float, rng: np.random.Generator) -> Array:
     """Residuals (m, REPLICATES) of a push."""
-    noise = loudness * rng.standard_normal((len(own), REPLICATES))
-    return np.asarray(noise + own @ (prior[:, None] * rng.standard_normal((own.shape[1], REPLICATES))))
+    noise = noise_scale * rng.standard_normal((len(nuisance), REPLICATES))
+    return np.asarray(noise + nuisance @ (prior[:, None] * rng.standard_normal((nuisance.shape[1], REPLICATES))))
 
 
 def _best(scored: Sequence[tuple[Array, Array]]) -> Array:
@@ -139,7 +139,7 @@ class _Table:
         self.prior[: self.n, : self.n] = self.h.precision
         self.log_prior = log_prior_of_scatter(scatter)
         made = [
-            _equations(np.column_stack([push.shared, *(c.pushes[i] for c in found)]), push.own * prior,
+            _equations(np.column_stack([push.shared, *(c.pushes[i] for c in found)]), push.nuisance * prior,
                        fit.weighed[i].weight, drawn[i])
             for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(scatter), strict=True))
         ]  # fmt: skip
@@ -176,9 +176,9 @@ class _Table:
         return value, held
 
 
-def _equations(shared: Array, own: Array, weight: float, drawn: Array) -> tuple[Array, Array, Array, float]:
+def _equations(shared: Array, nuisance: Array, weight: float, drawn: Array) -> tuple[Array, Array, Array, float]:
     """A push's precision (n, n), precision times estimate (n, r), squares (r,) and log determinant of its noise."""
-    factor = cho_factor(np.eye(len(own)) / weight + own @ own.T, lower=True)
+    factor = cho_factor(np.eye(len(nuisance)) / weight + nuisance @ nuisance.T, lower=True)
     solved = cho_solve(factor, shared)
     squares = np.einsum("ij,ij->j", drawn, cho_solve(factor, drawn))
     return shared.T @ solved, solved.T @ drawn, squares, 2.0 * float(np.log(np.diag(factor[0])).sum())

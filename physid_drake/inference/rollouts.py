@@ -44,7 +44,7 @@ class Physics:
 
 @dc.dataclass(frozen=True, eq=False)
 class Ask:
-    """A rollout: a push with its own unknowns (k,), in units of their priors' standard deviations.
+    """A rollout: a push with its nuisance parameters (k,), in units of their priors' standard deviations.
 
     ``path_error``, where it is not negative, is the one that its hand's path has; ``wander`` what frictions and
     forces do for a while.
@@ -52,7 +52,7 @@ class Ask:
 
     push: int
     physics: Physics
-    own: Array
+    nuisance: Array
     path_error: int = -1
     wander: Wander = STEADY
 
@@ -103,7 +103,8 @@ class Rollouts:
         tasks = [
             Task(
                 problem=self._problem(ask), theta=ask.physics.theta, nuisance=self.nuisances[ask.push],
-                values=ask.own * self.nuisances[ask.push].stds, effects=(*ask.physics.effects, *self._pulses(ask)),
+                values=ask.nuisance * self.nuisances[ask.push].stds,
+                effects=(*ask.physics.effects, *self._pulses(ask)),
             )
             for ask in asks
         ]  # fmt: skip
@@ -154,12 +155,12 @@ class Rollouts:
         return answers
 
     def _setting(self, ask: Ask) -> PushSetting:
-        key = ask.push, ask.path_error, ask.own.tobytes()
+        key = ask.push, ask.path_error, ask.nuisance.tobytes()
         if key not in self._settings:
             if len(self._settings) >= MOST_SETTINGS:
                 self._settings.clear()
             nuisance = self.nuisances[ask.push]
-            self._settings[key] = apply_nuisance(self._problem(ask), nuisance, ask.own * nuisance.stds)
+            self._settings[key] = apply_nuisance(self._problem(ask), nuisance, ask.nuisance * nuisance.stds)
         return self._settings[key]
 
     def _push(self, twin: Twin, plain: Geometry, ask: Ask) -> tuple[TwinPush, Index | None] | None:

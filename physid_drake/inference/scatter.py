@@ -1,4 +1,4 @@
-"""The scatter of friction from push to push: the values that are looked at, and what is known of it beforehand."""
+"""The scatter of friction between pushes: the values that are looked at, and what is known of it beforehand."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ SCATTER_PRIOR = (1.0, 0.6)  # median, in units of it, and standard deviation of 
 
 
 def log_prior_of_scatter(scatter: float) -> float:
-    """Of the friction's scatter from push to push, but for a constant."""
+    """Of the friction scatter between pushes, but for a constant."""
     return -0.5 * float(np.log(scatter / SCATTER_PRIOR[0]) / SCATTER_PRIOR[1]) ** 2
 
 

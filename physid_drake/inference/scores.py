@@ -93,7 +93,7 @@ def _simulated(fitter: Fitter, fit: Fit, blank: Sequence[Column]) -> list[Column
 
     sides = [[stepped(c, sign) for sign in ((1.0, -1.0) if c.family.central else (1.0,))] for c in blank]
     asks = [
-        Ask(i, physics, point.own[i]) for both in sides for physics in both for i in range(fitter.count)
+        Ask(i, physics, point.nuisance[i]) for both in sides for physics in both for i in range(fitter.count)
     ]  # fmt: skip
     vectors = iter(fitter.predictor.vectors(asks))
     plain: list[Array | None] = [
@@ -160,7 +160,7 @@ def _equations(fitter: Fitter, fit: Fit, found: Sequence[Column], scatter: float
     precision[:n, :n], right[:n] = h.precision, h.precision @ (h.mean - fit.point.z)
     for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(scatter), strict=True)):
         shared = np.column_stack([push.shared, *(c.pushes[i] for c in found)])
-        one = weighed(push.residual, shared, push.own, prior, fit.loudness, fit.tail)
+        one = weighed(push.residual, shared, push.nuisance, prior, fit.noise_scale, fit.tail)
         precision += one.precision
         right += one.right
         value += one.log_density

@@ -9,21 +9,21 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-OWN_STEP = 0.5  # of the prior's standard deviation, for differences
+NUISANCE_STEP = 0.5  # of the prior's standard deviation, for differences
 
 
-def own_steps(own: Array) -> list[Array]:
-    """Each of a push's unknowns (k,) stepped, towards its middle."""
-    return [own + step for step in np.diag(_own_sizes(own))]
+def nuisance_steps(nuisance: Array) -> list[Array]:
+    """Each of a push's nuisance parameters (k,) stepped, towards its middle."""
+    return [nuisance + step for step in np.diag(_nuisance_sizes(nuisance))]
 
 
-def own_slopes(base: Array, own: Array, vectors: Iterator[Array | None]) -> Array:
-    """Derivatives (m, k) by a push's unknowns, from the rollouts of ``own_steps``."""
-    return np.column_stack([slope(base, next(vectors), size) for size in _own_sizes(own)])
+def nuisance_slopes(base: Array, nuisance: Array, vectors: Iterator[Array | None]) -> Array:
+    """Derivatives (m, k) by a push's nuisance parameters, from the rollouts of ``own_steps``."""
+    return np.column_stack([slope(base, next(vectors), size) for size in _nuisance_sizes(nuisance)])
 
 
-def _own_sizes(own: Array) -> Array:
-    return np.where(own <= 0.0, OWN_STEP, -OWN_STEP)
+def _nuisance_sizes(nuisance: Array) -> Array:
+    return np.where(nuisance <= 0.0, NUISANCE_STEP, -NUISANCE_STEP)
 
 
 def slope(base: Array, moved: Array | None, step: float) -> Array:

@@ -25,9 +25,9 @@ def as_loud_as_left(fitter: Fitter, fit: Fit) -> Case:
     """The case with noise as large as what a model leaves, as most pushes say; no quieter than it is."""
     forces: list[Array] = []
     for i, (push, features) in enumerate(zip(fit.pushes, fitter.case.features, strict=True)):
-        left = np.linalg.solve(fitter.predictor.whitening[i], push.residual - push.own @ fit.point.own[i])
+        left = np.linalg.solve(fitter.predictor.whitening[i], push.residual - push.nuisance @ fit.point.nuisance[i])
         forces.append(np.asarray(left[features.pose_numbers :].reshape(2, -1).T, dtype=np.float64))
-    return fitter.case.louder(max(1.0, fit.loudness), _force_noise(fitter.case, forces))
+    return fitter.case.louder(max(1.0, fit.noise_scale), _force_noise(fitter.case, forces))
 
 
 def _force_noise(case: Case, forces: Sequence[Array]) -> ForceNoise:

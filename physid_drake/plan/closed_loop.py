@@ -11,8 +11,8 @@ import numpy as np
 from physid_drake.model import Model
 from physid_drake.plan.costs import DistanceToGoal
 from physid_drake.plan.learning import MadePush, learned
+from physid_drake.plan.pipeline import TOLERANCE, Plan, plan
 from physid_drake.plan.robot import Robot
-from physid_drake.plan.story import TOLERANCE, Plan, plan
 from physid_drake.plan.task import NEAREST, policy_for
 from physid_drake.plan.trajectory import Situation, path_of
 

@@ -74,7 +74,7 @@ class SimulatedRobot:
         if self.ending not in (Ending.AT_REST, Ending.MOVING):
             raise RobotError(f"robot: the object {self.ending.value} in the last push; put it back first.")
         situation = Situation(start=self._pose, order=self._pushes)
-        path = path_of(self._hidden.plain(), push, aim or self.see())
+        path = path_of(self._hidden.baseline(), push, aim or self.see())
         trajectory = trajectory_of(self._hidden, (push,), situation, path=path, rate=RATE)
         if trajectory.ending is Ending.DIVERGED:
             raise RobotError("robot: the hidden world's rollout diverged.")

@@ -18,8 +18,8 @@ from physid_drake.model import Correlation, Model
 from physid_drake.plan.config import PlanConfig
 from physid_drake.plan.costs import DistanceToGoal
 from physid_drake.plan.draws import scatter_freedom
+from physid_drake.plan.pipeline import Plan, plan
 from physid_drake.plan.robot import Robot
-from physid_drake.plan.story import Plan, plan
 from physid_drake.plan.task import check_task, default_goal, policy_for
 from physid_drake.plan.trajectory import Situation
 from physid_drake.policies import PlannedPush, policy_named
@@ -159,24 +159,28 @@ class Planner:
         """Number of the policy's settings."""
         return policy_named(self.config.policy, Reach(heading=0.0, travel=1.0, inner_radius=1.0)).space.dimension
 
-    def run(self, result: Identification, tick: Progress | None = None) -> Plan:
+    def run(self, result: Identification, progress: Progress | None = None) -> Plan:
         """Plan with the identified theta and its intervals.
 
         Args:
             result: the identification.
-            tick: told stage, steps done and steps in all.
+            progress: called with the stage, steps done and steps in all.
         """
         model = identified_model(result, self.spec, self.name, hand=self.hand)
-        return self.with_model(model, friction_scatter=result.friction_scatter, pushes=len(result.pushes), tick=tick)
+        return self.with_model(
+            model, friction_scatter=result.friction_scatter, pushes=len(result.pushes), progress=progress
+        )
 
-    def with_model(self, model: Model, *, friction_scatter: float, pushes: int, tick: Progress | None = None) -> Plan:
+    def with_model(
+        self, model: Model, *, friction_scatter: float, pushes: int, progress: Progress | None = None
+    ) -> Plan:
         """Plan with a model of the object, such as the one that a diagnosis leaves.
 
         Args:
             model: the cell, with intervals, and with effects.
             friction_scatter: of support friction from push to push [-].
             pushes: that it was learnt from.
-            tick: told stage, steps done and steps in all.
+            progress: called with the stage, steps done and steps in all.
         """
         stream = np.random.SeedSequence(self.seed).spawn(_STREAM + 1)[_STREAM]
         return plan(
@@ -184,7 +188,7 @@ class Planner:
             DistanceToGoal(goal=self.goal), situation=self.situation, rng=np.random.default_rng(stream),
             budget=self.config.budget, draws=self.config.draws, sweep=self.config.sweep,
             tolerance=self.config.tolerance_m, friction_scatter=friction_scatter,
-            scatter_freedom=scatter_freedom(pushes), tick=tick,
+            scatter_freedom=scatter_freedom(pushes), progress=progress,
         )  # fmt: skip
 
 

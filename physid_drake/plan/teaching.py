@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from physid_drake.cell import Start
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
-from physid_drake.identify.baseline import plain
+from physid_drake.identify.baseline import baseline_hypothesis
 from physid_drake.inference.fit import Fitter
 from physid_drake.inference.predictions import Predictor
 from physid_drake.inference.push import NO_TAIL, weighed
@@ -38,8 +38,8 @@ class Lesson:
 
     Attributes:
         best: index of the push that teaches most.
-        gains: (n,) expected information of each push about theta [nats]; 0 where its rollout diverged or fell
-            off the table.
+        gains: (n,) expected information of each push about theta [log likelihood]; 0 where its rollout diverged or
+            fell off the table.
         informations: (n, d, d) expected information of each push, in the unit cube of theta.
         stds: (n, d) posterior standard deviations after each push, in the unit cube.
     """
@@ -58,26 +58,26 @@ def most_informative_push(
     thetas: Array,
     information: Array | None = None,
     scatter: float = 1.0,
-    loudness: float = 1.0,
+    noise_scale: float = 1.0,
     order: int = 0,
     hand_height: float | None = None,
 ) -> Lesson:
     """Of planned pushes, the one that is expected to teach most about theta.
 
-    A push's information is that of a recording at 100 Hz with the recording's noise, its own unknowns marginalised as
-    in the fit: simulated Jacobians, no approximation of the mechanics. But the hand's path is taken for exact: a
-    noisy hand teaches less than is expected. The gain is half the rise of the log-determinant of the Gaussian
-    information, averaged over ``thetas``: what a Gaussian belief is expected to lose in entropy.
+    A push's information is that of a recording at 100 Hz with the recording's noise, its nuisance parameters
+    marginalised as in the fit: simulated Jacobians, no approximation of the mechanics. But the hand's path is taken
+    for exact: a noisy hand teaches less than is expected. The gain is half the rise of the log-determinant of the
+    Gaussian information, averaged over ``thetas``: what a Gaussian belief is expected to lose in entropy.
 
     Args:
         pushes: to choose from, for instance ``policy.pushes(settings)[0]`` of drawn settings.
         case: a recording with the same object, hand and sensors.
         start: of the object, x, y [m], yaw [rad].
         thetas: (d,) the estimate, or (k, d) draws from the belief, each entry in its unit; each costs
-            2 + own unknowns + d rollouts a push.
+            2 + nuisance parameters + d rollouts a push.
         information: (d, d) what is known, in the unit cube, such as ``OnlineBelief.information``; None is the prior.
         scatter: of friction from push to push, in units of ``UNIT_SCATTER``.
-        loudness: times the noise, where the cell does not explain the pushes.
+        noise_scale: times the noise, where the cell does not explain the pushes.
         order: number of the push in the recording.
         hand_height: of the tip's contact above the table [m]; None for half the object's height.
 
@@ -90,14 +90,14 @@ def most_informative_push(
         raise ConfigError("next push: at least one push is needed to choose from.")
     if case.pool.spec.hand_radius is None:
         raise ConfigError("next push: the cell has no hand.")
-    known = plain(case).precision if information is None else information
+    known = baseline_hypothesis(case).precision if information is None else information
     points = np.atleast_2d(np.asarray(thetas, dtype=np.float64))
     problems = [
         dc.replace(_problem(push, case, start, order, hand_height), name=f"next {k}") for k, push in enumerate(pushes)
     ]
     gains, expected = np.zeros(len(pushes)), np.zeros((len(pushes), *known.shape))
     for theta in points:
-        told = _informations(case, problems, theta, scatter, loudness)
+        told = _informations(case, problems, theta, scatter, noise_scale)
         expected += told / len(points)
         gains += 0.5 * (np.linalg.slogdet(known + told)[1] - np.linalg.slogdet(known)[1]) / len(points)
     covariances = np.linalg.inv(known + expected)
@@ -108,7 +108,7 @@ def most_informative_push(
 
 
 def _informations(
-    case: Case, problems: Sequence[PushProblem], theta: Array, scatter: float, loudness: float
+    case: Case, problems: Sequence[PushProblem], theta: Array, scatter: float, noise_scale: float
 ) -> Array:
     """Information (n, d, d) of each push at theta (d,); zero where the rollout diverged or fell."""
     d = case.thetas.space.dimension
@@ -129,7 +129,7 @@ def _informations(
         case, problems=tuple(recorded), nuisances=tuple(nuisances[k] for k in kept),
         features=tuple(features_of(p, q, case.noise) for p, q in zip(pushes, recorded, strict=True)),
     )  # fmt: skip
-    fitter, h = Fitter(case, Predictor(case)), plain(case)
+    fitter, h = Fitter(case, Predictor(case)), baseline_hypothesis(case)
     z = np.clip(case.thetas.space.to_unit(theta), *h.bounds)
     point = fitter.points([h], [z], [fitter.at_rest()])[0]
     if point is None:  # what the twin cannot say of one of them, the cell says of all
@@ -138,7 +138,7 @@ def _informations(
     assert point is not None
     pushed = fitter.started([h], [point], [None])[0].pushes
     for k, push, prior in zip(kept, pushed, fitter.priors(scatter), strict=True):
-        told[k] = weighed(push.residual, push.shared, push.own, prior, loudness, NO_TAIL).precision
+        told[k] = weighed(push.residual, push.shared, push.nuisance, prior, noise_scale, NO_TAIL).precision
     return told
 
 

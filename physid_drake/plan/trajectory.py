@@ -28,8 +28,8 @@ HORIZON = 4.0  # s after the hand has stopped
 MOST_SAMPLES = 200
 TOPPLED = math.cos(math.radians(30.0))
 STILL = 2e-3  # m/s, of any point
-LONGEST_STEP = 2.5e-4  # m of the hand in one tick, within the bounds below
-SHORTEST_TICK, LONGEST_TICK = 2e-3, 4e-3  # s, unless the model's own tick is shorter, or longer
+LONGEST_STEP = 2.5e-4  # m of the hand in one time step, within the bounds below
+SHORTEST_TIME_STEP, LONGEST_TIME_STEP = 2e-3, 4e-3  # s, unless the model's own time step is shorter, or longer
 
 
 class Ending(enum.Enum):
@@ -196,13 +196,15 @@ def _roll(model: Model, push: PlannedPush, path: HandPath, situation: Situation)
 
 
 def _paced(solver: SolverConfig, speed: float) -> SolverConfig:
-    """Ticks for a push's speed: a model learnt from slow pushes has long ones, in which a fast hand would jump."""
+    """Time steps for a push's speed: in those of a model of slow pushes a fast hand would jump."""
     own = solver.time_step_s
     # In powers of two, so that few cells are built.
     wanted = own * 2.0 ** math.floor(math.log2(LONGEST_STEP / (speed * own)))
-    tick = min(max(wanted, min(own, SHORTEST_TICK)), max(own, LONGEST_TICK))
+    time_step = min(max(wanted, min(own, SHORTEST_TIME_STEP)), max(own, LONGEST_TIME_STEP))
     return dc.replace(
-        solver, time_step_s=tick, slide_time_step_s=max(tick, min(solver.slide_time_step_s, 2.0 * tick))
+        solver,
+        time_step_s=time_step,
+        slide_time_step_s=max(time_step, min(solver.slide_time_step_s, 2.0 * time_step)),
     )
 
 

@@ -1,1 +1,1 @@
-"""A recorded push as a fit sees it: what is compared, its own unknowns, and what either integrator predicts of it."""
+"""A recorded push as a fit sees it: what is compared, its per-push parameters, and what is predicted of it."""

@@ -13,14 +13,14 @@ from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.effects import Surroundings
 from physid_drake.errors import RecordingError
 from physid_drake.pushes.config import ThetaConfig
-from physid_drake.pushes.doubts import doubts
 from physid_drake.pushes.features import PushFeatures, features_of
 from physid_drake.pushes.force_windows import WINDOW
-from physid_drake.pushes.frames import unseen_motion
+from physid_drake.pushes.frame_checks import unseen_motion
 from physid_drake.pushes.noise import Noise
 from physid_drake.pushes.nuisance import Nuisance, nuisance_of
 from physid_drake.pushes.problem import PushProblem, problems_of, spec_of
-from physid_drake.pushes.refusals import refuse
+from physid_drake.pushes.push_checks import refuse
+from physid_drake.pushes.push_warnings import doubts
 from physid_drake.pushes.rollouts import RolloutPool
 from physid_drake.pushes.theta import ThetaMap, friction_names, theta_map
 from physid_drake.pushes.tied_cells import tied_cells
@@ -29,13 +29,15 @@ from physid_drake.recording import ObjectModel, Push, Recording, rest_segments, 
 
 T = TypeVar("T")
 
-# Of the hand between two ticks [m]. Measured on forty drawn pushes against ticks of half a millisecond: 0.02 mm and
-# 0.5 mrad for slow pushes, as much as one millisecond costs for fast ones.
-TRAVEL_PER_TICK = 2.5e-4
+# Of the hand between two time steps [m]. Measured on forty drawn pushes against time steps of half a millisecond:
+# 0.02 mm and 0.5 mrad for slow pushes, as much as one millisecond costs for fast ones.
+TRAVEL_PER_TIME_STEP = 2.5e-4
 PACES = (1.0, 1.5, 2.0, 3.0, 4.0)
 SLOW = 0.03  # m/s: a hand that is never faster
-LONGEST_TICK = 2e-2  # s, for slow hands: within 0.08 mm and 0.6 mrad of ticks of 1 ms (benchmarks/slow_pushes.py)
-MOST_SLIDE_TICK = 0.05  # s
+LONGEST_TIME_STEP = (
+    2e-2  # s, for slow hands: within 0.08 mm and 0.6 mrad of time steps of 1 ms (benchmarks/slow_pushes.py)
+)
+MOST_SLIDE_TIME_STEP = 0.05  # s
 MOST_PUSHES = 24  # more take longer and tell little more
 UNIT_SCATTER = 0.025  # of friction, push to push: the columns' unit and the median of its prior
 LEAST_MOTION = 6.0  # standard deviations: an object that moves less in every push does not move
@@ -53,7 +55,7 @@ class Case:
         noise: of the tracker.
         sensors: of hand and force.
         problems: one per push.
-        nuisances: each push's own unknowns.
+        nuisances: each push's nuisance parameters.
         features: what is compared, one per push.
         thetas: the parameter space.
         pool: makes the rollouts.
@@ -188,20 +190,20 @@ def cell_config(recording: Recording, *, contact: str = "point", time_step: floa
     """The cell in which a recording is diagnosed.
 
     Args:
-        recording: whose hand may be slow: then ticks are longer than 1 ms.
+        recording: whose hand may be slow: then time steps are longer than 1 ms.
         contact: ``point`` or ``hydroelastic``.
-        time_step: tick with the hand [s]; None chooses it.
+        time_step: time step with the hand [s]; None chooses it.
     """
     config = CellConfig()
     config.contact.model = contact
-    config.solver.time_step_s = time_step or _tick(recording)
+    config.solver.time_step_s = time_step or _time_step(recording)
     config.solver.slide_time_step_s = max(config.solver.slide_time_step_s, config.solver.time_step_s)
     if time_step is not None:
-        config.solver.slide_time_step_s = min(MOST_SLIDE_TICK, 2.0 * time_step)
+        config.solver.slide_time_step_s = min(MOST_SLIDE_TIME_STEP, 2.0 * time_step)
     return config
 
 
-def _tick(recording: Recording) -> float:
+def _time_step(recording: Recording) -> float:
     """1 ms; of slow hands as long as the fastest takes for a tenth of a millimetre, up to ``LONGEST_TICK``."""
     fastest = 0.0
     for push in recording.pushes:
@@ -209,7 +211,7 @@ def _tick(recording: Recording) -> float:
             return 1e-3
         steps = np.linalg.norm(np.diff(push.hand.positions[:, :2], axis=0), axis=1)
         fastest = max(fastest, float(np.quantile(steps / np.diff(push.hand.times), 0.95)))
-    return float(np.clip(1e-4 / max(fastest, 1e-6), 1e-3, LONGEST_TICK)) if fastest < SLOW else 1e-3
+    return float(np.clip(1e-4 / max(fastest, 1e-6), 1e-3, LONGEST_TIME_STEP)) if fastest < SLOW else 1e-3
 
 
 def _floored(problem: PushProblem) -> PushProblem:
@@ -222,7 +224,7 @@ def _paced(problem: PushProblem, config: CellConfig) -> PushProblem:
     if problem.path is None:
         return problem
     speed = float(np.linalg.norm(problem.path.velocities, axis=1).max())
-    longest = TRAVEL_PER_TICK / max(speed, 1e-6) / config.solver.time_step_s
+    longest = TRAVEL_PER_TIME_STEP / max(speed, 1e-6) / config.solver.time_step_s
     limit = PACES[-1] * 1e-3 / config.solver.time_step_s
     return dc.replace(problem, pace=max(p for p in PACES if p <= max(1.0, min(longest, limit))))
 

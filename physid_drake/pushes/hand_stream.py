@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import RecordingError
-from physid_drake.pushes.frames import from_object
+from physid_drake.pushes.frame_checks import from_object
 from physid_drake.recording import Cylinder, Hand, PoseStream, Push, Recording, motion_span
 from physid_drake.recording.rests import rests_of
 

@@ -1,7 +1,7 @@
 """Each push's own small unknowns, with stated priors: they enter linearly and are fitted along.
 
 What a recording cannot say exactly moves the object by several standard deviations of the tracker: where the
-object stood, how the hand braked between two samples, the scatter of friction from push to push.
+object stood, how the hand braked between two samples, the scatter of friction between pushes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ VELOCITY = ("start_vx", "start_vy", "start_wz")
 
 @dataclass(frozen=True, kw_only=True)
 class Nuisance:
-    """One push's own unknowns and their prior standard deviations.
+    """One push's nuisance parameters and their prior standard deviations.
 
     Attributes:
         names: of the unknowns, all zero when nothing is known.

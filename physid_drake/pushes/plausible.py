@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.cell.touch import Tip
 from physid_drake.pushes.force_windows import windows_of
-from physid_drake.pushes.frames import HEAVIEST, LIGHTEST, MOVED
+from physid_drake.pushes.frame_checks import HEAVIEST, LIGHTEST, MOVED
 from physid_drake.recording import Push, Recording
 from physid_drake.recording.clocks import FEWEST
 

@@ -15,7 +15,7 @@ from physid_drake.cell.hand_fit import fit_uncertain_paths
 from physid_drake.cell.hand_path import PathError
 from physid_drake.cell.solid import solid_of
 from physid_drake.pushes.force_windows import force_windows
-from physid_drake.pushes.frames import FEWEST_FREE, check_clocks, checks_of, hand_seen_until, push_checks_of
+from physid_drake.pushes.frame_checks import FEWEST_FREE, check_clocks, checks_of, hand_seen_until, push_checks_of
 from physid_drake.pushes.hand_stream import beside_object, touching_radius, vertical_reach, while_pushing
 from physid_drake.pushes.noise import Noise
 from physid_drake.recording import Cylinder as CylinderShape
@@ -62,7 +62,7 @@ class PushProblem:
         forces: (k, 2) recorded mean forces on the object, x and y of W [N].
         force_std: (k,) of each [N].
         moving: from when to when the object moves [s], as far as it is seen.
-        pace: ticks longer than the cell's by this factor will do: the hand is slow.
+        pace: time steps longer than the cell's by this factor will do: the hand is slow.
         tip_height: of P above the table, as recorded [m]; None without a hand. Of an upright tip, which may be longer
             than the object is high, it is not the contact's.
     """

@@ -72,12 +72,12 @@ def simulate(spec: CellSpec, thetas: ThetaMap, task: Task) -> Motion:
 
 
 def _paced(spec: CellSpec, pace: float) -> CellSpec:
-    """The cell with longer ticks."""
+    """The cell with longer time steps."""
     if pace == 1.0:
         return spec
     solver = spec.config.solver
-    tick = pace * solver.time_step_s
-    longer = dc.replace(solver, time_step_s=tick, slide_time_step_s=max(solver.slide_time_step_s, tick))
+    time_step = pace * solver.time_step_s
+    longer = dc.replace(solver, time_step_s=time_step, slide_time_step_s=max(solver.slide_time_step_s, time_step))
     return dc.replace(spec, config=dc.replace(spec.config, solver=longer))
 
 
@@ -140,21 +140,23 @@ class RolloutPool:
         """A pool for another cell, which keeps its rollouts in the same place."""
         return RolloutPool(spec, self.thetas, self.jobs, kept=self.kept)
 
-    def run(self, tasks: Sequence[Task], tick: Callable[[int], None] | None = None) -> list[Prediction | None]:
-        """Predictions in the order of the tasks; ``tick`` is told how many more are done."""
-        results = list(self._made(tasks, tick) if self.kept is None else self._recalled(tasks, self.kept, tick))
+    def run(self, tasks: Sequence[Task], progress: Callable[[int], None] | None = None) -> list[Prediction | None]:
+        """Predictions in the order of the tasks; ``time step`` is told how many more are done."""
+        results = list(
+            self._made(tasks, progress) if self.kept is None else self._recalled(tasks, self.kept, progress)
+        )
         self.count += len(results)
         self.diverged += sum(result is None for result in results)
         return results
 
-    def _made(self, tasks: Sequence[Task], tick: Callable[[int], None] | None) -> Iterable[Prediction | None]:
+    def _made(self, tasks: Sequence[Task], progress: Callable[[int], None] | None) -> Iterable[Prediction | None]:
         for chunk in self._chunks(tasks):
             yield from chunk
-            if tick is not None:
-                tick(len(chunk))
+            if progress is not None:
+                progress(len(chunk))
 
     def _recalled(
-        self, tasks: Sequence[Task], kept: KeptRollouts, tick: Callable[[int], None] | None
+        self, tasks: Sequence[Task], kept: KeptRollouts, progress: Callable[[int], None] | None
     ) -> Iterable[Prediction | None]:
         """Of the tasks, those that are not kept are made, each of them once."""
         cell = repr((self.spec, self.thetas))
@@ -165,10 +167,10 @@ class RolloutPool:
             of_chunk = {next(missing): said for said in chunk}
             kept.keep(of_chunk)
             made |= of_chunk
-            if tick is not None:
-                tick(len(chunk))
-        if tick is not None and len(tasks) > len(fresh):
-            tick(len(tasks) - len(fresh))
+            if progress is not None:
+                progress(len(chunk))
+        if progress is not None and len(tasks) > len(fresh):
+            progress(len(tasks) - len(fresh))
         return (made[key] if key in made else kept[key] for key in keys)
 
     def _chunks(self, tasks: Sequence[Task]) -> Iterable[list[Prediction | None]]:

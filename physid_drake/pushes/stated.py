@@ -7,7 +7,7 @@ import math
 import numpy as np
 from scipy import stats
 
-from physid_drake.pushes.frames import reach_of
+from physid_drake.pushes.frame_checks import reach_of
 from physid_drake.pushes.noise import (
     FINEST_FORCE,
     FINEST_HAND,

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """One rollout to make: push ``problem`` with ``theta`` (d,), the push's own unknowns (k,), and effects."""
+    """One rollout to make: push ``problem`` with ``theta`` (d,), the push's nuisance parameters (k,), and effects."""
 
     problem: PushProblem
     theta: Array

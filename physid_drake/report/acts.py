@@ -82,9 +82,9 @@ def acts_of(known: Identification, evidence: Evidence | None) -> list[Act]:
 def acts_of_plan(plan: Plan, hindsight: Hindsight | None = None) -> list[Act]:
     """The planned push; before it, where there is one, what the baseline's plan would have come to."""
     acts = []
-    if hindsight is not None and hindsight.plain is not None and hindsight.outcome is not None:
-        bodies = {BASELINE: _track(plan, hindsight.plain.predicted), CORRECTED: _track(plan, hindsight.outcome[0])}
-        acts.append(_planned(hindsight.plain, bodies, "baseline plan, simulated with the effect"))
+    if hindsight is not None and hindsight.baseline is not None and hindsight.outcome is not None:
+        bodies = {BASELINE: _track(plan, hindsight.baseline.predicted), CORRECTED: _track(plan, hindsight.outcome[0])}
+        acts.append(_planned(hindsight.baseline, bodies, "baseline plan, simulated with the effect"))
     name = "planned push" + (
         f", with {' and '.join(e.name for e in plan.model.effects)}" if plan.model.effects else ""
     )
@@ -103,7 +103,7 @@ def _fits(known: Identification, evidence: Evidence | None) -> dict[str, Fit]:
     """The models, by who says so: the baseline, and what leaves where that has effects."""
     if evidence is None or evidence.best is None:
         return {BASELINE: known.fit}
-    return {BASELINE: evidence.plain, CORRECTED: evidence.leaving}
+    return {BASELINE: evidence.baseline, CORRECTED: evidence.corrected}
 
 
 def _predicted(case: Case, fit: Fit, i: int) -> Track:

@@ -9,14 +9,14 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from rich.table import Table
 
-from physid_drake.identify import CellsTold
+from physid_drake.identify import IdentifiableCells
 from physid_drake.report.svg import INK, drawn, svg_of
 from physid_drake.report.terminal import narrow_table, numbers, words
 
 Array = NDArray[np.float64]
 
 
-def cells_table(cells: CellsTold) -> Table:
+def cells_table(cells: IdentifiableCells) -> Table:
     """Which combinations of the cells' frictions are identifiable, best first."""
     headings = ("singular\nvalue", "posterior /\nprior std", "identifiable")
     table = narrow_table(
@@ -25,11 +25,11 @@ def cells_table(cells: CellsTold) -> Table:
     )  # fmt: skip
     for c in cells.combinations:
         table.add_row(combination_text(cells, c.weights), f"{c.strength:.3g}", f"{100 * c.left:.0f} %",
-                      "yes" if c.told else "no")  # fmt: skip
+                      "yes" if c.identifiable else "no")  # fmt: skip
     return table
 
 
-def combination_text(cells: CellsTold, weights: Array) -> str:
+def combination_text(cells: IdentifiableCells, weights: Array) -> str:
     """The weights that matter, by the cells' places, largest first."""
     order = np.argsort(-np.abs(weights), kind="stable")
     shown = [k for k in order if abs(weights[k]) >= 0.1 * np.abs(weights).max()][:6]
@@ -42,18 +42,18 @@ def place_of(name: str) -> str:
     return ",".join(name.split("_")[-2:])
 
 
-def cells_verdict(cells: CellsTold) -> str:
+def cells_verdict(cells: IdentifiableCells) -> str:
     """In a sentence or two, which cells are identifiable and which neighbours are distinguishable."""
     count = len(cells.combinations)
-    text = f"{cells.told} of {count} combinations of the cells' frictions are identifiable"
-    text += "; the others keep their prior." if cells.told < count else "."
+    text = f"{cells.identifiable} of {count} combinations of the cells' frictions are identifiable"
+    text += "; the others keep their prior." if cells.identifiable < count else "."
     if not cells.not_apart:
         return f"{text} All neighbouring cells are distinguishable." if cells.apart else text
     pairs = ", ".join(f"{place_of(a)} and {place_of(b)}" for a, b in cells.not_apart)
     return f"{text} Indistinguishable neighbours: {pairs}."
 
 
-def cells_figure(cells: CellsTold) -> Markup:
+def cells_figure(cells: IdentifiableCells) -> Markup:
     """Friction of each cell, and its posterior over its prior standard deviation, from above in the object's axes."""
     with drawn():
         figure = Figure(figsize=(5.2, 2.2), layout="constrained")
@@ -63,7 +63,7 @@ def cells_figure(cells: CellsTold) -> Markup:
         return svg_of(figure, "cells", "Friction of the cells, and posterior over prior standard deviation")
 
 
-def _draw_map(axes: Axes, cells: CellsTold, values: Array, title: str, form: str,
+def _draw_map(axes: Axes, cells: IdentifiableCells, values: Array, title: str, form: str,
               limits: tuple[float, float] | None) -> None:  # fmt: skip
     places = [[int(v) for v in place_of(name).split(",")] for name in cells.names]
     image = np.full(cells.grid, np.nan)

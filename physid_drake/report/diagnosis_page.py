@@ -15,7 +15,7 @@ from jinja2 import Environment, StrictUndefined
 from physid_drake.diagnose import Evidence
 from physid_drake.diagnose.evidence import predicted
 from physid_drake.diagnose.localise import MissingWrench
-from physid_drake.diagnose.looks import SAID
+from physid_drake.diagnose.location import number_of
 from physid_drake.diagnose.values import (
     Detectable,
     Diagnosis,
@@ -24,7 +24,7 @@ from physid_drake.diagnose.values import (
     Ranked,
     ThetaEstimate,
 )
-from physid_drake.diagnose.whereabouts import number_of
+from physid_drake.diagnose.wrench_patterns import SAID
 from physid_drake.effects import effect_named
 from physid_drake.recording import Recording
 from physid_drake.report.answers import answers

@@ -37,7 +37,7 @@ def law_figure(effect: EffectFinding, k: int, view: TableView) -> tuple[Markup, 
 
 
 def _curve(view: TableView, fastest: float, across: str, up: str) -> tuple[Figure, Axes, Array]:
-    """Axes over speed, with a tick at each speed that these pushes had; speeds (n,) [m/s]."""
+    """Axes over speed, with a time step at each speed that these pushes had; speeds (n,) [m/s]."""
     seen = [w.speed for w in view.wrenches if math.isfinite(w.speed)]
     top = 1.05 * max([fastest, *seen])
     figure = Figure(figsize=(3.5, 2.4))

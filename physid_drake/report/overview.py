@@ -9,7 +9,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from physid_drake.diagnose import Examined
-from physid_drake.identify import CellsTold
+from physid_drake.identify import IdentifiableCells
 from physid_drake.identify.accuracy import accuracy_of
 from physid_drake.identify.estimates import Estimate, estimates_of
 from physid_drake.plan import Hindsight, Plan
@@ -81,7 +81,7 @@ def overview_page(
         hindsight: what a diagnosis says of the plan that was made before it.
     """
     known, evidence = examined.known, examined.evidence
-    fitter, fit = (known.fitter, known.fit) if evidence is None else (evidence.fitter, evidence.leaving)
+    fitter, fit = (known.fitter, known.fit) if evidence is None else (evidence.fitter, evidence.corrected)
     names = " and ".join(part.kind.name for part in fit.hypothesis.parts)
     rows = [
         ("initial guess", known.before),
@@ -108,9 +108,14 @@ def _told(e: Estimate) -> tuple[str, str, str, str]:
     return e.name, f"{e.value:.4g}{unit}", f"{e.ci90[0]:.4g} to {e.ci90[1]:.4g}", identifiable_text(e)
 
 
-def _shown_cells(cells: CellsTold) -> dict[str, Any]:
+def _shown_cells(cells: IdentifiableCells) -> dict[str, Any]:
     rows = [
-        (combination_text(cells, c.weights), f"{c.strength:.3g}", f"{100 * c.left:.0f} %", "yes" if c.told else "no")
+        (
+            combination_text(cells, c.weights),
+            f"{c.strength:.3g}",
+            f"{100 * c.left:.0f} %",
+            "yes" if c.identifiable else "no",
+        )
         for c in cells.combinations
     ]
     return {"map": cells_figure(cells), "rows": rows, "verdict": cells_verdict(cells)}

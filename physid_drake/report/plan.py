@@ -118,10 +118,10 @@ def plan_rows(
     if plan.spread is not None:
         whose = "" if with_effects is None else ", baseline model"
         rows += [(what + whose, value) for what, value in _posterior_rows(plan.spread, plan.tolerance)]
-    if hindsight is not None and hindsight.plain is not None and hindsight.outcome is not None:
-        settings = ", ".join(value for _, value in _settings_rows(hindsight.plain))
+    if hindsight is not None and hindsight.baseline is not None and hindsight.outcome is not None:
+        settings = ", ".join(value for _, value in _settings_rows(hindsight.baseline))
         rows += [
-            ("baseline plan", f"{settings}; predicted miss {1e3 * hindsight.plain.cost:.1f} mm"),
+            ("baseline plan", f"{settings}; predicted miss {1e3 * hindsight.baseline.cost:.1f} mm"),
             ("baseline plan, simulated with the effect", _said(*hindsight.outcome)),
         ]
     return [*rows, *(("warning", caveat) for caveat in caveats_of(plan, hindsight))]
@@ -136,7 +136,7 @@ def _settings_rows(plan: Plan) -> list[tuple[str, str]]:
 
 def _baseline_plan(hindsight: Hindsight) -> dict[str, Any] | None:
     """The plan with the baseline model: what that predicts, and what the model with the effects does."""
-    plain, outcome = hindsight.plain, hindsight.outcome
+    plain, outcome = hindsight.baseline, hindsight.outcome
     if plain is None or outcome is None:
         return None
     return {

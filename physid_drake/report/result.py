@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from physid_drake.diagnose import Examined
-from physid_drake.identify import Accuracy, CellsTold, Estimate, Identification
+from physid_drake.identify import Accuracy, Estimate, IdentifiableCells, Identification
 from physid_drake.identify.accuracy import accuracy_of
 from physid_drake.identify.estimates import estimates_of
 from physid_drake.identify.identify import unknowns_of
 from physid_drake.pushes.case import UNIT_SCATTER
-from physid_drake.pushes.doubts import doubts
+from physid_drake.pushes.push_warnings import doubts
 from physid_drake.recording import Recording
 from physid_drake.report.inspection import warning_lines
 from physid_drake.report.numbers import rounded
@@ -36,7 +36,7 @@ def result_json(examined: Examined, recording: Recording, seed: int, versions: d
         versions: of the packages.
     """
     known, evidence, search = examined.known, examined.evidence, examined.known.search
-    fitter, fit = (known.fitter, known.fit) if evidence is None else (evidence.fitter, evidence.leaving)
+    fitter, fit = (known.fitter, known.fit) if evidence is None else (evidence.fitter, evidence.corrected)
     changed = fit is not known.fit
     after = known.after if evidence is None else accuracy_of(known.case, evidence.errors_after)
     pushes = list(known.pushes)
@@ -97,19 +97,19 @@ def _search(search: SearchResult, known: Identification) -> dict[str, Any]:
     }
 
 
-def _cells(cells: CellsTold) -> dict[str, Any]:
+def _cells(cells: IdentifiableCells) -> dict[str, Any]:
     return {
         "grid": list(cells.grid),
         "names": list(cells.names),
         "friction": cells.friction.tolist(),
         "posterior_over_prior_std": cells.left.tolist(),
-        "combinations_identifiable": cells.told,
+        "combinations_identifiable": cells.identifiable,
         "combinations": [
             {
                 "weights": c.weights.tolist(),
                 "singular_value": c.strength,
                 "posterior_over_prior_std": c.left,
-                "identifiable": c.told,
+                "identifiable": c.identifiable,
             }
             for c in cells.combinations
         ],

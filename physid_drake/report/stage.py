@@ -277,8 +277,8 @@ class Stage:
         """Spots on the table where the baseline model was seen, the darker the surer something is missing there."""
         shades = colormaps["Reds"]
         for k, wrench in enumerate(wrenches):
-            loudness = float(np.linalg.norm(wrench.wrench / wrench.std))
-            share = min(1.0, loudness / LOUDEST)
+            noise_scale = float(np.linalg.norm(wrench.wrench / wrench.std))
+            share = min(1.0, noise_scale / LOUDEST)
             self.meshcat.SetObject(
                 f"mismatch/{k}", Cylinder(SPOT, 5e-4), Rgba(*shades(share)[:3], 0.15 + 0.85 * share)
             )

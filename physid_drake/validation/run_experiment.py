@@ -43,8 +43,8 @@ def run(arguments: argparse.Namespace) -> int:
     out: Path = arguments.out or Path("experiments") / (arguments.name + ("_quick" if arguments.quick else ""))
     console = terminal()
     with claim(arguments.name, experiment, out) as folder:
-        with ended_softly(), progress_bar(console) as tick:
-            records = run_all(experiment, folder, jobs=arguments.jobs, tick=tick)
+        with ended_softly(), progress_bar(console) as progress:
+            records = run_all(experiment, folder, jobs=arguments.jobs, progress=progress)
         result = experiment.result(records)
         write(folder, result, arguments.name, command_of(arguments))
     _show(console, result, out)

@@ -163,7 +163,7 @@ def _make(arguments: argparse.Namespace, worlds: int, out: Path, console: Consol
     words += ["--kind", arguments.kind] if arguments.kind else []
     last = ""
     with (
-        progress_bar(console) as tick,
+        progress_bar(console) as progress,
         # In a session of its own: it is told of an interruption once, by the lines below.
         subprocess.Popen(
             words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
@@ -175,7 +175,7 @@ def _make(arguments: argparse.Namespace, worlds: int, out: Path, console: Consol
                 last = line.strip() or last
                 counts = re.search(r" (\d+)/(\d+) ", line)
                 if counts is not None:
-                    tick("worlds made", int(counts[1]), int(counts[2]))
+                    progress("worlds made", int(counts[1]), int(counts[2]))
             said = child.stdout.read()
         except BaseException:
             child.send_signal(signal.SIGINT)  # it ends its own workers
@@ -210,10 +210,10 @@ def diagnose_worlds(
 def run_tasks(tasks: Sequence[Task], arguments: argparse.Namespace, console: Console) -> None:
     """Diagnose with a bar, and a line for each that ends."""
     left = sum(is_open(task, arguments.retry) for task in tasks)
-    with progress_bar(console) as tick:
-        tick("diagnosed", 0, left)
+    with progress_bar(console) as progress:
+        progress("diagnosed", 0, left)
         done = iter(range(1, left + 1))
-        ended = functools.partial(_tell, console, tick, done, left)
+        ended = functools.partial(_tell, console, progress, done, left)
         settings = {"timeout": arguments.timeout, "ended": ended, "again": arguments.retry}
         if arguments.cluster is None:
             diagnose_all(tasks, jobs=arguments.jobs, **settings)
@@ -224,7 +224,7 @@ def run_tasks(tasks: Sequence[Task], arguments: argparse.Namespace, console: Con
 
 def _tell(
     console: Console,
-    tick: Callable[[str, int, int], None],
+    progress: Callable[[str, int, int], None],
     done: Iterator[int],
     left: int,
     task: Task,
@@ -233,7 +233,7 @@ def _tell(
     said = "failed: " + attempt.error if attempt.error is not None else verdict_of(task.folder)
     k = next(done)
     console.print(f"{task.name}  {k}/{left}  {attempt.seconds:.0f} s  {said}", soft_wrap=True, markup=False)
-    tick("diagnosed", k, left)
+    progress("diagnosed", k, left)
 
 
 def opened(out: Path, names: Sequence[str], seal: str, secret: Secret) -> Proof:

@@ -94,9 +94,9 @@ PUSHES = {
 
 
 @cache
-def built(geometry, hand=True, tick=2e-3):
+def built(geometry, hand=True, time_step=2e-3):
     config = config_of("point")
-    config.solver.slide_time_step_s = tick
+    config.solver.slide_time_step_s = time_step
     return Cell(
         geometry.shape, hand_radius=0.01 if hand else None, config=config, pressure=geometry.pressure,
         gravity=geometry.gravity,
@@ -175,7 +175,8 @@ def test_a_vanishing_effect_changes_vanishingly_little(kind):
             worst,
             float(np.sqrt((((seen(kind.at(point, around(rolls)), rolls=rolls) - plain(rolls)) / SIGMA) ** 2).mean())),
         )
-    # Measured: 0.03 sigma where rounding moves the start of a contact by a tick, more for a stiff tip's own contact.
+    # Measured: 0.03 sigma where rounding moves the start of a contact by a time step, more for a stiff tip's own
+    # contact.
     assert worst < (0.3 if kind.name == "hand_compliance" else 0.05)
 
 
@@ -344,11 +345,11 @@ BRAKES = [
 ]
 
 
-@pytest.mark.parametrize("tick", [2e-3, 2e-2], ids=["2ms", "20ms"])
+@pytest.mark.parametrize("time_step", [2e-3, 2e-2], ids=["2ms", "20ms"])
 @pytest.mark.parametrize("effect", BRAKES, ids=lambda e: f"{e.name}-{max(v for v in dc.astuple(e))}")
-def test_what_brakes_never_drives_a_free_slide(effect, tick):
+def test_what_brakes_never_drives_a_free_slide(effect, time_step):
     rolls = effect.name == "rolling_resistance"
-    cell, inertia = built(SHAPES[rolls], False, tick), MASS * (0.1**2 + 0.08**2) / 12
+    cell, inertia = built(SHAPES[rolls], False, time_step), MASS * (0.1**2 + 0.08**2) / 12
     velocity = (0.3, 0.0, 0.0) if rolls else (0.4, 0.2, 4.0)
     start = Start(pose=(0.0, 0.0, 0.0), velocity=velocity)
     go = Rollout(start=start, path=None, begin=0.0, end=0.6, hand_height=None, order=1)
@@ -414,7 +415,7 @@ def test_friction_laws_together_do_not_depend_on_their_order():
         effect_named("stribeck_friction")(excess=0.5),
         effect_named("anisotropic_table")(ratio=1.5, angle=0.4),
     )
-    # The same but for rounding, which moves the start of a contact by a tick.
+    # The same but for rounding, which moves the start of a contact by a time step.
     assert np.abs((seen(*laws) - seen(*laws[::-1])) / SIGMA).max() < 0.1
 
 

@@ -57,13 +57,14 @@ def test_the_diagram_slides_as_the_rollout_does(effect):
     built = model(effect).build()
     start = Start(pose=(0.0, 0.0, 0.0), velocity=(SPEED, 0.0, 0.0))
     want = built.rollout(start=start, path=None, begin=0.0, end=END).planar_at(np.array([END]))[0]
-    # Measured: 0.72 mm without any force: half a tick of speed that only the rollout's trapezoidal update takes back.
+    # Measured: 0.72 mm without any force: half a time step of speed that only the rollout's trapezoidal update takes
+    # back.
     np.testing.assert_allclose(planar(slid_in_diagram(built)), want, atol=9e-4)
 
 
 @pytest.mark.parametrize("stiffness", [20.0, 200.0])
 def test_a_spring_in_the_diagram_gives_back_what_it_took(stiffness):
-    """Drake's step moves by the velocity at its end: with the force half a tick ahead, half of it was lost in 2 s."""
+    """Drake's step moves by the velocity at its end: with the force half a step ahead, half of it was lost in 2 s."""
     made = model(("tether", {"stiffness": stiffness, "x": 0.05, "y": 0.0}))
     built = replace(made, body=replace(made.body, support_friction=np.array([1e-6]))).build()
     scene, context = built.scene, built.scene.plant.GetMyMutableContextFromRoot(built.simulator.get_mutable_context())
@@ -74,7 +75,7 @@ def test_a_spring_in_the_diagram_gives_back_what_it_took(stiffness):
         built.simulator.AdvanceTo(time)
         x, v = scene.plant.GetPositions(context)[4] - 0.05, scene.plant.GetVelocities(context)[3]
         energies.append(0.5 * stiffness * x**2 + 0.5 * built.model.body.mass * v**2)
-    # Measured: 0.98 to 1.01; it swings with the tick.
+    # Measured: 0.98 to 1.01; it swings with the time step.
     np.testing.assert_allclose(energies, 0.5 * stiffness * 0.05**2, rtol=0.04)
 
 

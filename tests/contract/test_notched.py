@@ -82,7 +82,7 @@ def test_a_tip_that_is_wedged_into_a_notch_carries_it_along(direction):
             c, s = math.cos(yaw), math.sin(yaw)
             local = np.array([[c, s], [-s, c]]) @ (hand - [x, y])
             assert local == pytest.approx(corner + RADIUS, abs=2e-3)
-    assert rms((poses[0] - poses[1]) / SIGMA) < 4.0  # the contact changes face with every tick
+    assert rms((poses[0] - poses[1]) / SIGMA) < 4.0  # the contact changes face with every time step
 
 
 SHAPES_DRAWN = {8: "tee", 6: "ell", 12: "plus"}

@@ -35,8 +35,8 @@ FIELD = ForceTable(
     over_grid(lambda x, y: 0.1 * WEIGHT * math.cos(12.0 * y)),
     GRID,
 )
-# They move the object by 4 to 64 deviations. Measured apart: .19 of all of them, which half the cell's tick halves,
-# .08 of a force across, and .06 and less of all others.
+# They move the object by 4 to 64 deviations. Measured apart: .19 of all of them, which half the cell's time step
+# halves, .08 of a force across, and .06 and less of all others.
 FURTHEST = {"all of them": 0.25, "across": 0.12}
 CASES = {
     "places": (SOFT_PLACES,),

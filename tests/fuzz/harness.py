@@ -63,7 +63,7 @@ class Tally:
 
 def run(
     indices: Sequence[int], *, seed: int, module: str = "fuzz.kinds", table: str = "KINDS", silent: float = SILENT,
-    keep: bool = False, scratch: Path | None = None, tick: Callable[[int], object] = lambda done: None,
+    keep: bool = False, scratch: Path | None = None, progress: Callable[[int], object] = lambda done: None,
 ) -> Tally:  # fmt: skip
     """Run the inputs of some indices.
 
@@ -75,14 +75,14 @@ def run(
         silent: seconds after which an input hangs.
         keep: whether to leave the inputs' folders.
         scratch: where they are made; None: a temporary folder.
-        tick: is told how many are done.
+        progress: is told how many are done.
     """
     tally, left, since = Tally(), list(indices), time.monotonic()
     own = scratch is None
     scratch = Path(tempfile.mkdtemp(prefix="fuzz_")) if scratch is None else scratch
     try:
         while left:
-            done = _run_some(left, seed, module, table, silent, keep, scratch, tally, tick)
+            done = _run_some(left, seed, module, table, silent, keep, scratch, tally, progress)
             left = left[done:]
     finally:
         if own and not keep:
@@ -93,7 +93,7 @@ def run(
 
 def _run_some(
     left: list[int], seed: int, module: str, table: str, silent: float, keep: bool, scratch: Path, tally: Tally,
-    tick: Callable[[int], object],
+    progress: Callable[[int], object],
 ) -> int:  # fmt: skip
     """Run until all are done or the process ends; how many are."""
     reading, writing = os.pipe()
@@ -125,7 +125,7 @@ def _run_some(
                         if at is None:
                             tally.add(said)
                             done += 1
-                            tick(tally.inputs)
+                            progress(tally.inputs)
                     if not some:
                         break
             child.wait()

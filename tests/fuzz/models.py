@@ -82,7 +82,7 @@ def _effect(kind: Any) -> dict[str, Any]:
 
 def _use(run: Path, build: bool) -> None:
     model, _ = _read(argparse.Namespace(run_folder=run, model=None))
-    model.plain()
+    model.baseline()
     text = model.dump()
     Path("again.yaml").write_text(text, encoding="utf-8")
     if load_model("again.yaml").dump() != text:

@@ -11,8 +11,8 @@ from fuzz.case import WrongError
 from fuzz.judge import LONGEST
 from physid_drake.pushes.case import case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
-from physid_drake.pushes.doubts import doubts
-from physid_drake.pushes.refusals import refusals
+from physid_drake.pushes.push_checks import refusals
+from physid_drake.pushes.push_warnings import doubts
 from physid_drake.recording import Recording, digest_of, read_recording, write_recording
 from physid_drake.report.inspection import draw_pushes, inspection_table, warning_lines
 from physid_drake.report.picture import write_picture

@@ -24,9 +24,9 @@ SLOW = {"speed": 0.02, "until": 1.0, "rise": 0.2, "brake": 0.2}  # a push along 
 
 
 @cache
-def built(geometry, hand, model="point", points=30, tick=2e-3):
+def built(geometry, hand, model="point", points=30, time_step=2e-3):
     config = config_of(model)
-    config.solver.time_step_s, config.solver.slide_time_step_s = min(config.solver.time_step_s, tick), tick
+    config.solver.time_step_s, config.solver.slide_time_step_s = min(config.solver.time_step_s, time_step), time_step
     config.contact.support_points = points
     return Cell(
         geometry.shape, hand_radius=TIP if hand else None, config=config, pressure=geometry.pressure,
@@ -39,12 +39,12 @@ def make(name, **parameters):
 
 
 def slide(*effects, velocity=(0.5, 0.0, 0.0), pose=(0.0, 0.0, 0.0), seconds=1.0, geometry=BOX, order=0,
-          friction=MU, model="point", points=30, tick=2e-3):  # fmt: skip
+          friction=MU, model="point", points=30, time_step=2e-3):  # fmt: skip
     """The motion of an object that is let go with a velocity."""
     start = Start(pose=pose, velocity=velocity)
     push = Rollout(start=start, path=None, begin=0.0, end=seconds, hand_height=None, order=order)
     body = body_of(MASS, friction)
-    motion = roll(lambda g: built(g, False, model, points, tick), geometry, body, push, effects)
+    motion = roll(lambda g: built(g, False, model, points, time_step), geometry, body, push, effects)
     assert motion.outcome is Outcome.COMPLETED
     return motion
 
@@ -83,7 +83,7 @@ def at(motion, times):
 
 
 def velocities(motion):
-    """Mean planar velocities (n - 1, 3) over the ticks."""
+    """Mean planar velocities (n - 1, 3) over the time steps."""
     return np.diff(motion.planar_at(motion.times), axis=0) / np.diff(motion.times)[:, None]
 
 

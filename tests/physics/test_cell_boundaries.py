@@ -1,4 +1,4 @@
-"""The cell at the ends of what it takes: no friction, odd ticks, hands that touch, steps that failed."""
+"""The cell at the ends of what it takes: no friction, odd time steps, hands that touch, steps that failed."""
 
 import numpy as np
 import pytest
@@ -62,12 +62,12 @@ def test_a_push_without_friction_is_nearly_that_of_next_to_none(model):
 
 
 @pytest.mark.parametrize(
-    ("tick", "slide", "most"),
+    ("time_step", "slide", "most"),
     [(1e-3, 1.5e-3, 5e-5), (1.3e-3, 2e-3, 5e-5), (2e-3, 3.33e-3, 8e-5), (4e-3, 6e-3, 2e-4)],
 )
-def test_ticks_of_a_slide_that_are_no_multiple_stop_where_they_should(tick, slide, most):
-    """Measured: 0.02 to 0.13 mm; 1.1 to 5.6 mm where a slide took more ticks than Drake's integrator one step."""
-    cell = cell_of("point", hand=None, time_step_s=tick, slide_time_step_s=slide)
+def test_ticks_of_a_slide_that_are_no_multiple_stop_where_they_should(time_step, slide, most):
+    """Measured: 0.02 to 0.13 mm; 1.1 to 5.6 mm where a slide took more steps than Drake's integrator one."""
+    cell = cell_of("point", hand=None, time_step_s=time_step, slide_time_step_s=slide)
     start = Start(pose=(0.0, 0.0, 0.0), velocity=(1.0, 0.0, 0.0))
     motion = cell.rollout(body(), start=start, path=None, begin=0.0, end=0.6)
     assert motion.planar_at(np.array([0.6]))[0, 0] == pytest.approx(1.0 / (2.0 * 0.3 * GRAVITY), abs=most)

@@ -96,7 +96,7 @@ def test_an_object_of_uneven_density_is_followed_within_half_a_sigma(model):
 
 
 def test_a_slow_push_needs_no_short_ticks():
-    # A contact that sticks must not creep because the hand gives way within a tick: 2 mm/s, off the centre.
+    # A contact that sticks must not creep because the hand gives way within a time_step: 2 mm/s, off the centre.
     body = OBJECTS["box"]
     push = draw_push(
         np.random.default_rng(5), body, speed=0.002, offset=0.5, heading=0.1, push_time=4.0, pose=(0, 0, 0)
@@ -104,8 +104,8 @@ def test_a_slow_push_needs_no_short_ticks():
     theta = Theta(support_friction=0.3, hand_friction=0.4)
     end = float(push.path.times[-1])
     short, long = (
-        twin(body, theta, push, end, "point", (("time_step_s", tick), ("slide_time_step_s", tick)))
-        for tick in (1e-3, 2e-2)
+        twin(body, theta, push, end, "point", (("time_step_s", time_step), ("slide_time_step_s", time_step)))
+        for time_step in (1e-3, 2e-2)
     )
     moved, parted = (m.planar_at(np.array([end]))[0] for m in (short, long))
     assert abs(moved[2]) > 0.03  # it does turn
@@ -160,7 +160,7 @@ def test_the_hand_follows_its_path(model, name):
     finally:
         cell.simulator.clear_monitor()
     times, places = np.array(seen)[:, 0], np.array(seen)[:, 1:]
-    at_tick = np.abs(times / 1e-3 - np.round(times / 1e-3)) < 1e-6  # between ticks the path is taken as straight
+    at_tick = np.abs(times / 1e-3 - np.round(times / 1e-3)) < 1e-6  # between time steps the path is taken as straight
     assert np.abs(motion.forces).max() > 0.5  # it pushed
     assert at_tick.sum() > 200
     error = np.linalg.norm(places - path.positions(times), axis=1)[at_tick].max()
@@ -168,7 +168,7 @@ def test_the_hand_follows_its_path(model, name):
 
 
 @pytest.mark.parametrize(
-    ("mass", "friction", "speed", "tick"),
+    ("mass", "friction", "speed", "time_step"),
     [
         (0.35, 0.3, 0.4, 1e-3),
         (0.02, 0.3, 0.02, 1e-3),
@@ -179,9 +179,9 @@ def test_the_hand_follows_its_path(model, name):
     ],
 )
 @both_models
-def test_a_push_through_the_middle_feels_the_friction_of_the_weight(model, mass, friction, speed, tick):
-    """At every tick: a hand so heavy that a solver's tolerance hides the contact felt a quarter of it, in bursts."""
-    cell = cell_of("box", model, 0.01, solver=(("time_step_s", tick), ("slide_time_step_s", 2.0 * tick)))
+def test_a_push_through_the_middle_feels_the_friction_of_the_weight(model, mass, friction, speed, time_step):
+    """At every step: a hand so heavy that a solver's tolerance hides the contact felt a quarter of it, in bursts."""
+    cell = cell_of("box", model, 0.01, solver=(("time_step_s", time_step), ("slide_time_step_s", 2.0 * time_step)))
     reach = -float(OBJECTS["box"].polygon[:, 0].min())
     until = 0.05 / speed
     path = HandPath(

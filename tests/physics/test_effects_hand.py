@@ -68,7 +68,7 @@ def test_a_soft_tip_throws_the_object_back_as_a_spring_and_a_damper_do(damping, 
     assert back == pytest.approx(speed * MASS / whole * math.exp(-ratio / root * phase), abs=2e-3)
     pressed = motion.times[motion.forces[:, 0] > 0.0]
     lasts = phase / root * math.sqrt(whole * compliance)
-    assert pressed[-1] - pressed[0] == pytest.approx(lasts, abs=2.5e-3)  # of 58 to 92 ms, in ticks of 1 ms
+    assert pressed[-1] - pressed[0] == pytest.approx(lasts, abs=2.5e-3)  # of 58 to 92 ms, in time steps of 1 ms
 
 
 @pytest.mark.parametrize("side", [0.0, 0.015, -0.03])
@@ -121,17 +121,17 @@ def test_a_soft_tip_sticks_to_a_face_until_its_friction_slides():
     heavy = Body(mass=1e6, p_BBcm=np.zeros(2), inertia_ratio=1.0, hand_friction=0.3, support_friction=np.array([0.3]))
     tip = ContactTip(rectangle(0.2, 0.2), TIP)
     soft = SoftTip(Mount(stiffness=100.0, damping=0.0, mass=1e-3), tip, heavy, 1e6)
-    pose, still, speed, tick = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.01, 1e-3
+    pose, still, speed, time_step = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.01, 1e-3
     soft.begin(pose, [-0.1 - TIP + 0.01, 0.0], (0.0, 0.0))
     forces, places = [], []
     for k in range(600):
         touch = tip.touch(pose, still, soft.place, soft.velocity)
-        goal = [-0.1 - TIP + 0.01, speed * tick * (k + 1)]
-        push = soft.step(touch, goal, (0.0, speed), tick)
+        goal = [-0.1 - TIP + 0.01, speed * time_step * (k + 1)]
+        push = soft.step(touch, goal, (0.0, speed), time_step)
         assert push is not None
-        forces.append((push.jx / tick, push.jy / tick))
+        forces.append((push.jx / time_step, push.jy / time_step))
         places.append(soft.place[1])
-    forces, places, times = np.array(forces), np.array(places), tick * (np.arange(600) + 0.5)
+    forces, places, times = np.array(forces), np.array(places), time_step * (np.arange(600) + 0.5)
     assert forces[:, 0] == pytest.approx(np.ones(600), rel=1e-6)
     sticks = times < 0.29
     np.testing.assert_allclose(forces[sticks, 1], 100.0 * speed * times[sticks], atol=1e-6)
@@ -154,13 +154,13 @@ def test_a_heavy_loose_tip_gives_the_blow_of_a_rigid_hand(side, slide, restituti
         mass=0.2, p_BBcm=np.zeros(2), inertia_ratio=1.0, hand_friction=0.3, support_friction=np.array([0.3]),
         restitution=restitution,
     )  # fmt: skip
-    inertia, speed, tick = 1.6e-4, 0.5, 1e-6
+    inertia, speed, time_step = 1.6e-4, 0.5, 1e-6
     tip = ContactTip(rectangle(0.1, 0.1), TIP)
     soft = SoftTip(Mount(stiffness=1e-9, damping=0.0, mass=1e6), tip, light, inertia)
     soft.begin((0.0, 0.0, 0.0), [-0.05 - TIP - 1e-7, side], (speed, slide))
     touch = tip.touch((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), soft.place, soft.velocity)
     rigid = blow(touch, (speed, slide), light, inertia)
-    got = soft.step(touch, [soft.place[0] + speed * tick, side + slide * tick], (speed, slide), tick)
+    got = soft.step(touch, [soft.place[0] + speed * time_step, side + slide * time_step], (speed, slide), time_step)
     np.testing.assert_allclose([got.jx, got.jy, got.spin], rigid, rtol=1e-4, atol=1e-9)
 
 
@@ -205,23 +205,23 @@ def test_a_hand_offset_across_the_push_is_a_push_beside_the_middle():
     ("compliance", "metres", "radians"),
     [(1e-5, 5e-6, 3e-5), (3e-4, 4e-5, 3e-4), (3e-3, 4e-5, 6e-4)],  # measured 2e-6, 1e-5; 3e-5, 2e-4; 3e-5, 4e-4
 )
-@pytest.mark.parametrize("tick", [1e-2, 2e-2])
-def test_a_soft_tip_is_no_less_stable_in_the_long_ticks_of_a_slow_hand(tick, compliance, metres, radians):
-    """Beside the middle, at 5 mm/s; in ticks as long as these a stiff tip's own were 17 mrad off."""
+@pytest.mark.parametrize("time_step", [1e-2, 2e-2])
+def test_a_soft_tip_is_no_less_stable_in_the_long_ticks_of_a_slow_hand(time_step, compliance, metres, radians):
+    """Beside the middle, at 5 mm/s; in time steps as long as these a stiff tip's own were 17 mrad off."""
     path = HandPath(
         times=np.array([0.0, 0.02, 8.0]), velocities=np.outer([0.0, 0.005, 0.005], [1.0, 0.0]),
         start=np.array([-0.5 * SIZE[0] - TIP - 5e-4, 0.01]),
     )  # fmt: skip
     push = Rollout(start=Start(pose=(0.0, 0.0, 0.0)), path=path, begin=0.0, end=8.1, hand_height=None)
     body, soft = body_of(MASS, MU, hand_friction=0.3), (make("hand_compliance", compliance=compliance),)
-    long, short = (end(roll(lambda g, t=t: ticking(g, t), BOX, body, push, soft)) for t in (tick, 1e-3))
+    long, short = (end(roll(lambda g, t=t: ticking(g, t), BOX, body, push, soft)) for t in (time_step, 1e-3))
     np.testing.assert_allclose(long[:2], short[:2], atol=metres)
     assert long[2] == pytest.approx(short[2], abs=radians)
 
 
-def ticking(geometry, tick):
-    """A cell with a hand and long ticks."""
-    config = config_of("point", time_step_s=tick, slide_time_step_s=tick)
+def ticking(geometry, time_step):
+    """A cell with a hand and long time steps."""
+    config = config_of("point", time_step_s=time_step, slide_time_step_s=time_step)
     return Cell(geometry.shape, hand_radius=TIP, config=config)
 
 

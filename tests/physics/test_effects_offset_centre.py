@@ -96,7 +96,7 @@ def pushed(effects, model="point", side=0.012):
     )  # fmt: skip
     push = Rollout(start=Start(pose=(0.0, 0.0, 0.0)), path=path, begin=0.0, end=0.4, hand_height=None)
     motion = roll(
-        lambda g: built(g, True, model, tick=1e-3), BOX, body_of(MASS, MU, hand_friction=0.3), push, effects
+        lambda g: built(g, True, model, time_step=1e-3), BOX, body_of(MASS, MU, hand_friction=0.3), push, effects
     )
     assert motion.outcome is Outcome.COMPLETED
     return end(motion)

@@ -39,7 +39,7 @@ def test_a_tilt_across_the_slide_bends_it():
 @pytest.mark.parametrize(("c", "most"), [(0.1, 5e-4), (1.0, 4e-3), (20.0, 0.02)])
 def test_viscous_drag_stops_the_object_where_the_equation_says(c, most):
     want = distance(lambda v: MU * G + c * v / MASS)
-    # Measured: 2.6e-4, 2.2e-3 and 1.1e-2 (of 6.6 mm): drag and friction act one after the other within a tick.
+    # Measured: 2.6e-4, 2.2e-3 and 1.1e-2 (of 6.6 mm): drag and friction act one after the other within a time step.
     assert end(slide(make("viscous_drag", coefficient=c)))[0] == pytest.approx(want, rel=most)
 
 
@@ -191,7 +191,8 @@ def test_a_tall_object_is_pushed_against_the_friction_that_the_law_leaves(model,
     push = Rollout(start=Start(pose=(0.0, 0.0, 0.0)), path=path, begin=0.0, end=0.65, hand_height=0.06, order=0)
     motion = roll(lambda g: built(g, True, model), can, body_of(MASS, MU), push, (make(law[0], **law[1]),))
     later = (motion.times > 0.3) & (motion.times < 0.6)
-    # Measured: 0.2 %; 25 % and more, and the can topples, if what is given back carries the weight at every tick.
+    # Measured: 0.2 %; 25 % and more, and the can topples, if what is given back carries the weight at every time
+    # step.
     assert motion.forces[later, 0].mean() == pytest.approx(MU * MASS * G, rel=5e-3)
     assert 2.0 * np.hypot(*motion.poses[-1, 1:3]) < 1e-3
 

@@ -15,14 +15,14 @@ SOFT = make("hand_compliance", compliance=2e-3)
 LYING = Geometry(shape=Cylinder(radius=0.033, length=0.12, axis="y"))
 
 
-def pushed(*effects, geometry=BOX, first, side, speed, way, tick=1e-3, height=None):
+def pushed(*effects, geometry=BOX, first, side, speed, way, time_step=1e-3, height=None):
     """Where an object ends that is pushed along x by so much."""
     times = np.array([0.0, 0.2, 0.2 + way / speed, 0.4 + way / speed])
     path = HandPath(
         times=times, velocities=np.outer([0.0, speed, speed, 0.0], [1.0, 0.0]), start=np.array([-first, side])
     )
     config = config_of("point")
-    config.solver.time_step_s, config.solver.slide_time_step_s = tick, max(tick, 2e-3)
+    config.solver.time_step_s, config.solver.slide_time_step_s = time_step, max(time_step, 2e-3)
     push = Rollout(
         start=Start(pose=(0.0, 0.0, 0.0)), path=path, begin=0.0, end=float(times[-1]) + 0.1, hand_height=height
     )
@@ -42,7 +42,7 @@ def pushed(*effects, geometry=BOX, first, side, speed, way, tick=1e-3, height=No
 def test_a_tip_that_gives_way_leaves_laws_as_they_are_in_long_ticks(effect):
     """The laws saw the tip's impulse before the table's friction had answered it: up to 39 mrad off."""
     slow = {"first": 0.5 * SIZE[0] + TIP + 0.003, "side": 0.015, "speed": 0.01, "way": 0.04}
-    short, long = (pushed(SOFT, effect, **slow, tick=tick) for tick in (1e-3, 1e-2))
+    short, long = (pushed(SOFT, effect, **slow, time_step=time_step) for time_step in (1e-3, 1e-2))
     np.testing.assert_allclose(long[:2], short[:2], atol=1e-4)
     assert long[2] == pytest.approx(short[2], abs=2e-3)
 

@@ -77,7 +77,7 @@ def test_viscous_drag_shortens_a_slide(slide):
     c = 0.2
     k, a = c / MASS, MU * G
     want = 0.5 / k - a / k**2 * np.log(1.0 + k * 0.5 / a)
-    # Measured: -3.9e-3 (point), 2e-4 (hydroelastic): the force is that of the tick's start.
+    # Measured: -3.9e-3 (point), 2e-4 (hydroelastic): the force is that of the time step's start.
     assert end(slide(0.5, laws=(Drag(c),))) == pytest.approx(want, rel=8e-3)
 
 

@@ -34,7 +34,7 @@ TWIN = Twin(solid=solid_of(Box(size=SIZE)), hand_radius=None)
 
 
 def in_cell(*laws, velocity=(0.5, 0.1, 2.0), friction=MU):
-    return at(slide(BareLaws(all=laws), velocity=velocity, friction=friction, tick=1e-3), TIMES)
+    return at(slide(BareLaws(all=laws), velocity=velocity, friction=friction, time_step=1e-3), TIMES)
 
 
 def in_twin(*laws, velocity=(0.5, 0.1, 2.0), friction=MU):

@@ -85,7 +85,7 @@ def test_the_model_that_leaves_predicts_what_the_diagnosis_says(tilted, tmp_path
     problem = made.problems[0]
     run = {"start": problem.start, "path": problem.path, "begin": problem.begin, "end": problem.end,
            "hand_height": problem.hand_height}  # fmt: skip
-    again, first, plain = (m.build().rollout(**run).poses for m in (loaded, model, model.plain()))
+    again, first, plain = (m.build().rollout(**run).poses for m in (loaded, model, model.baseline()))
     np.testing.assert_array_equal(again, first)
     assert np.abs(first[-1] - plain[-1]).max() > 1e-4
 
@@ -101,7 +101,7 @@ def test_an_interrupted_diagnosis_goes_on_to_the_same_bytes(tmp_path):
         if stage == "test for missing physics":  # what an interrupted run would leave here
             shutil.copy(live, cut_off)
 
-    whole, _ = diagnose(made, effects=effects, tick=copy, kept=KeptRollouts(live))
+    whole, _ = diagnose(made, effects=effects, progress=copy, kept=KeptRollouts(live))
     assert cut_off.exists()
     goes_on = KeptRollouts(cut_off)
     half, all_of_them = len(goes_on), len(KeptRollouts(live))
@@ -144,7 +144,7 @@ def test_where_no_noise_is_known_an_effect_is_found_by_the_quiet_that_it_leaves(
     assert diagnosis.verdict in ("explained", "ambiguous")
     (found,) = diagnosis.effects
     assert "table_tilt" in (found.name, *found.indistinguishable_from)
-    assert evidence.best.loudness < 0.7 * evidence.plain.loudness
+    assert evidence.best.noise_scale < 0.7 * evidence.baseline.noise_scale
     assert diagnosis.p_value < 0.01
 
 

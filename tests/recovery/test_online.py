@@ -65,7 +65,7 @@ def test_push_by_push_agrees_with_all_at_once_within_the_interval(recording, lea
 
 def test_every_push_adds_information(learned):
     _, beliefs = learned
-    # A larger scatter or loudness may take some of it back, not much.
+    # A larger scatter or noise scale may take some of it back, not much.
     gains = np.diff([np.linalg.slogdet(b.information)[1] for b in beliefs])
     assert gains[0] > 2.0
     assert np.all(gains[1:] > -0.5)
@@ -169,7 +169,7 @@ def test_a_straight_slide_tells_the_sides_apart_but_not_front_and_back():
     told = result.cells
     for i in (0, 1):
         assert (f"support_friction_0_{i}", f"support_friction_1_{i}") in told.not_apart
-    assert told.told == 2
+    assert told.identifiable == 2
     signs = [np.sign(c.weights) for c in told.combinations[:2]]
     both = sorted(signs, key=lambda s: -abs(s.sum()))
     np.testing.assert_array_equal(both[0], 1.0)
@@ -201,7 +201,7 @@ def test_friction_of_three_cells_is_recovered_push_by_push():
         e = found[f"support_friction_{k}_0"]
         assert e.value == pytest.approx(true, rel=0.15), e
         assert e.ci90[0] / 1.1 < true < 1.1 * e.ci90[1]
-    assert result.cells.told == 3
+    assert result.cells.identifiable == 3
     assert result.cells.not_apart == ()
 
 

@@ -10,7 +10,7 @@ from worlds import recorded
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError
 from physid_drake.identify import OnlineIdentifier, SearchConfig
-from physid_drake.identify.baseline import plain
+from physid_drake.identify.baseline import baseline_hypothesis
 from physid_drake.plan import most_informative_push, teaching
 from physid_drake.policies import PlannedPush
 from physid_drake.pushes.config import ThetaConfig
@@ -63,7 +63,7 @@ def taught():
 
 def test_the_gain_is_half_the_rise_of_the_log_determinant(taught):
     _, case, _, lesson = taught
-    prior = plain(case).precision
+    prior = baseline_hypothesis(case).precision
     np.testing.assert_allclose(prior, 12.0 * np.eye(2), rtol=1e-6)
     wanted = [0.5 * np.log(np.linalg.det(prior + told) / np.linalg.det(prior)) for told in lesson.informations]
     np.testing.assert_allclose(lesson.gains, wanted, rtol=1e-6)

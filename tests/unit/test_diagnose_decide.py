@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from physid_drake.diagnose.decide import ADEQUATE, LITTLE, LOUD, decided, probability, surely_better
+from physid_drake.diagnose.decide import ADEQUATE, LITTLE, MOST_NOISE_SCALE, decided, probability, surely_better
 from physid_drake.diagnose.search import Found, Weighed
 from physid_drake.effects.drag import QuadraticDrag, ViscousDrag
 from physid_drake.effects.fields import Magnet, TableTilt, Tether
@@ -20,25 +20,25 @@ KINDS = (TableTilt, Tether, Magnet, ViscousDrag, QuadraticDrag, FrictionDrift)
 BY_CHANCE = {kind.name: np.random.default_rng(0).exponential(size=300) for kind in KINDS}
 
 
-def hypothesis(*kinds, gain, loudness=1.0, alike=0.5):
+def hypothesis(*kinds, gain, noise_scale=1.0, alike=0.5):
     """Effects that every push speaks for as loudly, or that gain (n,)."""
     parts = tuple(SimpleNamespace(kind=kind) for kind in kinds)
     name = " + ".join(sorted(kind.name for kind in kinds))
-    fit = SimpleNamespace(hypothesis=SimpleNamespace(parts=parts, name=name), loudness=loudness)
+    fit = SimpleNamespace(hypothesis=SimpleNamespace(parts=parts, name=name), noise_scale=noise_scale)
     return Weighed(fit=fit, gains=np.broadcast_to(gain, (PUSHES,)).astype(float), alike=alike)
 
 
 def found(*named, unnamed=(), odd=True, left=0.5, left_gain=20.0, plain=1.0, alike=0.5, pushes=PUSHES,
           rare=False):  # fmt: skip
     return Found(
-        fitter=None, plain=SimpleNamespace(pushes=range(pushes), loudness=plain), alike=alike,
+        fitter=None, baseline=SimpleNamespace(pushes=range(pushes), noise_scale=plain), alike=alike,
         columns=(), linearly={}, p_value=1e-6, odd=odd, rare=rare,
         by_chance=BY_CHANCE, named=tuple(sorted(named, key=lambda one: -one.gain)), left=left,
         left_gain=left_gain, unnamed=tuple(unnamed),
     )  # fmt: skip
 
 
-def said(*named, most=LOUD, **others):
+def said(*named, most=MOST_NOISE_SCALE, **others):
     return decided(found(*named, **others), most=most)
 
 
@@ -97,12 +97,14 @@ def test_a_second_effect_has_to_be_worth_it():
 def test_what_leaves_something_gets_no_name_and_yet_a_model():
     tilt = hypothesis(TableTilt, gain=2.0 * MUCH)
     nameless = hypothesis(UnnamedForce, gain=MUCH)
-    for others in ({"left": 0.5 * ADEQUATE}, {"plain": 2.0 * LOUD}):
-        loud = hypothesis(TableTilt, gain=2.0 * MUCH, loudness=1.1 * LOUD) if "plain" in others else tilt
+    for others in ({"left": 0.5 * ADEQUATE}, {"plain": 2.0 * MOST_NOISE_SCALE}):
+        loud = (
+            hypothesis(TableTilt, gain=2.0 * MUCH, noise_scale=1.1 * MOST_NOISE_SCALE) if "plain" in others else tilt
+        )
         answer = said(loud, unnamed=[nameless], **others)
         assert (answer.verdict, answer.best, answer.partly) == ("unexplained", nameless, loud)
     assert said(tilt, left=0.5 * ADEQUATE, left_gain=0.5 * LITTLE * tilt.gain).verdict == "explained"
-    loud = hypothesis(TableTilt, gain=2.0 * MUCH, loudness=2.0 * LOUD)
+    loud = hypothesis(TableTilt, gain=2.0 * MUCH, noise_scale=2.0 * MOST_NOISE_SCALE)
     assert said(loud, most=math.inf).verdict == "explained"  # as loud as nobody knows
 
 
@@ -113,7 +115,7 @@ def test_what_has_no_name_takes_a_name_away_that_predicts_worse():
 
 
 def test_errors_that_are_no_noise_are_a_mismatch_though_no_effect_helps():
-    answer = said(hypothesis(TableTilt, gain=0.0), odd=False, plain=2.0 * LOUD)
+    answer = said(hypothesis(TableTilt, gain=0.0), odd=False, plain=2.0 * MOST_NOISE_SCALE)
     assert (answer.verdict, answer.best) == ("unexplained", None)
 
 

@@ -106,9 +106,9 @@ def test_what_does_not_vary_or_is_no_single_number_is_left_out():
 @pytest.mark.parametrize(("column", "shows"), [(20.0, True), (0.5, False)])
 def test_what_would_not_show_at_its_strongest_is_not_among_what_would(column, shows):
     """A square of the restitution, up to 0.81: with so much change for each unit, it takes 0.04, or 1.5."""
-    pushes = [LinearPush(residual=np.zeros(3), shared=np.zeros((3, 2)), own=np.zeros((3, 0)))] * 12
+    pushes = [LinearPush(residual=np.zeros(3), shared=np.zeros((3, 2)), nuisance=np.zeros((3, 0)))] * 12
     hypothesis = Hypothesis(space=SPACE, around=AROUND, tolerances=1)
-    plain = SimpleNamespace(hypothesis=hypothesis, pushes=pushes, scatter=1.0, loudness=1.0, tail=1e6)
+    plain = SimpleNamespace(hypothesis=hypothesis, pushes=pushes, scatter=1.0, noise_scale=1.0, tail=1e6)
     columns = [
         Column(
             kind=Restitution, family=Family(point=(0.0,), free=(0,)), index=0,
@@ -122,7 +122,7 @@ def test_what_would_not_show_at_its_strongest_is_not_among_what_would(column, sh
     chance = np.random.default_rng(0).exponential(size=300)
     needed = gain_of(-np.log(CONFIRMED), chance) * 12.0 / 11.0
     found = estimates.smallest(
-        SimpleNamespace(fitter=fitter, plain=plain, columns=columns, by_chance={"restitution": chance})
+        SimpleNamespace(fitter=fitter, baseline=plain, columns=columns, by_chance={"restitution": chance})
     )
     assert [one.name for one in found] == (["restitution"] if shows else [])
     if shows:

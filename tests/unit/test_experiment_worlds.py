@@ -22,7 +22,7 @@ from physid_drake.validation.experiments.hidden_robot import (
     record_pushes,
 )
 from physid_drake.validation.experiments.learning import Learner, plain_task
-from physid_drake.validation.experiments.mit_pushes import PLAYED_SPEED, TICK, played
+from physid_drake.validation.experiments.mit_pushes import PLAYED_SPEED, TIME_STEP, played
 from physid_drake.validation.experiments.motion_prediction import MotionPrediction
 from physid_drake.validation.experiments.next_push import most_informative, the_first
 from physid_drake.validation.experiments.push_direction import _share_within
@@ -44,7 +44,7 @@ def truth_of(world, learner):
 def test_the_true_theta_predicts_what_the_hidden_robot_records():
     world, rng = world_of(), np.random.default_rng(1)
     robot = HiddenRobot(world, rng=rng, friction_scatter=0.0)
-    learner = Learner(robot.recording(record_pushes(robot, rng, 3, speeds=SPEEDS)), tick_s=2e-3)
+    learner = Learner(robot.recording(record_pushes(robot, rng, 3, speeds=SPEEDS)), time_step_s=2e-3)
     errors = learner.end_errors(learner.problems, truth_of(world, learner))
     assert errors.positions.max() < 2e-3
     assert np.degrees(errors.rotations.max()) < 2.0
@@ -88,7 +88,9 @@ def test_the_informative_push_is_one_that_turns_the_object():
     world, rng = world_of(), np.random.default_rng(3)
     robot = HiddenRobot(world, rng=rng)
     recording = robot.recording(record_pushes(robot, rng, 1, speeds=SPEEDS))
-    learner = Learner(recording, tick_s=4e-3, theta=ThetaConfig(parameters=["support_friction", "hand_friction"]))
+    learner = Learner(
+        recording, time_step_s=4e-3, theta=ThetaConfig(parameters=["support_friction", "hand_friction"])
+    )
     pushes = [
         PlannedPush(direction=0.5 * math.pi, speed=speed, travel=0.05, contact_offset=offset)
         for speed, offset in ((0.05, 0.0), (0.3, 0.02))
@@ -125,7 +127,7 @@ def slow_pushes(shape, speed=0.010):
 def test_a_slow_push_ends_where_it_does_played_faster():
     recording = slow_pushes(Box(size=(0.09, 0.09, 0.013)))
     config = ThetaConfig(parameters=["hand_friction"], nominal={"support_friction": 0.15})
-    exact, coarse = (Learner(recording, tick_s=tick, theta=config) for tick in (2e-3, TICK))
+    exact, coarse = (Learner(recording, time_step_s=time_step, theta=config) for time_step in (2e-3, TIME_STEP))
     theta = np.array([0.25])
     slow = np.array([r.poses[-1] for r in exact.case.pool.run([plain_task(p, theta) for p in exact.problems])])
     fast = [played(problem, PLAYED_SPEED) for problem in coarse.problems]
@@ -162,10 +164,10 @@ def test_the_share_of_trials_within_a_distance_grows_to_one():
 @pytest.mark.slow
 def test_motion_prediction_runs_from_end_to_end_and_is_resumed(tmp_path):
     experiment = MotionPrediction(
-        seed=0, repetitions=2, pushes=4, training=2, testing=1, subsets=(1, 2), budget=4, tick_s=4e-3
+        seed=0, repetitions=2, pushes=4, training=2, testing=1, subsets=(1, 2), budget=4, time_step_s=4e-3
     )  # fmt: skip
     with claim("motion_prediction", experiment, tmp_path) as folder:
-        records = run_all(experiment, folder, jobs=1, tick=lambda stage, done, total: None)
+        records = run_all(experiment, folder, jobs=1, time_step=lambda stage, done, total: None)
         result = experiment.result(records)
         write(folder, result, "motion_prediction", "the command")
     names = {"command.txt", "figure.svg", "result.json", "result.md", "budget.csv", "training_pushes.csv"}
@@ -176,5 +178,5 @@ def test_motion_prediction_runs_from_end_to_end_and_is_resumed(tmp_path):
         assert record["true_theta"]["mm"] < 5.0
     kept = (tmp_path / "repetitions" / "001.json").read_text()
     with claim("motion_prediction", experiment, tmp_path) as folder:
-        again = run_all(experiment, folder, jobs=1, tick=lambda s, d, t: None)
+        again = run_all(experiment, folder, jobs=1, time_step=lambda s, d, t: None)
     assert again == records and (tmp_path / "repetitions" / "001.json").read_text() == kept

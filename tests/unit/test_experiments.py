@@ -45,7 +45,7 @@ class Counted:
     repetitions: int = 4
     stop_at: int | None = None
 
-    def repeat(self, index, tick):
+    def repeat(self, index, progress):
         if index == self.stop_at:
             raise KeyboardInterrupt
         with Path(self.log).open("a") as file:
@@ -122,7 +122,7 @@ def test_a_result_is_written_to_the_same_bytes(tmp_path):
 
 def run_in(out, experiment, jobs=1):
     with claim("counted", experiment, out) as folder:
-        return run_all(experiment, folder, jobs=jobs, tick=silent)
+        return run_all(experiment, folder, jobs=jobs, progress=silent)
 
 
 def test_repetitions_that_are_done_are_not_made_again(counted, tmp_path):
@@ -136,7 +136,7 @@ def test_repetitions_that_are_done_are_not_made_again(counted, tmp_path):
 
 def test_an_interrupted_experiment_keeps_what_is_done(counted, tmp_path):
     with pytest.raises(KeyboardInterrupt), claim("counted", counted, tmp_path / "out") as folder:
-        run_all(dc.replace(counted, stop_at=2), folder, jobs=1, tick=silent)
+        run_all(dc.replace(counted, stop_at=2), folder, jobs=1, progress=silent)
     assert len(run_in(tmp_path / "out", counted)) == 4
     assert made(counted) == [0, 1, 2, 3]
 

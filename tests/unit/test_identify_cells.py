@@ -9,7 +9,7 @@ from physid_drake.belief import Belief
 from physid_drake.cell.outline import rectangle
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import ConfigError, ParameterError
-from physid_drake.identify.cells import cells_told
+from physid_drake.identify.cells import identifiable_cells
 from physid_drake.inference.hypothesis import Hypothesis
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.pushes.theta import theta_map
@@ -99,7 +99,7 @@ def test_a_length_of_nothing_is_refused():
 def told_by(thetas, rows):
     """What whitened residuals that change by ``rows`` (m, d) with ln theta tell."""
     prior, posterior = covariances(thetas, rows)
-    return cells_told(thetas, thetas.space.nominal, prior, posterior)
+    return identifiable_cells(thetas, thetas.space.nominal, prior, posterior)
 
 
 def covariances(thetas, rows):
@@ -118,7 +118,7 @@ def test_pushes_that_feel_only_the_sum_tell_one_combination_with_its_singular_va
     strength = 10.0 * np.sqrt(covariance.sum())
     assert first.strength == pytest.approx(strength, rel=1e-3)
     assert first.left == pytest.approx(1.0 / np.sqrt(1.0 + strength**2), rel=1e-3)
-    assert told.told == 1
+    assert told.identifiable == 1
     assert all(c.left == pytest.approx(1.0, abs=1e-4) for c in others)
     assert told.apart == ()
     assert len(told.not_apart) == 4
@@ -142,8 +142,8 @@ def test_what_is_told_does_not_depend_on_the_order_of_what_else_is_unknown():
     thetas = tied((2, 1), "mass", "support_friction")
     told = told_by(thetas, [[0.0, 50.0, 50.0], [50.0, 50.0, -50.0]])
     # The difference is mixed with the mass, whose prior leaves ln(0.9 / 0.1) / sqrt(12) open.
-    assert [c.told for c in told.combinations] == [True, False]
+    assert [c.identifiable for c in told.combinations] == [True, False]
     alone = told_by(tied((2, 1)), [[50.0, 50.0], [50.0, -50.0]])
-    assert alone.told == 2
+    assert alone.identifiable == 2
     assert alone.apart == (("support_friction_0_0", "support_friction_1_0"),)
     assert cells_verdict(alone).endswith("All neighbouring cells are distinguishable.")

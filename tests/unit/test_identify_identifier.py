@@ -37,11 +37,11 @@ class Trials:
         self.thetas = []
         misfits = theta_search.log_misfits
 
-        def counted(predictor, pushes, owns, thetas):
+        def counted(predictor, pushes, nuisances, thetas):
             if len(self.thetas) + 1 == stop_at:
                 raise KeyboardInterrupt
             self.thetas.append(thetas)
-            return misfits(predictor, pushes, owns, thetas)
+            return misfits(predictor, pushes, nuisances, thetas)
 
         patch.setattr(theta_search, "log_misfits", counted)
 
@@ -126,7 +126,7 @@ def test_predictions_come_in_the_order_of_the_tasks_whatever_was_simulated_befor
 
 def test_the_pool_says_how_far_it_is(recording):
     one, done = identifier(recording), []
-    one.case.pool.run(tasks_of(one, [0.2, 0.3]), tick=done.append)
+    one.case.pool.run(tasks_of(one, [0.2, 0.3]), progress=done.append)
     assert sum(done) == 4
 
 

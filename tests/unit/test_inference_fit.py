@@ -11,10 +11,10 @@ from physid_drake.effects.fields import TableTilt
 from physid_drake.effects.friction import AnisotropicTable
 from physid_drake.identify.baseline import baseline, settled, with_tolerances
 from physid_drake.inference.fit import Fitter, normal_equations
+from physid_drake.inference.multistart import reseated
 from physid_drake.inference.predictions import Predictor
 from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.inference.scores import columns, scores
-from physid_drake.inference.seats import reseated
 from physid_drake.pushes.case import case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
 
@@ -49,7 +49,7 @@ def test_the_baseline_is_identified_within_its_own_uncertainty(eraser):
     precision, _ = normal_equations(fit.weighed, h.mean - fit.point.z, h.precision)
     stds = np.sqrt(np.diag(np.linalg.inv(precision)))
     truth = np.asarray(space.to_unit([TRUTH.get(p.name, p.prior_mean) for p in space.parameters]))
-    assert fit.loudness == 1.0
+    assert fit.noise_scale == 1.0
     assert np.all(np.abs(fit.point.z - truth)[1:] < 4.0 * stds[1:])
     assert h.theta(fit.point.z)[1:] == pytest.approx([0.22, 0.27], rel=0.03)
 
@@ -63,7 +63,7 @@ def test_a_fit_is_where_no_step_gains(eraser):
 
 def test_a_push_on_the_wrong_one_of_its_ways_is_put_back(eraser):
     fitter, fit = eraser
-    off = tuple(own + 2.0 for own in fit.point.own)
+    off = tuple(nuisance + 2.0 for nuisance in fit.point.nuisance)
     point = fitter.points([fit.hypothesis], [fit.point.z], [off])[0]
     lost = fitter.started([fit.hypothesis], [point], [None], fit.tail)[0]
     assert lost.cost > fit.cost + 10.0
@@ -75,7 +75,9 @@ def test_null_effects_change_not_a_bit(eraser):
     h, point = fit.hypothesis, fit.point
     null = with_part(h, TableTilt, np.zeros(2))
     z = np.concatenate([point.z, np.zeros(2)])
-    asks = [Ask(0, Physics(one.theta(at), one.effects(at)), point.own[0]) for one, at in ((h, point.z), (null, z))]
+    asks = [
+        Ask(0, Physics(one.theta(at), one.effects(at)), point.nuisance[0]) for one, at in ((h, point.z), (null, z))
+    ]
     plain, with_null = fitter.predictor.vectors(asks)
     assert np.array_equal(plain, with_null)
 

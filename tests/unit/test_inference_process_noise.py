@@ -18,15 +18,15 @@ def left(table, tip, seed=0):
     found = [(30.0 * rng.normal(size=(ROWS, HATS)), 30.0 * rng.normal(size=(ROWS, HATS))) for _ in range(PUSHES)]
     pushes = []
     for w, v in found:
-        own = rng.normal(size=(ROWS, 1))
+        nuisance = rng.normal(size=(ROWS, 1))
         wandering = table * w @ rng.normal(size=HATS) + tip * v @ rng.normal(size=HATS)
-        residual = rng.normal(size=ROWS) + own @ rng.normal(size=1) + wandering
-        pushes.append(LinearPush(residual=residual, shared=np.zeros((ROWS, 0)), own=own))
+        residual = rng.normal(size=ROWS) + nuisance @ rng.normal(size=1) + wandering
+        pushes.append(LinearPush(residual=residual, shared=np.zeros((ROWS, 0)), nuisance=nuisance))
     fit = SimpleNamespace(
-        pushes=pushes, loudness=1.0, tail=NO_TAIL, point=SimpleNamespace(own=(), z=None),
+        pushes=pushes, noise_scale=1.0, tail=NO_TAIL, point=SimpleNamespace(nuisance=(), z=None),
         hypothesis=SimpleNamespace(physics=lambda z: None),
     )  # fmt: skip
-    predictor = SimpleNamespace(wanders=lambda own, physics: found)
+    predictor = SimpleNamespace(wanders=lambda nuisance, physics: found)
     return SimpleNamespace(predictor=predictor, least=1.0, priors=lambda scatter: [PRIOR] * PUSHES), fit
 
 

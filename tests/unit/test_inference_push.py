@@ -11,7 +11,7 @@ from physid_drake.inference.push import (
     TAIL,
     LinearPush,
     held_out,
-    loudness_of,
+    noise_scale_of,
     weighed,
     without,
 )
@@ -25,49 +25,51 @@ def a_push(rng, count=12):
     return rng.normal(size=count), rng.normal(size=(count, 3)), rng.normal(size=(count, 2))
 
 
-def covariance(own, loudness):
-    return loudness**2 * np.eye(len(own)) + (own * PRIOR**2) @ own.T
+def covariance(nuisance, noise_scale):
+    return noise_scale**2 * np.eye(len(nuisance)) + (nuisance * PRIOR**2) @ nuisance.T
 
 
-@pytest.mark.parametrize("loudness", [1.0, 2.5])
-def test_normal_errors_have_the_density_and_the_equations_of_linear_algebra(loudness):
-    residual, shared, own = a_push(RNG)
-    one = weighed(residual, shared, own, PRIOR, loudness, NO_TAIL)
-    inverse = np.linalg.inv(covariance(own, loudness))
-    density = stats.multivariate_normal(cov=covariance(own, loudness)).logpdf(residual)
+@pytest.mark.parametrize("noise_scale", [1.0, 2.5])
+def test_normal_errors_have_the_density_and_the_equations_of_linear_algebra(noise_scale):
+    residual, shared, nuisance = a_push(RNG)
+    one = weighed(residual, shared, nuisance, PRIOR, noise_scale, NO_TAIL)
+    inverse = np.linalg.inv(covariance(nuisance, noise_scale))
+    density = stats.multivariate_normal(cov=covariance(nuisance, noise_scale)).logpdf(residual)
     assert one.log_density == pytest.approx(density, rel=1e-4)
     np.testing.assert_allclose(one.precision, shared.T @ inverse @ shared, rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose(one.right, shared.T @ inverse @ residual, rtol=1e-4, atol=1e-6)
 
 
 def test_unknowns_follow_what_all_pushes_share():
-    residual, shared, own = a_push(RNG)
-    one = weighed(residual, shared, own, PRIOR, 1.0, NO_TAIL)
+    residual, shared, nuisance = a_push(RNG)
+    one = weighed(residual, shared, nuisance, PRIOR, 1.0, NO_TAIL)
     dz = np.array([0.3, -0.2, 0.1])
-    moved = weighed(residual - shared @ dz, shared, own, PRIOR, 1.0, NO_TAIL)
-    np.testing.assert_allclose(one.own + one.to_own @ dz, moved.own, atol=1e-6)
+    moved = weighed(residual - shared @ dz, shared, nuisance, PRIOR, 1.0, NO_TAIL)
+    np.testing.assert_allclose(one.nuisance + one.to_nuisance @ dz, moved.nuisance, atol=1e-6)
 
 
-@pytest.mark.parametrize("loudness", [1.0, 3.0])
-def test_without_unknowns_a_push_has_the_density_of_a_t_distribution(loudness):
+@pytest.mark.parametrize("noise_scale", [1.0, 3.0])
+def test_without_unknowns_a_push_has_the_density_of_a_t_distribution(noise_scale):
     residual, shared, _ = a_push(RNG)
-    one = weighed(residual, shared, np.zeros((12, 0)), np.zeros(0), loudness)
-    heavy = stats.multivariate_t(shape=loudness**2 * np.eye(12), df=TAIL)
+    one = weighed(residual, shared, np.zeros((12, 0)), np.zeros(0), noise_scale)
+    heavy = stats.multivariate_t(shape=noise_scale**2 * np.eye(12), df=TAIL)
     assert one.log_density == pytest.approx(heavy.logpdf(residual))
 
 
 def test_an_odd_push_counts_less_the_further_it_is_off():
-    residual, shared, own = a_push(np.random.default_rng(4))
-    off = np.linalg.qr(np.column_stack([own, RNG.normal(size=12)]))[0][:, -1]  # what no unknown explains
-    weights = [weighed(residual + far * off, shared, own, PRIOR, 1.0).weight for far in (0.0, 10.0, 30.0, 100.0)]
+    residual, shared, nuisance = a_push(np.random.default_rng(4))
+    off = np.linalg.qr(np.column_stack([nuisance, RNG.normal(size=12)]))[0][:, -1]  # what no unknown explains
+    weights = [weighed(residual + far * off, shared, nuisance, PRIOR, 1.0).weight for far in (0.0, 10.0, 30.0, 100.0)]
     assert weights[0] == pytest.approx(1.0, abs=0.5)
     assert all(later < 0.5 * earlier for earlier, later in pairwise(weights))
 
 
 def test_far_from_an_explanation_unknowns_stay_at_zero():
-    _, shared, own = a_push(RNG)
+    _, shared, nuisance = a_push(RNG)
     residual = 40.0 * RNG.normal(size=12)
-    near, far = (weighed(residual, shared, own, PRIOR, loudness, NO_TAIL).own for loudness in (1.0, 40.0))
+    near, far = (
+        weighed(residual, shared, nuisance, PRIOR, noise_scale, NO_TAIL).nuisance for noise_scale in (1.0, 40.0)
+    )
     assert np.abs(near / PRIOR).max() > 5.0
     assert np.abs(far / PRIOR).max() < 1.0
 
@@ -78,8 +80,8 @@ def test_loudness_is_found_and_is_no_less_than_it_may_be(scale):
     chances = np.sqrt(TAIL / rng.chisquare(TAIL, size=(400, 1)))  # of a t distribution
     errors = scale * chances * rng.normal(size=(400, count))
     squares = [float(e @ e) for e in errors]
-    assert loudness_of(squares, [count] * 400, 1e-3, TAIL) == pytest.approx(scale, rel=0.05)
-    assert loudness_of(squares, [count] * 400, 1.0, TAIL) >= 1.0
+    assert noise_scale_of(squares, [count] * 400, 1e-3, TAIL) == pytest.approx(scale, rel=0.05)
+    assert noise_scale_of(squares, [count] * 400, 1.0, TAIL) >= 1.0
 
 
 def test_coordinates_that_act_alike_leave_what_is_known_beforehand():
@@ -102,14 +104,14 @@ def test_a_coordinate_that_no_other_push_tells_is_as_good_as_free():
 def test_held_out_density_is_the_ratio_of_two_marginal_ones():
     rng = np.random.default_rng(2)
     mean, std = np.zeros(3), np.array([1.0, 2.0, 0.7])
-    pushes = [LinearPush(residual=r, shared=x, own=j) for r, x, j in (a_push(rng) for _ in range(4))]
-    found = [weighed(p.residual, p.shared, p.own, PRIOR, 1.0, NO_TAIL) for p in pushes]
+    pushes = [LinearPush(residual=r, shared=x, nuisance=j) for r, x, j in (a_push(rng) for _ in range(4))]
+    found = [weighed(p.residual, p.shared, p.nuisance, PRIOR, 1.0, NO_TAIL) for p in pushes]
 
     def marginal(some):
         shared = np.vstack([p.shared for p in some])
         blocks = np.zeros((12 * len(some),) * 2)
         for k, p in enumerate(some):
-            blocks[12 * k : 12 * (k + 1), 12 * k : 12 * (k + 1)] = covariance(p.own, 1.0)
+            blocks[12 * k : 12 * (k + 1), 12 * k : 12 * (k + 1)] = covariance(p.nuisance, 1.0)
         spread = blocks + (shared * std**2) @ shared.T
         return stats.multivariate_normal(cov=spread).logpdf(np.concatenate([p.residual for p in some]))
 

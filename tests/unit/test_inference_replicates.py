@@ -33,20 +33,20 @@ def problem(rng, amount=0.0):
     ]  # fmt: skip
     pushes = tuple(
         LinearPush(
-            residual=amount * column + own @ (PRIOR * rng.normal(size=2)) + rng.normal(size=ROWS),
+            residual=amount * column + nuisance @ (PRIOR * rng.normal(size=2)) + rng.normal(size=ROWS),
             shared=shared,
-            own=own,
+            nuisance=nuisance,
         )
-        for (shared, own), column in zip(shapes, columns[0].pushes, strict=True)
+        for (shared, nuisance), column in zip(shapes, columns[0].pushes, strict=True)
     )
     hypothesis = SimpleNamespace(
         dimension=SHARED, mean=np.zeros(SHARED), known=np.arange(SHARED), precision=1e-2 * np.eye(SHARED),
         whitening=0.1 * np.eye(SHARED),
     )  # fmt: skip
     fit = SimpleNamespace(
-        hypothesis=hypothesis, pushes=pushes, scatter=SCATTER, loudness=1.0, tail=1e6,
+        hypothesis=hypothesis, pushes=pushes, scatter=SCATTER, noise_scale=1.0, tail=1e6,
         point=SimpleNamespace(z=np.zeros(SHARED)),
-        weighed=tuple(weighed(p.residual, p.shared, p.own, PRIOR, 1.0, 1e6) for p in pushes),
+        weighed=tuple(weighed(p.residual, p.shared, p.nuisance, PRIOR, 1.0, 1e6) for p in pushes),
     )  # fmt: skip
     return SimpleNamespace(priors=lambda scatter: [PRIOR] * PUSHES), fit, columns
 

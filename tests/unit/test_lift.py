@@ -1,4 +1,4 @@
-"""The friction of depths beyond the loads: what is given back over a tick."""
+"""The friction of depths beyond the loads: what is given back over a time step."""
 
 import numpy as np
 import pytest

@@ -21,7 +21,7 @@ from physid_drake.errors import ConfigError, RobotError
 from physid_drake.identify import SearchConfig
 from physid_drake.plan import DistanceToGoal, Ending, SimulatedRobot, Situation, plan
 from physid_drake.plan.draws import draws_of
-from physid_drake.plan.story import outcome_under, spread_of
+from physid_drake.plan.pipeline import outcome_under, spread_of
 from physid_drake.plan.system import PolicySystem, identified_model
 from physid_drake.plan.task import Choices, default_goal, policy_for
 from physid_drake.plan.trajectory import _paced, path_of, trajectory_of
@@ -159,10 +159,10 @@ def test_another_model_says_what_it_makes_of_a_plan(planned):
 
 
 @pytest.mark.parametrize(
-    ("own", "speed", "tick"), [(1e-3, 1.0, 1e-3), (1e-3, 0.02, 4e-3), (1e-2, 0.005, 1e-2), (1e-2, 1.0, 2e-3)]
+    ("own", "speed", "time_step"), [(1e-3, 1.0, 1e-3), (1e-3, 0.02, 4e-3), (1e-2, 0.005, 1e-2), (1e-2, 1.0, 2e-3)]
 )
-def test_a_tick_is_short_enough_for_the_push_and_no_shorter(own, speed, tick):
-    assert _paced(SolverConfig(time_step_s=own), speed).time_step_s == pytest.approx(tick)
+def test_a_tick_is_short_enough_for_the_push_and_no_shorter(own, speed, time_step):
+    assert _paced(SolverConfig(time_step_s=own), speed).time_step_s == pytest.approx(time_step)
 
 
 # The diagram and the robot.

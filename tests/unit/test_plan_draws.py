@@ -17,7 +17,7 @@ from physid_drake.errors import ConfigError
 from physid_drake.model import Correlation
 from physid_drake.plan import DistanceToGoal, Situation
 from physid_drake.plan.draws import draws_of
-from physid_drake.plan.story import spread_of
+from physid_drake.plan.pipeline import spread_of
 from physid_drake.policies import PlannedPush
 
 

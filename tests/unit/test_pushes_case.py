@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from physid_drake.diagnose.next_push import LONGEST_TICK, _chance, _problem, brisk_pool
+from physid_drake.diagnose.next_push import LONGEST_TIME_STEP, _chance, _problem, brisk_pool
 from physid_drake.errors import RecordingError
 from physid_drake.model import turned
 from physid_drake.pushes.case import case_of, cell_config
@@ -61,8 +61,8 @@ def test_forces_that_are_compared_or_were_not_recorded_need_no_word(recording):
 
 def test_the_next_push_of_a_slow_recording_is_simulated_on_ticks_for_a_fast_hand(recording):
     slow = case(slowed(recording, 100.0))
-    assert slow.pool.spec.config.solver.time_step_s > 5.0 * LONGEST_TICK
-    assert brisk_pool(slow).spec.config.solver.time_step_s == pytest.approx(LONGEST_TICK)
+    assert slow.pool.spec.config.solver.time_step_s > 5.0 * LONGEST_TIME_STEP
+    assert brisk_pool(slow).spec.config.solver.time_step_s == pytest.approx(LONGEST_TIME_STEP)
     usual = case(recording)
     assert brisk_pool(usual).spec == usual.pool.spec
 

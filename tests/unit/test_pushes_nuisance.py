@@ -1,4 +1,4 @@
-"""A push's own unknowns: what each of them changes, and what it leaves alone."""
+"""A push's nuisance parameters: what each of them changes, and what it leaves alone."""
 
 from dataclasses import replace
 

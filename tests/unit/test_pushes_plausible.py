@@ -8,8 +8,8 @@ import pytest
 from runs import shipped_pushes
 
 from physid_drake.diagnose.sentence import sentence
-from physid_drake.pushes.doubts import doubts
 from physid_drake.pushes.plausible import FEW_NAMES, implausible
+from physid_drake.pushes.push_warnings import doubts
 from physid_drake.pushes.stated import MANY_TIMES, quieter_by, too_loud
 from physid_drake.recording import Box, Cylinder, ForceStream, ObjectModel, Sensors, Table, read_recording
 from physid_drake.report.tables import verdict

@@ -9,7 +9,7 @@ import pytest
 from recovery.worlds import POSITION_STD, endpoints, pushes_of, recorded
 from reference.scenes import OBJECTS, Theta
 
-from physid_drake.diagnose.decide import loudest
+from physid_drake.diagnose.decide import most_noise_scale
 from physid_drake.pushes import tracker_noise as noise_module
 from physid_drake.pushes.features import features_of
 from physid_drake.pushes.problem import problems_of
@@ -59,8 +59,8 @@ def test_noise_that_one_short_rest_tells_is_called_a_mismatch_as_seldom_as_is_sa
     rng, called = np.random.default_rng(4), []
     for _ in range(300):
         seen = seen_noise([*rests(rng, 2, 14, rho)], 1e-3)
-        loudness = float(np.sqrt(np.mean((2.0 / seen.std * rng.standard_normal(88)) ** 2)))
-        called.append(loudness > loudest(SimpleNamespace(known=True, doubt=seen.doubt)))
+        noise_scale = float(np.sqrt(np.mean((2.0 / seen.std * rng.standard_normal(88)) ** 2)))
+        called.append(noise_scale > most_noise_scale(SimpleNamespace(known=True, doubt=seen.doubt)))
     assert np.mean(called) <= 0.02
 
 

@@ -10,8 +10,8 @@ from runs import shipped_pushes
 from physid_drake.errors import RecordingError
 from physid_drake.pushes.case import case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
-from physid_drake.pushes.doubts import doubts
-from physid_drake.pushes.refusals import refusals, refuse
+from physid_drake.pushes.push_checks import refusals, refuse
+from physid_drake.pushes.push_warnings import doubts
 from physid_drake.recording import ForceStream, PoseStream, estimate_noise, read_recording, thinned, write_recording
 from physid_drake.recording.clocks import check_seconds, samples_within
 from physid_drake.recording.reading import MOST_ROWS

@@ -24,8 +24,8 @@ def test_brackets_are_printed(capsys):
 
 
 def test_a_bar_takes_any_name_for_its_stage():
-    with progress_bar(terminal()) as tick:
-        tick(WORDS[1], 1, 2)
+    with progress_bar(terminal()) as progress:
+        progress(WORDS[1], 1, 2)
 
 
 def test_a_file_has_room_for_a_table(capsys):
@@ -34,9 +34,9 @@ def test_a_file_has_room_for_a_table(capsys):
 
 
 def test_a_log_says_every_stage_once_and_apart_from_the_results(capsys):
-    with progress_bar(terminal()) as tick:
+    with progress_bar(terminal()) as progress:
         for stage, done in (("search", 1), ("search", 2), (WORDS[1], 1)):
-            tick(stage, done, 2)
+            progress(stage, done, 2)
     printed = capsys.readouterr()
     assert [line.split(" s  ")[1] for line in printed.err.splitlines()] == ["search", WORDS[1]]
     assert printed.out == ""
@@ -52,12 +52,12 @@ class Clock:
 
 def test_a_log_says_once_a_minute_how_far_a_long_stage_is(capsys, monkeypatch):
     clock = Clock(monkeypatch)
-    with progress_bar(terminal()) as tick:
+    with progress_bar(terminal()) as progress:
         for done, seconds in enumerate((0.0, 30.0, 70.0, 100.0, 131.0)):
             clock.now = 100.0 + seconds
-            tick("search", done, 9)
+            progress("search", done, 9)
         clock.now = 300.0
-        tick("search", 0, 0)  # nobody knows how far
+        progress("search", 0, 0)  # nobody knows how far
     lines = [line.strip() for line in capsys.readouterr().err.splitlines()]
     assert lines == [
         "0 s  search", "70 s  search, 2 of 9 (4 min left)", "131 s  search, 4 of 9 (3 min left)"
@@ -102,10 +102,10 @@ def test_eighty_columns_hold_the_line(monkeypatch):
     console = Console(width=80, force_terminal=True, file=io.StringIO(), markup=False)
     clock = Clock(monkeypatch)
     for stage in DIAGNOSIS_STAGES:
-        with progress_bar(console, DIAGNOSIS_STAGES) as tick:
-            tick(next(iter(DIAGNOSIS_STAGES)), 0, 0)
+        with progress_bar(console, DIAGNOSIS_STAGES) as progress:
+            progress(next(iter(DIAGNOSIS_STAGES)), 0, 0)
             clock.now += 100.0
-            tick(stage, 0, 0)
+            progress(stage, 0, 0)
     written = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", console.file.getvalue())
     lines = [line for line in re.split(r"[\r\n]+", written) if line.strip()]
     assert lines and max(map(len, lines)) <= 80 and not any("…" in line for line in lines)

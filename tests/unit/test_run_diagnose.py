@@ -95,7 +95,7 @@ def test_a_model_survives_its_file(model, tmp_path):
     assert loaded.effects == model.effects and loaded.shape == model.shape and loaded.config == model.config
     assert loaded.intervals == model.intervals and loaded.body.support_friction[0] == 0.3
     assert loaded.build().diagram.HasSubsystemNamed("plant")
-    assert loaded.plain().effects == ()
+    assert loaded.baseline().effects == ()
 
 
 def test_a_push_is_simulated_as_the_docs_say(model, tmp_path, monkeypatch, capsys):

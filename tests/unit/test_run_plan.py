@@ -236,7 +236,7 @@ def test_ctrl_c_ends_with_130_and_writes_nothing(folder, tmp_path, capsys, monke
     def interrupted(*args, **more):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("physid_drake.plan.story.trajectory_of", interrupted)
+    monkeypatch.setattr("physid_drake.plan.pipeline.trajectory_of", interrupted)
     assert main(["plan", str(folder), *QUICK, "--out", str(tmp_path / "out")]) == 130
     assert "interrupted" in capsys.readouterr().err and not (tmp_path / "out").exists()
 
@@ -291,7 +291,7 @@ def test_the_main_job_plans_again_with_what_its_diagnosis_found(
         named = [SimpleNamespace(name=e.name, indistinguishable_from=rivals) for e in effects]
         said = SimpleNamespace(verdict=verdict, sentence="Said & done.", effects=named, rollouts=1)
         return said, SimpleNamespace(
-            known=known, leaving=known.fit, fitter=known.fitter, errors_after=known.errors
+            known=known, corrected=known.fit, fitter=known.fitter, errors_after=known.errors
         )  # fmt: skip
 
     model = run_cell.Work.model

@@ -29,7 +29,7 @@ class Wish:
 
 def _motion_prediction(wish: Wish) -> Experiment:
     if wish.quick:
-        return MotionPrediction(seed=wish.seed, repetitions=2, budget=12, tick_s=4e-3)
+        return MotionPrediction(seed=wish.seed, repetitions=2, budget=12, time_step_s=4e-3)
     return MotionPrediction(seed=wish.seed)
 
 
@@ -46,7 +46,7 @@ def _mit_pushes(wish: Wish) -> Experiment:
 
 def _push_direction(wish: Wish) -> Experiment:
     if wish.quick:
-        return PushDirections(seed=wish.seed, repetitions=3, budget=10, training=3, directions=15, tick_s=4e-3)
+        return PushDirections(seed=wish.seed, repetitions=3, budget=10, training=3, directions=15, time_step_s=4e-3)
     return PushDirections(seed=wish.seed)
 
 
@@ -60,7 +60,7 @@ def _push_speed(wish: Wish) -> Experiment:
 
 def _next_push(wish: Wish) -> Experiment:
     if wish.quick:
-        return NextPush(seed=wish.seed, repetitions=2, pushes=3, candidates=5, testing=3, budget=7, tick_s=4e-3)
+        return NextPush(seed=wish.seed, repetitions=2, pushes=3, candidates=5, testing=3, budget=7, time_step_s=4e-3)
     return NextPush(seed=wish.seed)
 
 

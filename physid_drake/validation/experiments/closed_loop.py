@@ -69,13 +69,13 @@ class ClosedLoops:
     pushes: int = 3
     budget: int = 48
 
-    def repeat(self, index: int, tick: Progress) -> Record:
+    def repeat(self, index: int, progress: Progress) -> Record:
         """One eraser: identify it from a push, then bring it to a goal, blindly and not, in both worlds."""
         draws = np.random.default_rng([self.seed, index, 7])
         world = draw_world(draws, ERASER, FRICTIONS)
         robot = HiddenRobot(world, rng=draws)
         recording = robot.recording(record_pushes(robot, draws, TRAINING, speeds=SPEEDS))
-        tick("identification", 0, 0)
+        progress("identification", 0, 0)
         case = case_of(recording, cell_config(recording), ThetaConfig(nominal={"mass": world.mass}))
         known = with_prior(identified(case, seed=self.seed))
         model = identified_model(known, case.pool.spec, "hidden", hand=HandUse.of(case.problems))
@@ -86,7 +86,7 @@ class ClosedLoops:
         )  # fmt: skip
         record: Record = {"truth": world.support_friction, "believed": value_of(model, "theta.support_friction")}
         truth = dc.replace(
-            model.plain(), body=dc.replace(
+            model.baseline(), body=dc.replace(
                 model.body, mass=world.mass, hand_friction=world.hand_friction,
                 support_friction=np.full_like(model.body.support_friction, world.support_friction),
             ),
@@ -95,7 +95,7 @@ class ClosedLoops:
         for where in (SIMULATED, HIDDEN):
             record[where] = {}
             for name, loop in LOOPS.items():
-                tick(f"{where}, {name}", 0, 0)
+                progress(f"{where}, {name}", 0, 0)
                 rng = np.random.default_rng(seed)
                 arm: Robot = SimulatedRobot(truth, start=start, sensors=SENSORS, rng=rng)
                 if where == HIDDEN:

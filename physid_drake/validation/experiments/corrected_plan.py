@@ -49,13 +49,13 @@ class CorrectedPlans:
     repetitions: int = 40
     budget: int = 48
 
-    def repeat(self, index: int, tick: Progress) -> Record:
+    def repeat(self, index: int, progress: Progress) -> Record:
         """One world: diagnose its recording, plan with both models, make both pushes there."""
-        tick("a hidden world", 0, 0)
+        progress("a hidden world", 0, 0)
         world, _ = draw_world(index, self.seed, "effect")
         recording, truth = make_world(index, self.seed, "effect", name="hidden")
         case = case_of(recording, cell_config(recording), ThetaConfig())
-        diagnosis, evidence = diagnose(case, seed=self.seed, alpha=ALPHA, tick=tick)
+        diagnosis, evidence = diagnose(case, seed=self.seed, alpha=ALPHA, progress=progress)
         draws = np.random.default_rng([self.seed, index, 60])
         start, goal = _task(draws, world, recording)
         record: Record = {
@@ -65,7 +65,7 @@ class CorrectedPlans:
         }  # fmt: skip
         factor = 1.0 + 0.02 * float(draws.standard_normal())
         for name, model in _models(evidence).items():
-            tick(f"the plan of the {name} model", 0, 0)
+            progress(f"the plan of the {name} model", 0, 0)
             made = self._planned(model, start, goal, len(recording.pushes), index)
             record[name] = _outcome(world, made, start, goal, factor)
         return record

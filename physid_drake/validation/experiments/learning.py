@@ -77,7 +77,7 @@ class Learner:
         self,
         recording: Recording,
         *,
-        tick_s: float = 2e-3,
+        time_step_s: float = 2e-3,
         theta: ThetaConfig | None = None,
         config: CellConfig | None = None,
     ) -> None:
@@ -85,11 +85,11 @@ class Learner:
 
         Args:
             recording: the pushes.
-            tick_s: of the cell [s].
+            time_step_s: of the cell [s].
             theta: what is unknown; mass, within the paper's bounds, and both frictions if None.
-            config: of the cell, instead of the default with that tick.
+            config: of the cell, instead of the default with that time step.
         """
-        solver = SolverConfig(time_step_s=tick_s, slide_time_step_s=max(tick_s, 2e-3))
+        solver = SolverConfig(time_step_s=time_step_s, slide_time_step_s=max(time_step_s, 2e-3))
         self.config = config or CellConfig(solver=solver)
         count = len(recording.pushes)
         self.case = case_of(recording, self.config, theta or AS_IN_THE_PAPER, jobs=1, most=count)
@@ -229,6 +229,6 @@ class _SpentError(Exception):
 
 
 def plain_task(problem: PushProblem, theta: Array) -> Task:
-    """A rollout of a push with theta (d,), its own unknowns at their most likely values."""
+    """A rollout of a push with theta (d,), its nuisance parameters at their most likely values."""
     nuisance = nuisance_of(problem, UNIT_SCATTER)
     return Task(problem=problem, theta=theta, nuisance=nuisance, values=np.zeros(len(nuisance.names)))

@@ -76,7 +76,7 @@ FRICTION_BUDGET: Final = 6
 
 PLAYED_SPEED: Final = 0.03
 """m/s at which a slow push is played: friction alone decides, and it does not know the speed."""
-TICK: Final = 4e-3  # s
+TIME_STEP: Final = 4e-3  # s
 SUPPORT_FRICTION: Final = 0.15  # documented; it hardly matters
 DIVERGED: Final = 1.0  # m and rad: error of a rollout that did
 SMALLEST_SIZE: Final = 2e-4  # m
@@ -137,13 +137,13 @@ class MitPushes:
         """The folds of the main table, then the other tables."""
         return self.folds + len(self.others)
 
-    def repeat(self, index: int, tick: Progress) -> Record:
+    def repeat(self, index: int, progress: Progress) -> Record:
         """One fold of the main table, or all folds of another."""
         if index < self.folds:
-            return self._fold(MAIN, index, self.pushes, self.folds, self.budget, TRIED, tick)
+            return self._fold(MAIN, index, self.pushes, self.folds, self.budget, TRIED, progress)
         name = self.others[index - self.folds]
         folds = [
-            self._fold(name, k, self.other_pushes, self.other_folds, self.other_budget, OTHERS_TRIED, tick)
+            self._fold(name, k, self.other_pushes, self.other_folds, self.other_budget, OTHERS_TRIED, progress)
             for k in range(self.other_folds)
         ]
         return {"folds": folds}
@@ -156,7 +156,7 @@ class MitPushes:
         folds: int,
         budget: int,
         tried: Sequence[tuple[str, str]],
-        tick: Progress,
+        progress: Progress,
     ) -> Record:
         """Learn from pushes outside a fold, and predict those inside."""
         table = PublishedPushes(self.folder, name, pushes, self.seed)
@@ -176,7 +176,7 @@ class MitPushes:
                 method,
                 lambda theta, space=space: table.roots(table.errors(training, space.as_dict(theta))),  # type: ignore[misc]
                 table.misfit, space, budget=total, rng=stream,
-                on_trial=lambda count, stage=stage, total=total: tick(stage, count, total),  # type: ignore[misc]
+                on_trial=lambda count, stage=stage, total=total: progress(stage, count, total),  # type: ignore[misc]
             )  # fmt: skip
             record["methods"][f"{method}: {unknown}"] = self._tested(table, space, trials, testing, budget)
         return record
@@ -221,7 +221,7 @@ class MitPushes:
                 " from the other folds. Errors are of the object's last pose. The objective is the mean size of"
                 " the error, with rotations multiplied by the radius of gyration. Pushes are played at"
                 f" {1e3 * PLAYED_SPEED:.0f} mm/s with time steps of"
-                f" {1e3 * TICK:.0f} ms."
+                f" {1e3 * TIME_STEP:.0f} ms."
             ),
             tables=tuple(tables),
             panels=tuple(self._panel(main, k) for k in range(2)),
@@ -286,7 +286,7 @@ class PublishedPushes:
         with tempfile.TemporaryDirectory() as place:
             recording = convert_mit(source, Path(place) / "recording", limit=limit, seed=seed)
         theta = ThetaConfig(parameters=["hand_friction"], nominal={"support_friction": SUPPORT_FRICTION})
-        config = CellConfig(solver=SolverConfig(time_step_s=TICK, slide_time_step_s=TICK))
+        config = CellConfig(solver=SolverConfig(time_step_s=TIME_STEP, slide_time_step_s=TIME_STEP))
         learner = Learner(recording, theta=theta, config=config)
         self._spec, self._thetas = learner.case.pool.spec, learner.thetas
         self.problems = tuple(played(problem, PLAYED_SPEED) for problem in learner.problems)

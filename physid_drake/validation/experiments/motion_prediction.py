@@ -42,7 +42,7 @@ class MotionPrediction:
         subsets: numbers of training pushes that are compared; what is neither for training nor for testing is
             tested on too.
         budget: trials of a method, one of them a rollout of all training pushes.
-        tick_s: of the cell [s].
+        time_step_s: of the cell [s].
     """
 
     seed: int
@@ -52,22 +52,22 @@ class MotionPrediction:
     testing: int = 3
     subsets: tuple[int, ...] = (1, 3, 6)
     budget: int = 40
-    tick_s: float = 2e-3
+    time_step_s: float = 2e-3
 
-    def repeat(self, index: int, tick: Progress) -> Record:
+    def repeat(self, index: int, progress: Progress) -> Record:
         """One world: every method on the same pushes."""
         draws, *streams = [np.random.default_rng(s) for s in np.random.SeedSequence([self.seed, index]).spawn(8)]
         world = draw_world(draws, ERASER, FRICTIONS)
         robot = HiddenRobot(world, rng=draws)
-        tick("pushes in the hidden world", 0, 0)
+        progress("pushes in the hidden world", 0, 0)
         recording = robot.recording(record_pushes(robot, draws, self.pushes, speeds=SPEEDS))
-        learner = Learner(recording, tick_s=self.tick_s)
+        learner = Learner(recording, time_step_s=self.time_step_s)
         training, testing = learner.problems[: self.training], learner.problems[self.training :][: self.testing]
         methods = {}
         for method, rng in zip(METHODS, streams, strict=False):
             trials = learner.learn(
                 method, training, budget=self.budget, rng=rng,
-                on_trial=lambda count, method=method: tick(method, count, self.budget),  # type: ignore[misc]
+                on_trial=lambda count, method=method: progress(method, count, self.budget),  # type: ignore[misc]
             )  # fmt: skip
             methods[method] = self._against_budget(learner, trials, testing)
         truth = np.array([{"mass": world.mass, "support_friction": world.support_friction,
@@ -77,7 +77,7 @@ class MotionPrediction:
             "methods": methods,
             "true_theta": _ends(learner.end_errors(testing, truth)),
             "nominal_theta": _ends(learner.end_errors(testing, np.asarray(learner.thetas.space.nominal))),
-            "subsets": self._against_pushes(learner, streams[-1], tick),
+            "subsets": self._against_pushes(learner, streams[-1], progress),
         }
 
     def _against_budget(self, learner: Learner, trials: Trials, testing: Sequence[PushProblem]) -> Record:
@@ -98,11 +98,11 @@ class MotionPrediction:
             "deg": [row["deg"] for row in rows],
         }
 
-    def _against_pushes(self, learner: Learner, rng: np.random.Generator, tick: Progress) -> Record:
+    def _against_pushes(self, learner: Learner, rng: np.random.Generator, progress: Progress) -> Record:
         """Errors on all pushes that are never trained on, by the number of training pushes."""
         others, result = learner.problems[self.training :], {}
         for count, stream in zip(self.subsets, rng.spawn(len(self.subsets)), strict=True):
-            tick(f"greedy entropy search on {count} of {self.training} training pushes", 0, 0)
+            progress(f"greedy entropy search on {count} of {self.training} training pushes", 0, 0)
             trials = learner.learn(GREEDY, learner.problems[:count], budget=self.budget, rng=stream)
             result[str(count)] = _ends(learner.end_errors(others, trials.best_after(self.budget)))
         return result

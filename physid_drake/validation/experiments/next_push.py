@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from physid_drake.identify.baseline import plain
+from physid_drake.identify.baseline import baseline_hypothesis
 from physid_drake.plan import most_informative_push
 from physid_drake.policies import PlannedPush
 from physid_drake.progress import Progress
@@ -62,7 +62,7 @@ class NextPush:
         candidates: random pushes from which the next is chosen.
         testing: random pushes that are predicted.
         budget: trials of each fit.
-        tick_s: of the cell [s].
+        time_step_s: of the cell [s].
     """
 
     seed: int
@@ -71,9 +71,9 @@ class NextPush:
     candidates: int = 10
     testing: int = 6
     budget: int = 10
-    tick_s: float = 2e-3
+    time_step_s: float = 2e-3
 
-    def repeat(self, index: int, tick: Progress) -> Record:
+    def repeat(self, index: int, progress: Progress) -> Record:
         """One world: both ways of choosing meet the same candidates."""
         draws = np.random.default_rng([self.seed, index])
         world = draw_world(draws, ERASER, FRICTIONS)
@@ -84,7 +84,7 @@ class NextPush:
         record: Record = {"truth": {name: getattr(world, name) for name in UNKNOWN}}
         for name, choose in CHOOSERS.items():
             robot = HiddenRobot(world, rng=np.random.default_rng(seed))
-            record[name] = self._learned(robot, choose, offers, tester.recording(tests), name, tick)
+            record[name] = self._learned(robot, choose, offers, tester.recording(tests), name, progress)
         return record
 
     def _learned(
@@ -94,22 +94,22 @@ class NextPush:
         offers: Sequence[Offer],
         tests: Recording,
         name: str,
-        tick: Progress,
+        progress: Progress,
     ) -> Record:
         """Push, learn, choose, push."""
         config = ThetaConfig(parameters=list(UNKNOWN), nominal={"mass": robot.world.mass})
-        tester = Learner(tests, tick_s=self.tick_s, theta=config)
+        tester = Learner(tests, time_step_s=self.time_step_s, theta=config)
         learner, made = tester, list[Push]()
         theta = np.asarray(tester.thetas.space.nominal)
-        information = plain(tester.case).precision
+        information = baseline_hypothesis(tester.case).precision
         found: dict[str, list[float]] = {"support_friction": [], "hand_friction": [], "mm": [], "deg": []}
         for number, offer in enumerate(offers):
-            tick(f"{name}: push {number + 1}", number, len(offers))
+            progress(f"{name}: push {number + 1}", number, len(offers))
             pose, pushes = offer
             chosen, information = choose(learner, theta, information, offer)
             robot.put(pose)
             made.append(robot.execute(pushes[chosen]))
-            learner = Learner(robot.recording(tuple(made)), tick_s=self.tick_s, theta=config)
+            learner = Learner(robot.recording(tuple(made)), time_step_s=self.time_step_s, theta=config)
             trials = learner.learn(LEAST_SQUARES, learner.problems, budget=self.budget, rng=np.random.default_rng(0))
             theta = trials.best_after(self.budget)
             for parameter, value in learner.thetas.space.as_dict(theta).items():

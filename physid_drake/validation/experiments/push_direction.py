@@ -54,7 +54,7 @@ class PushDirections:
         directions: candidates for each push.
         distance: of the goal [m].
         speed: of the hand [m/s].
-        tick_s: of the cell [s].
+        time_step_s: of the cell [s].
     """
 
     seed: int
@@ -64,9 +64,9 @@ class PushDirections:
     directions: int = 25
     distance: float = 0.2
     speed: float = 0.3
-    tick_s: float = 2e-3
+    time_step_s: float = 2e-3
 
-    def repeat(self, index: int, tick: Progress) -> Record:
+    def repeat(self, index: int, progress: Progress) -> Record:
         """One world: learn, then push twice with each model."""
         draws, scatter, *streams = [
             np.random.default_rng(s) for s in np.random.SeedSequence([self.seed, index]).spawn(6)
@@ -74,7 +74,7 @@ class PushDirections:
         world = draw_world(draws, ERASER, FRICTIONS)
         robot = HiddenRobot(world, rng=draws)
         learner = Learner(
-            robot.recording(record_pushes(robot, draws, self.training, speeds=SLOW)), tick_s=self.tick_s
+            robot.recording(record_pushes(robot, draws, self.training, speeds=SLOW)), time_step_s=self.time_step_s
         )  # fmt: skip
         space = learner.thetas.space
         truth = {"mass": world.mass, "support_friction": world.support_friction, "hand_friction": world.hand_friction}
@@ -82,7 +82,7 @@ class PushDirections:
         for method, stream in zip(COMPARED, streams, strict=False):
             trials = learner.learn(
                 method, learner.problems, budget=self.budget, rng=stream,
-                on_trial=lambda count, method=method: tick(method, count, self.budget),  # type: ignore[misc]
+                on_trial=lambda count, method=method: progress(method, count, self.budget),  # type: ignore[misc]
             )  # fmt: skip
             thetas[method] = trials.best_after(self.budget)
         start = draw_start(draws)
@@ -92,7 +92,7 @@ class PushDirections:
         seeds = scatter.integers(2**63, size=2).tolist()
         ends = {}
         for name, theta in thetas.items():
-            tick(f"pushes with {name}", 0, 0)
+            progress(f"pushes with {name}", 0, 0)
             attempt = HiddenRobot(world, rng=np.random.default_rng(seeds[0]), start=start)
             model = attempt.model(learner.config, learner.thetas.body(theta))
             ends[name] = self._distance(attempt, model, goal, np.random.default_rng(seeds[1]))

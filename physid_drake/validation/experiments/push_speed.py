@@ -72,7 +72,7 @@ class PushSpeeds:
         polish_budget: trials of least squares after it, where the model is polished.
         plan_budget: speeds tried in simulation.
         rollouts, updates: of PoWER and its peer: real pushes of an update, and updates.
-        tick_s: of the cell [s].
+        time_step_s: of the cell [s].
     """
 
     seed: int
@@ -83,18 +83,18 @@ class PushSpeeds:
     plan_budget: int = 32
     rollouts: int = 5
     updates: int = 10
-    tick_s: float = 2e-3
+    time_step_s: float = 2e-3
 
-    def repeat(self, index: int, tick: Progress) -> Record:
+    def repeat(self, index: int, progress: Progress) -> Record:
         """One bottle: plan with a model from slow pushes; learn by fast pushes alone."""
         draws, *streams = [np.random.default_rng(s) for s in np.random.SeedSequence([self.seed, index]).spawn(5)]
         world = draw_world(draws, BOTTLE, FRICTIONS)
-        tick("the bottle's way against speed", 0, 0)
+        progress("the bottle's way against speed", 0, 0)
         bottle = FastPushes(world)
         record: Record = {
             "truth": {"mass": world.mass, "support_friction": world.support_friction},
             "interpolation_mm": bottle.worst_error_mm(),
-            **self._model_based(world, bottle, draws, streams[0], tick),
+            **self._model_based(world, bottle, draws, streams[0], progress),
             POWER: self._by_power(bottle, streams[1]),
         }
         if load_cma() is not None:
@@ -102,18 +102,23 @@ class PushSpeeds:
         return record
 
     def _model_based(
-        self, world: Plan, bottle: FastPushes, draws: np.random.Generator, rng: np.random.Generator, tick: Progress
+        self,
+        world: Plan,
+        bottle: FastPushes,
+        draws: np.random.Generator,
+        rng: np.random.Generator,
+        progress: Progress,
     ) -> Record:
         robot = HiddenRobot(world, rng=draws, start=START, table=TABLE)
         slow = _slow_pushes(robot, draws, max(self.slow_pushes))
-        learner = Learner(robot.recording(slow), tick_s=self.tick_s)
+        learner = Learner(robot.recording(slow), time_step_s=self.time_step_s)
         found: Record = {name: {"pushes": list(self.slow_pushes), "friction": [], "speed": [], "x": []}
                          for name in (GREEDY, POLISHED)}  # fmt: skip
         for count in self.slow_pushes:
             problems = learner.problems[:count]
             searched = learner.learn(
                 GREEDY, problems, budget=self.budget, rng=rng,
-                on_trial=lambda done, count=count: tick(f"{GREEDY} on {count} slow pushes", done, self.budget),  # type: ignore[misc]
+                on_trial=lambda done, count=count: progress(f"{GREEDY} on {count} slow pushes", done, self.budget),  # type: ignore[misc]
             )  # fmt: skip
             polished = learner.polish(problems, searched, budget=self.polish_budget)
             for name, trials in ((GREEDY, searched), (POLISHED, polished)):

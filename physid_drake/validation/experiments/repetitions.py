@@ -42,24 +42,24 @@ def settings_of(experiment: Experiment) -> dict[str, Any]:
     return {k: list(v) if isinstance(v, tuple) else v for k, v in values.items() if not isinstance(v, Path)}
 
 
-def run_all(experiment: Experiment, folder: RunFolder, *, jobs: int, tick: Progress) -> list[Record]:
+def run_all(experiment: Experiment, folder: RunFolder, *, jobs: int, progress: Progress) -> list[Record]:
     """All records in their order; those that are kept are not made again.
 
     Args:
         experiment: what is repeated.
         folder: from ``claim``.
         jobs: processes; the records do not depend on it.
-        tick: told what is going on.
+        progress: told what is going on.
 
     Raises:
         KeyboardInterrupt: when interrupted; what is done is kept.
     """
     missing = [k for k in range(experiment.repetitions) if _kept(folder, k) is None]
     done = experiment.repetitions - len(missing)
-    for index, record in _made(experiment, missing, jobs, tick):
+    for index, record in _made(experiment, missing, jobs, progress):
         folder.write(_name(index), json.dumps(record, indent=1) + "\n")
         done += 1
-        tick(f"repetition {done} of {experiment.repetitions}", done, experiment.repetitions)
+        progress(f"repetition {done} of {experiment.repetitions}", done, experiment.repetitions)
     records = [_kept(folder, k) for k in range(experiment.repetitions)]
     return [record for record in records if record is not None]
 
@@ -79,12 +79,14 @@ def _kept(folder: RunFolder, index: int) -> Record | None:
     return record
 
 
-def _made(experiment: Experiment, indices: Sequence[int], jobs: int, tick: Progress) -> Iterator[tuple[int, Record]]:
+def _made(
+    experiment: Experiment, indices: Sequence[int], jobs: int, progress: Progress
+) -> Iterator[tuple[int, Record]]:
     if jobs <= 1 or len(indices) <= 1:
         for index in indices:
-            yield index, _through_json(experiment.repeat(index, _told(tick, index, experiment.repetitions)))
+            yield index, _through_json(experiment.repeat(index, _told(progress, index, experiment.repetitions)))
         return
-    tick("first repetitions", 0, experiment.repetitions)
+    progress("first repetitions", 0, experiment.repetitions)
     yield from in_processes(functools.partial(_repeat, experiment), indices, jobs)
 
 
@@ -98,5 +100,5 @@ def _through_json(record: Record) -> Record:
     return result
 
 
-def _told(tick: Progress, index: int, count: int) -> Progress:
-    return lambda stage, done, total: tick(f"repetition {index + 1} of {count}: {stage}", done, total)
+def _told(progress: Progress, index: int, count: int) -> Progress:
+    return lambda stage, done, total: progress(f"repetition {index + 1} of {count}: {stage}", done, total)

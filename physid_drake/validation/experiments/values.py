@@ -92,7 +92,7 @@ class Experiment(Protocol):
         """How many independent parts there are."""
         ...
 
-    def repeat(self, index: int, tick: Progress) -> Record:
+    def repeat(self, index: int, progress: Progress) -> Record:
         """Make one repetition."""
         ...
 

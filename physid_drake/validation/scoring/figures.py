@@ -364,7 +364,7 @@ def _errors(members: Sequence[Outcome]) -> Errors:
 
 
 def _ratios(members: Iterable[Outcome]) -> list[float]:
-    """Errors of left-out pushes after the fix over those of the true world, in standard deviations."""
+    """Errors of held-out pushes after the fix over those of the true world, in standard deviations."""
     pairs = [o.held_out.rms[1:] for o in members]
     return [after / floor for after, floor in pairs if math.isfinite(after) and floor > 0.0]
 

@@ -30,7 +30,7 @@ _VECTORS = (("x", "y"), ("slope_x", "slope_y"))
 
 @dc.dataclass(frozen=True, kw_only=True)
 class HeldOut:
-    """Root mean square errors of pushes that were left out: (before, after, floor) each; nan where unknown.
+    """Root mean square errors of pushes that were held out: (before, after, floor) each; nan where unknown.
 
     Attributes:
         rms: in standard deviations of the tracker.

@@ -157,7 +157,7 @@ def draw_world(index: int, seed: int, kind: Kind | None = None, effect: str | No
 
 
 def _floor(scene: Scene, effects: Sequence[Effect], recording: Recording) -> dict[str, float]:
-    """What the true world leaves of pushes whose own friction it is not told, as with pushes that are left out."""
+    """What the true world leaves of pushes whose own friction it is not told, as with pushes that are held out."""
     pushes = tuple(replace(push, friction_factor=1.0) for push in scene.pushes)
     expected = [motion.poses for motion in simulate(replace(scene, pushes=pushes), effects)]
     noise = scene.noise

@@ -98,7 +98,7 @@ class PushWorld:
         model.opt.gravity[:] = gx, gy, -GRAVITY * math.sqrt(1.0 - plan.tilt[0] ** 2 - plan.tilt[1] ** 2)
 
     def _to_simulation(self, x: float, y: float) -> tuple[float, float]:
-        """A vector of W in the simulation's frame, whose x is the table's slippery axis."""
+        """A vector of W in the simulation's frame, whose x is the table's low-friction axis."""
         c, s = math.cos(self._turn), math.sin(self._turn)
         return c * x + s * y, c * y - s * x
 

@@ -14,7 +14,7 @@ from physid_drake.validation.worlds.world_plan import Grain, Plan, Slosh
 
 @dataclass(frozen=True, kw_only=True)
 class AnisotropicObject(Effect):
-    """The same, with the slippery axis at ``angle`` in B."""
+    """The same, with the low-friction axis at ``angle`` in B."""
 
     name: ClassVar[str] = "anisotropic_object"
     strengths: ClassVar[tuple[str, ...]] = ("ratio",)

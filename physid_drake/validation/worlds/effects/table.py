@@ -45,7 +45,7 @@ class ViscousDrag(Effect):
 
 @dataclass(frozen=True, kw_only=True)
 class AnisotropicTable(Effect):
-    """Friction mu sqrt(``ratio``) across and mu / sqrt(``ratio``) along the slippery axis at ``angle`` in W."""
+    """Friction mu sqrt(``ratio``) across and mu / sqrt(``ratio``) along the low-friction axis at ``angle`` in W."""
 
     name: ClassVar[str] = "anisotropic_table"
     strengths: ClassVar[tuple[str, ...]] = ("ratio",)

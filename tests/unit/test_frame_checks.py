@@ -9,7 +9,7 @@ from problems import QUIET
 from runs import shipped_pushes
 
 from physid_drake.errors import RecordingError
-from physid_drake.pushes.frames import check_one_push, hand_seen_until, unseen_motion
+from physid_drake.pushes.frame_checks import check_one_push, hand_seen_until, unseen_motion
 from physid_drake.pushes.problem import problems_of
 from physid_drake.recording import PoseStream
 

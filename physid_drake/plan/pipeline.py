@@ -145,7 +145,7 @@ def plan(
     tolerance: float = TOLERANCE,
     friction_scatter: float = 0.0,
     scatter_freedom: float = math.inf,
-    tick: Progress | None = None,
+    progress: Progress | None = None,
 ) -> Plan:
     """Search a policy's settings for the least cost.
 
@@ -166,7 +166,7 @@ def plan(
         tolerance: cost up to which an end counts as a success [m].
         friction_scatter: of support friction from push to push [-], drawn along.
         scatter_freedom: degrees of freedom with which the scatter is known; infinite if it is exact.
-        tick: told stage, steps done and steps in all.
+        progress: called with the stage, steps done and steps in all.
 
     Raises:
         ConfigError: if a number is out of its range, the search is unknown, the model has no hand, or ``risk`` has
@@ -189,7 +189,7 @@ def plan(
         raise ConfigError(
             "plan: --risk needs posterior samples (--draws above 0), and a model with intervals to sample from."
         )
-    story = _Story(model, drawn, policy, cost, situation, tick or (lambda stage, done, total: None))
+    story = _Story(model, drawn, policy, cost, situation, progress or (lambda stage, done, total: None))
     objective = story.mean_costs if risk else story.likely_costs
     found = search_minimum(
         objective, policy.space, policy.space.sample(streams[1], CANDIDATES, from_prior=False),
@@ -237,12 +237,12 @@ class Hindsight:
     """What a diagnosis says of the plan that was made before it.
 
     Attributes:
-        plain: the plan that was made before, without effects; None where this one is that plan.
+        baseline: the plan that was made before, without effects; None where this one is that plan.
         outcome: what comes of the plain plan's push with the effects: its trajectory and cost [m].
         caveat: what the diagnosis leaves open; empty if nothing.
     """
 
-    plain: Plan | None = None
+    baseline: Plan | None = None
     outcome: Outcome | None = None
     caveat: str = ""
 
@@ -308,10 +308,16 @@ class _Story:
     """The rollouts of one plan."""
 
     def __init__(
-        self, model: Model, draws: Sequence[Draw], policy: Policy, cost: Cost, situation: Situation, tick: Progress
+        self,
+        model: Model,
+        draws: Sequence[Draw],
+        policy: Policy,
+        cost: Cost,
+        situation: Situation,
+        progress: Progress,
     ) -> None:
         self._model, self._draws, self._policy = model, draws, policy
-        self._cost, self._situation, self._tick = cost, situation, tick
+        self._cost, self._situation, self._progress = cost, situation, progress
         self.loss = loss_of(cost, model.table)
         self.best = np.zeros(policy.space.dimension), math.inf  # settings that were tried, and their cost [m]
 
@@ -346,7 +352,7 @@ class _Story:
         parameter = self._policy.space.parameters[index]
         rows = []
         for k, value in enumerate(np.linspace(parameter.lower, parameter.upper, count).tolist()):
-            self._tick("sweep", k, count)
+            self._progress("sweep", k, count)
             settings = np.array(best)
             settings[index] = value
             trajectory = self.trajectory(self._model, settings)
@@ -361,4 +367,4 @@ class _Story:
         return tuple(rows)
 
     def tell_search(self, belief: Belief, budget: int) -> None:
-        self._tick("policy search", belief.n_trials, budget)
+        self._progress("policy search", belief.n_trials, budget)

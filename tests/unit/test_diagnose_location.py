@@ -4,8 +4,8 @@ import math
 
 import pytest
 
+from physid_drake.diagnose.location import windows_in_words
 from physid_drake.diagnose.values import Window
-from physid_drake.diagnose.whereabouts import whereabouts
 
 
 def window(push, place=(0.0, 0.0), heading=0.0, speed=0.05):
@@ -34,11 +34,11 @@ def window(push, place=(0.0, 0.0), heading=0.0, speed=0.05):
     ],
 )
 def test_where(windows, said):
-    assert whereabouts(windows) == (f"clearest in {said}" if said else "")
+    assert windows_in_words(windows) == (f"clearest in {said}" if said else "")
 
 
 def test_the_words_hold_every_window():
     """Any set of windows lies within what is said of it."""
     windows = [window(k, (0.01 * k, -0.02 * k), 80.0 + 10.0 * k, 0.03 + 0.01 * k) for k in range(5)]
-    said = whereabouts(windows)
+    said = windows_in_words(windows)
     assert "(0, -80) and (40, 0)" in said and "80 to 120 deg" in said and "30 to 70 mm/s" in said

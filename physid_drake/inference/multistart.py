@@ -1,4 +1,4 @@
-"""A push may have two ways to go: its own unknowns, looked for from many starts."""
+"""A push may have two ways to go: its nuisance parameters, looked for from many starts."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.push import weighed
 from physid_drake.inference.rollouts import Ask
-from physid_drake.inference.slopes import own_slopes, own_steps
+from physid_drake.inference.slopes import nuisance_slopes, nuisance_steps
 
 Array = NDArray[np.float64]
 
 ODD = 1.5  # of what noise leaves of a push: more is to be explained
-DRAWN, STEPS = 4, 4  # starts of a push's unknowns that are drawn; steps from each
+DRAWN, STEPS = 4, 4  # starts of a push's nuisance parameters that are drawn; steps from each
 
 
 def reseated(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
@@ -30,14 +30,17 @@ def reseated(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
     physics, priors = h.physics(point.z), fitter.priors(fit.scatter)
     added = [more @ point.z[h.simulated :] for more in fitter.tolerances]
 
-    def cost(i: int, own: Array, predicted: Array) -> float:
-        return fitter.cost_of_push(i, own, predicted, priors[i], fit.loudness, fit.tail)
+    def cost(i: int, nuisance: Array, predicted: Array) -> float:
+        return fitter.cost_of_push(i, nuisance, predicted, priors[i], fit.noise_scale, fit.tail)
 
-    owns = list(point.own)
-    best = [cost(i, own, predicted) for i, (own, predicted) in enumerate(zip(owns, point.predicted, strict=True))]
-    seats = [(i, seat) for i in odd for seat in _starts(owns[i], fitter.most[i], rng)]
+    nuisances = list(point.nuisance)
+    best = [
+        cost(i, nuisance, predicted)
+        for i, (nuisance, predicted) in enumerate(zip(nuisances, point.predicted, strict=True))
+    ]
+    seats = [(i, seat) for i in odd for seat in _starts(nuisances[i], fitter.most[i], rng)]
     for _ in range(STEPS):
-        asks = [Ask(i, physics, one) for i, seat in seats for one in (seat, *own_steps(seat))]
+        asks = [Ask(i, physics, one) for i, seat in seats for one in (seat, *nuisance_steps(seat))]
         vectors, again = iter(fitter.predictor.vectors(asks)), []
         for i, seat in seats:
             base = next(vectors)
@@ -47,19 +50,19 @@ def reseated(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
                 continue
             here = cost(i, seat, base + added[i])
             if here < best[i]:
-                best[i], owns[i] = here, seat
-            own = own_slopes(base, seat, vectors)
-            residual = fitter.predictor.recorded[i] - base - added[i] + own @ seat
+                best[i], nuisances[i] = here, seat
+            nuisance = nuisance_slopes(base, seat, vectors)
+            residual = fitter.predictor.recorded[i] - base - added[i] + nuisance @ seat
             none = np.zeros((len(residual), 0))
-            step = weighed(residual, none, own, priors[i], fit.loudness, fit.tail)
-            again.append((i, np.clip(step.own, -fitter.most[i], fitter.most[i])))
+            step = weighed(residual, none, nuisance, priors[i], fit.noise_scale, fit.tail)
+            again.append((i, np.clip(step.nuisance, -fitter.most[i], fitter.most[i])))
         seats = again
-    if all(new is old for new, old in zip(owns, point.own, strict=True)):
+    if all(new is old for new, old in zip(nuisances, point.nuisance, strict=True)):
         return fit
-    moved = fitter.points([h], [point.z], [tuple(owns)])[0]
+    moved = fitter.points([h], [point.z], [tuple(nuisances)])[0]
     return fit if moved is None else fitter.started([h], [moved], [None], fit.tail)[0]
 
 
-def _starts(own: Array, most: Array, rng: np.random.Generator) -> list[Array]:
+def _starts(nuisance: Array, most: Array, rng: np.random.Generator) -> list[Array]:
     """Where the unknowns (k,) are, zero, and draws."""
-    return [own, np.zeros(len(own)), *np.clip(rng.standard_normal((DRAWN, len(own))), -most, most)]
+    return [nuisance, np.zeros(len(nuisance)), *np.clip(rng.standard_normal((DRAWN, len(nuisance))), -most, most)]

@@ -1,7 +1,7 @@
 """Where a missing wrench lives: in which frame it is constant, on what it depends, in which phase it acts.
 
 Every look is a pattern of a wrench over all windows of all pushes, and is judged like an effect: by what it explains
-of what the baseline model leaves, theta and the pushes' own unknowns projected out. Sign flips of whole pushes say
+of what the baseline model leaves, theta and the per-push parameters projected out. Sign flips of whole pushes say
 how much the best of all looks explains by chance.
 """
 
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from physid_drake.diagnose.localise import MissingWrench
+from physid_drake.diagnose.location import windows_in_words
 from physid_drake.diagnose.values import Location, Window
-from physid_drake.diagnose.whereabouts import whereabouts
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.push import LinearPush
 from physid_drake.pushes.case import Case
@@ -263,17 +263,17 @@ def _without(basis: Array, block: Array) -> Array:
 def _share(x: Array, left: Array) -> float:
     """Times what a push says of coefficients, so that it is no louder than ``LOUDEST`` deviations."""
     told = x.T @ left
-    loudness = math.sqrt(max(0.0, float(told @ np.linalg.pinv(x.T @ x) @ told)))
-    return min(1.0, LOUDEST / max(loudness, 1e-12))
+    noise_scale = math.sqrt(max(0.0, float(told @ np.linalg.pinv(x.T @ x) @ told)))
+    return min(1.0, LOUDEST / max(noise_scale, 1e-12))
 
 
 def _root(push: LinearPush, prior: Array) -> Array:
     """Takes what is left of a push (m,) to white noise: as noisy as it is far from explained."""
-    own = push.own * prior
-    covariance = np.eye(len(own)) + own @ own.T
+    nuisance = push.nuisance * prior
+    covariance = np.eye(len(nuisance)) + nuisance @ nuisance.T
     white = np.linalg.solve(np.linalg.cholesky(covariance), push.residual)
-    loudness = max(1.0, float(np.mean(white**2)))
-    return np.linalg.inv(np.linalg.cholesky(loudness * covariance))
+    noise_scale = max(1.0, float(np.mean(white**2)))
+    return np.linalg.inv(np.linalg.cholesky(noise_scale * covariance))
 
 
 def _signature(plain: Fit, wrenches: Sequence[MissingWrench], weights: Array) -> list[Array]:
@@ -307,7 +307,7 @@ def _location(case: Case, wrenches: Sequence[MissingWrench], seen: Sequence[_See
     amount = _amount([w for w in wrenches if w.phase in phase], dof)
     statement = f"{where}{amount}; {detail}" + ("" if amount else "; not in any single window")
     if windows:
-        statement += f"; {whereabouts(windows)}"
+        statement += f"; {windows_in_words(windows)}"
     return Location(statement=statement, phase=phase, dof=dof, frame=frame, windows=windows)
 
 

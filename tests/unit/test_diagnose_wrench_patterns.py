@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from physid_drake.diagnose import looks
+from physid_drake.diagnose import wrench_patterns
 from physid_drake.diagnose.localise import MissingWrench
-from physid_drake.diagnose.looks import locate, looks_at
+from physid_drake.diagnose.wrench_patterns import locate, looks_at
 from physid_drake.inference.push import LinearPush
 
 PUSHES, WINDOWS = 12, 4
@@ -45,7 +45,7 @@ def world(planted, seed=0, *, loud=1.0):
             )  # fmt: skip
         # Theta is friction: a force along the motion in all windows.
         friction = np.tile([1.0, 0.0, 0.0], WINDOWS)[:, None] / STD
-        pushes.append(LinearPush(residual=residual, shared=friction, own=friction * 0.01))
+        pushes.append(LinearPush(residual=residual, shared=friction, nuisance=friction * 0.01))
     return plain_of(pushes), wrenches
 
 
@@ -121,8 +121,8 @@ def test_the_direction_is_the_planted_one(size):
 
 
 def test_directions_end_before_they_begin_again():
-    assert [looks._degrees(np.array([1.0, y])) for y in (-0.004, 0.004, -0.03)] == ["0", "0", "358"]
-    assert [looks._axis(np.array([1.0, y])) for y in (-0.004, 0.004, -0.07)] == ["0", "0", "178"]
+    assert [wrench_patterns._degrees(np.array([1.0, y])) for y in (-0.004, 0.004, -0.03)] == ["0", "0", "358"]
+    assert [wrench_patterns._axis(np.array([1.0, y])) for y in (-0.004, 0.004, -0.07)] == ["0", "0", "178"]
 
 
 def test_the_axis_of_a_grain_is_the_one_that_holds_back_most():

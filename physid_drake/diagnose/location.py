@@ -13,7 +13,7 @@ NEAR = 0.06  # m: windows so close together are around one place
 ALL_ROUND = math.radians(120.0)  # of headings on either side of their mean: they are no one way
 
 
-def whereabouts(windows: Sequence[Window]) -> str:
+def windows_in_words(windows: Sequence[Window]) -> str:
     """Where some windows are; empty for none."""
     if not windows:
         return ""

@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.pushes.force_windows import WINDOW, too_seldom
-from physid_drake.pushes.frames import AT_A_TIME, SELDOM, UNSEEN_WAY, depths_at_touch
+from physid_drake.pushes.frame_checks import AT_A_TIME, SELDOM, UNSEEN_WAY, depths_at_touch
 from physid_drake.pushes.hand_stream import touching_radius
 from physid_drake.pushes.plausible import implausible, some_names
 from physid_drake.pushes.stated import too_loud

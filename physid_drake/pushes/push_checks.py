@@ -7,7 +7,7 @@ from functools import partial
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import RecordingError
-from physid_drake.pushes.frames import check_clocks, checks_of, push_checks_of
+from physid_drake.pushes.frame_checks import check_clocks, checks_of, push_checks_of
 from physid_drake.pushes.hand_stream import beside_object
 from physid_drake.pushes.noise import noise_of
 from physid_drake.recording import Recording, thinned

@@ -6,7 +6,7 @@ import dataclasses as dc
 from collections.abc import Sequence
 
 from physid_drake.diagnose.conclude import conclude
-from physid_drake.diagnose.decide import FEWEST_PUSHES, Decision, decided, is_own_error, kinds_of, loudest
+from physid_drake.diagnose.decide import FEWEST_PUSHES, Decision, decided, is_own_error, kinds_of, most_noise_scale
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.hypotheses import freed
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
@@ -32,7 +32,7 @@ def diagnose(
     seed: int = 0,
     alpha: float = 0.01,
     effects: Sequence[str] | None = None,
-    tick: Progress | None = None,
+    progress: Progress | None = None,
     kept: KeptRollouts | None = None,
 ) -> tuple[Diagnosis, Evidence]:
     """Diagnose a recording.
@@ -42,12 +42,14 @@ def diagnose(
         seed: of everything random.
         alpha: false-alarm rate of the detection.
         effects: names of the catalogue to look at; None for all.
-        tick: told the stage, steps done, steps in all.
+        progress: called with the stage, steps done, steps in all.
         kept: rollouts of a run that was interrupted, which goes on from there to the same answer.
     """
     case.pool.kept = KeptRollouts() if kept is None else kept
     applicable(case.around, effects)  # an unknown name is refused before anything is simulated
-    return diagnose_from(identified(case, seed=seed, tick=tick), seed=seed, alpha=alpha, effects=effects, tick=tick)
+    return diagnose_from(
+        identified(case, seed=seed, progress=progress), seed=seed, alpha=alpha, effects=effects, progress=progress
+    )
 
 
 def diagnose_from(
@@ -56,29 +58,29 @@ def diagnose_from(
     seed: int = 0,
     alpha: float = 0.01,
     effects: Sequence[str] | None = None,
-    tick: Progress | None = None,
+    progress: Progress | None = None,
 ) -> tuple[Diagnosis, Evidence]:
     """Diagnose what an identification leaves; arguments as of ``diagnose``."""
-    say: Progress = tick or (lambda stage, done, total: None)
-    evidence = gathered(known, seed=seed, alpha=alpha, effects=effects, tick=say)
+    say: Progress = progress or (lambda stage, done, total: None)
+    evidence = gathered(known, seed=seed, alpha=alpha, effects=effects, progress=say)
     return conclude(evidence, seed=seed, alpha=alpha), evidence
 
 
 def gathered(
-    known: Identification, *, seed: int, alpha: float, effects: Sequence[str] | None, tick: Progress
+    known: Identification, *, seed: int, alpha: float, effects: Sequence[str] | None, progress: Progress
 ) -> Evidence:
     """All that needs rollouts. Arguments as of ``diagnose``."""
     kinds = applicable(known.case.around, effects)
-    found = searched(known.finder, known.found, kinds, seed=seed, alpha=alpha, tick=tick)
+    found = searched(known.finder, known.found, kinds, seed=seed, alpha=alpha, progress=progress)
     if found.odd and not known.case.noise.known:  # of noise that nobody states, the kind is unknown, too
-        tick("process noise", 0, 0)
+        progress("process noise", 0, 0)
         rough, added = learned(found.fitter, found.richest)
         if not rough.is_none:
-            known = identified_with(known, rough, added, seed=seed, tick=tick)
-            found = searched(known.finder, known.found, kinds, seed=seed, alpha=alpha, tick=tick)
+            known = identified_with(known, rough, added, seed=seed, progress=progress)
+            found = searched(known.finder, known.found, kinds, seed=seed, alpha=alpha, progress=progress)
     case, plain, before = known.case, known.fit, known.errors
-    decision = decided(found, most=loudest(case.noise))
-    tick("effects in the Drake cell", 0, 0)
+    decision = decided(found, most=most_noise_scale(case.noise))
+    progress("effects in the Drake cell", 0, 0)
     judge = Judge(known.finder)
     if len(case.problems) >= FEWEST_PUSHES and is_own_error(accuracy_of(case, before)):
         decision = Decision(verdict="consistent")
@@ -92,9 +94,9 @@ def gathered(
     )  # fmt: skip
     if decision.verdict in ("consistent", "underpowered"):
         return evidence
-    tick("missing wrench", 0, 0)
+    progress("missing wrench", 0, 0)
     wrenches = with_phases(case, missing_wrenches(found.fitter, plain))
-    tick("next push", 0, 0)
+    progress("next push", 0, 0)
     return dc.replace(evidence, wrenches=wrenches, next_push=next_push(case, _rivals(found.named, decision)))
 
 

@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from physid_drake.errors import RecordingError
 from physid_drake.identify.identify import Estimate
-from physid_drake.pushes.doubts import doubts
-from physid_drake.pushes.frames import _brakes_hardly_seen, check_force_direction
+from physid_drake.pushes.frame_checks import _brakes_hardly_seen, check_force_direction
 from physid_drake.pushes.problem import problems_of
-from physid_drake.pushes.refusals import refusals
+from physid_drake.pushes.push_checks import refusals
+from physid_drake.pushes.push_warnings import doubts
 from physid_drake.recording import ForceStream, MeshShape, PoseStream
 from physid_drake.report.tables import estimates_table, verdict
 
