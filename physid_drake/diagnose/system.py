@@ -15,6 +15,7 @@ from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.values import Diagnosis
 from physid_drake.identify import Identification
 from physid_drake.identify.system import PUSH_PERIOD
+from physid_drake.optional import boxed, unboxed
 
 Array = NDArray[np.float64]
 
@@ -63,21 +64,21 @@ class DiagnosisSystem(LeafSystem):
         self.set_name("diagnosis")
         self._examine = examine
         self.DeclareAbstractInputPort("identification.estimated", Value[object]())
-        self._memory = self.DeclareAbstractState(Value[object](None))
+        self._memory = self.DeclareAbstractState(Value[object](boxed(None)))
         self.DeclareAbstractOutputPort("diagnosis.estimated", Value[object], self._copy, {self.all_state_ticket()})
         self.DeclarePeriodicUnrestrictedUpdateEvent(PUSH_PERIOD, begin, self._receive)
 
     def examined(self, context: Context) -> Examined | None:
         """The latest answer held in the state; None before the first."""
-        latest: Examined | None = context.get_abstract_state(self._memory).get_value()
+        latest: Examined | None = unboxed(context.get_abstract_state(self._memory).get_value())
         return latest
 
     def _receive(self, context: Context, state: State) -> EventStatus:
-        known: Identification | None = self.GetInputPort("identification.estimated").Eval(context)
+        known: Identification | None = unboxed(self.GetInputPort("identification.estimated").Eval(context))
         latest = self.examined(context)
         if known is not None and (latest is None or latest.known is not known):
-            state.get_mutable_abstract_state(self._memory).set_value(self._examine(known))
+            state.get_mutable_abstract_state(self._memory).set_value(boxed(self._examine(known)))
         return EventStatus.Succeeded()
 
     def _copy(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self.examined(context))
+        output.set_value(boxed(self.examined(context)))

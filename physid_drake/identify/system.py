@@ -11,6 +11,7 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
 
 from physid_drake.identify.identify import Identification
+from physid_drake.optional import boxed, unboxed
 from physid_drake.recording import Push
 
 PUSH_PERIOD = 1.0  # s of diagram time between two pushes
@@ -37,7 +38,7 @@ class RecordingPlayer(LeafSystem):
 
     def _play(self, context: Context, output: AbstractValue) -> None:
         index = int(np.floor(context.get_time() / PUSH_PERIOD + 1e-9))
-        output.set_value(self._pushes[min(index, len(self._pushes) - 1)])
+        output.set_value(boxed(self._pushes[min(index, len(self._pushes) - 1)]))
 
 
 class Learner(Protocol[Known]):
@@ -137,7 +138,7 @@ class IdentificationSystem(LeafSystem):
 
     def _receive(self, context: Context, state: State) -> EventStatus:
         belief, last = context.get_abstract_state(self._memory).get_value()
-        push: Push | None = self.GetInputPort("push.measured").Eval(context)
+        push: Push | None = unboxed(self.GetInputPort("push.measured").Eval(context))
         if push is not None and push.name != last:
             learned = (self._learner.learn(belief, push), push.name)
             state.get_mutable_abstract_state(self._memory).set_value(learned)
@@ -148,4 +149,4 @@ class IdentificationSystem(LeafSystem):
         output.SetFromVector(self._nominal if latest is None else latest.theta)
 
     def _copy(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self.identification(context))
+        output.set_value(boxed(self.identification(context)))

@@ -15,6 +15,7 @@ from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSys
 from physid_drake.identify import Identification
 from physid_drake.identify.system import PUSH_PERIOD
 from physid_drake.model import Correlation, Model
+from physid_drake.optional import boxed, unboxed
 from physid_drake.plan.config import PlanConfig
 from physid_drake.plan.costs import DistanceToGoal
 from physid_drake.plan.draws import scatter_freedom
@@ -71,7 +72,7 @@ class PolicySystem(LeafSystem):
 
     def _receive(self, context: Context, state: State) -> EventStatus:
         known, _ = context.get_abstract_state(self._memory).get_value()
-        identification = self.GetInputPort("identification.estimated").Eval(context)
+        identification = unboxed(self.GetInputPort("identification.estimated").Eval(context))
         # Drake copies what goes through a port, so that identity would not tell a new one from an old one.
         if identification is not None and not np.array_equal(identification.theta, known):
             made = (identification.theta.copy(), self._make_plan(identification))
@@ -79,7 +80,7 @@ class PolicySystem(LeafSystem):
         return EventStatus.Succeeded()
 
     def _copy(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(self.plan(context))
+        output.set_value(boxed(self.plan(context)))
 
     def _settings(self, context: Context, output: BasicVector) -> None:
         latest = self.plan(context)
@@ -118,7 +119,7 @@ class RobotSystem(LeafSystem):
 
     def _act(self, context: Context, state: State) -> EventStatus:
         count, _, done = context.get_abstract_state(self._memory).get_value()
-        plan: Plan | None = self.GetInputPort("push.desired").Eval(context)
+        plan: Plan | None = unboxed(self.GetInputPort("push.desired").Eval(context))
         if plan is None:
             push, settings = (self._first, done) if count == 0 else (None, done)
         else:
@@ -129,7 +130,7 @@ class RobotSystem(LeafSystem):
         return EventStatus.Succeeded()
 
     def _copy(self, context: Context, output: AbstractValue) -> None:
-        output.set_value(context.get_abstract_state(self._memory).get_value()[1])
+        output.set_value(boxed(context.get_abstract_state(self._memory).get_value()[1]))
 
 
 @dc.dataclass(frozen=True, kw_only=True)

@@ -1,5 +1,6 @@
 """Sloshing against closed forms and small integrations. Measured errors stand beside the tolerances."""
 
+import dataclasses as dc
 import math
 from dataclasses import dataclass
 
@@ -165,7 +166,8 @@ def test_liquid_that_does_not_turn_has_no_part_in_the_moment_of_inertia(turning)
     effect, whole = make("sloshing", fraction=0.3, turning=turning), body_of(MASS, MU)
     body = effect.body(whole, None)
     assert body.mass * body.inertia_ratio == pytest.approx(MASS * (0.7 + 0.3 * turning))
-    assert make("sloshing", turning=turning).body(whole, None) == whole
+    null = make("sloshing", turning=turning).body(whole, None)
+    assert all(np.array_equal(getattr(null, f.name), getattr(whole, f.name)) for f in dc.fields(whole))
 
 
 def test_an_object_whose_liquid_stays_behind_spins_down_sooner():

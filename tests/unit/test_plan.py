@@ -19,6 +19,7 @@ from physid_drake.effects.rollout import true_pose
 from physid_drake.effects.tracker import TrackerBias, TrackerScale
 from physid_drake.errors import ConfigError, RobotError
 from physid_drake.identify import SearchConfig
+from physid_drake.optional import boxed, unboxed
 from physid_drake.plan import DistanceToGoal, Ending, SimulatedRobot, Situation, plan
 from physid_drake.plan.draws import draws_of
 from physid_drake.plan.pipeline import outcome_under, spread_of
@@ -173,18 +174,18 @@ def test_the_policy_system_plans_once_it_has_an_identification():
     system = PolicySystem(lambda known: calls.append(known) or made(draws=0, sweep=0, budget=2), dimension=1)
     context = system.CreateDefaultContext()
     port = system.GetInputPort("identification.estimated")
-    fixed = port.FixValue(context, AbstractValue.Make(None))
+    fixed = port.FixValue(context, AbstractValue.Make(boxed(None)))
     simulator = Simulator(system, context)
     simulator.AdvanceTo(1.5)
     assert calls == [] and system.plan(context) is None
     assert math.isnan(system.GetOutputPort("settings.desired").Eval(context)[0])
-    fixed.GetMutableData().set_value(SimpleNamespace(theta=np.array([0.3])))
+    fixed.GetMutableData().set_value(boxed(SimpleNamespace(theta=np.array([0.3]))))
     simulator.AdvanceTo(4.5)
     assert [float(known.theta[0]) for known in calls] == [0.3]
-    fixed.GetMutableData().set_value(SimpleNamespace(theta=np.array([0.4])))
+    fixed.GetMutableData().set_value(boxed(SimpleNamespace(theta=np.array([0.4]))))
     simulator.AdvanceTo(6.5)
     assert [float(known.theta[0]) for known in calls] == [0.3, 0.4]
-    assert system.GetOutputPort("push.desired").Eval(context) is system.plan(context)
+    assert unboxed(system.GetOutputPort("push.desired").Eval(context)) is system.plan(context)
     assert system.GetOutputPort("settings.desired").Eval(context) == system.plan(context).settings
 
 
@@ -247,10 +248,10 @@ def test_a_policy_that_begins_late_plans_with_the_last_identification_only():
     plan_of = made(draws=0, sweep=0, budget=2)
     system = PolicySystem(lambda known: calls.append(float(known.theta[0])) or plan_of, dimension=1, begin=3.0)
     context = system.CreateDefaultContext()
-    fixed = system.GetInputPort("identification.estimated").FixValue(context, AbstractValue.Make(None))
+    fixed = system.GetInputPort("identification.estimated").FixValue(context, AbstractValue.Make(boxed(None)))
     simulator = Simulator(system, context)
     for k in range(4):
-        fixed.GetMutableData().set_value(SimpleNamespace(theta=np.array([0.1 * (k + 1)])))
+        fixed.GetMutableData().set_value(boxed(SimpleNamespace(theta=np.array([0.1 * (k + 1)]))))
         simulator.AdvanceTo(k + 0.5)
     assert calls == [0.4]
 

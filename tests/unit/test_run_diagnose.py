@@ -99,7 +99,7 @@ def test_a_model_survives_its_file(model, tmp_path):
 
 
 def test_a_push_is_simulated_as_the_docs_say(model, tmp_path, monkeypatch, capsys):
-    page = (Path(__file__).parents[2] / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "model.md").read_text(encoding="utf-8")
     (block,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     folder = tmp_path / "diagnoses" / "my_recording"
     folder.mkdir(parents=True)
