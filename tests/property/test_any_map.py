@@ -106,7 +106,7 @@ def test_a_table_by_other_axes_is_that_table_with_its_columns_exchanged(rng, axe
     assert np.abs(push.object.quaternions - same.object.quaternions).max() < 1e-14  # measured 1e-15
 
 
-# ----------------------------------------------------------------------------------------------------------- rotations
+# ---------------------------------------------------------------------------------------------------------- rotations
 
 UNIT = {
     "X": lambda a: np.array([[1, 0, 0], [0, math.cos(a), -math.sin(a)], [0, math.sin(a), math.cos(a)]]),
