@@ -34,8 +34,9 @@ shapes = boxes | discs | prisms
 
 
 @st.composite
-def bodies(draw):
-    return body_of(draw(numbers(0.05, 2.0)), draw(numbers(0.1, 0.6)), hand_friction=draw(numbers(0.05, 0.5)))
+def bodies(draw, least_friction=0.1):
+    mass, friction = draw(numbers(0.05, 2.0)), draw(numbers(least_friction, 0.6))
+    return body_of(mass, friction, hand_friction=draw(numbers(0.05, 0.5)))
 
 
 @st.composite
@@ -79,7 +80,8 @@ def point_of(kind, rng, most=8.0):
     point = np.array(family.point)
     for k, c in enumerate(chart):
         size = most * family.size * c.step if k in family.free else min(c.std, 0.5 if c.log else 3.0 * c.step)
-        point[k] = np.clip(point[k] + size * rng.uniform(-1.0, 1.0), c.lower, c.upper)
+        least = 0.1 if point[k] == c.lower else -1.0
+        point[k] = np.clip(point[k] + size * rng.uniform(least, 1.0), c.lower, c.upper)
     return point
 
 

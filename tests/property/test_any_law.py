@@ -39,8 +39,10 @@ from physid_drake.twin.with_effects import push_with
 pushes = rollouts() | slides()
 # Deviations. Rounding lets a touch come a step sooner or later: measured 1e-3 in 4000 pushes, 8e-6 in 2000 slides.
 ROUNDING = 0.01
+# A strong magnet may catch an object that swings about it a swing sooner or later: measured .036.
+ROUGHLY = {"magnet": 0.3}
 # The points of a pressure's grid under a disc are not their own image in a mirror: measured .06.
-IN_A_MIRROR = {"uneven_support": 0.2}
+IN_A_MIRROR = {"uneven_support": 0.2, **ROUGHLY}
 
 
 def apart(one, other):
@@ -48,28 +50,40 @@ def apart(one, other):
     return float(np.abs((one - other) / SIGMA).max())
 
 
+def of_each(*names):
+    """A test of each effect, of some names or of all: hypothesis would draw some of them often and others never."""
+
+    def marked(test):
+        kinds = [BY_NAME[name] for name in names] if names else PLANAR
+        return pytest.mark.parametrize("kind", kinds, ids=lambda kind: kind.name)(costly(test))
+
+    return marked
+
+
+def drawn_of(kind, rng):
+    return kind.at(point_of(kind, rng), AROUND)
+
+
 # ----------------------------------------------------------------------------------------------------- nothing there
 
 
-@pytest.mark.parametrize("kind", PLANAR, ids=lambda kind: kind.name)
-@costly
+@of_each()
 @given(shape=shapes, body=bodies(), push=pushes, rng=generators(), other=effects())
 def test_an_effect_at_its_null_leaves_any_rollout_as_it_is_to_the_last_bit(kind, shape, body, push, rng, other):
     """Whatever its other parameters, alone and beside another effect."""
     nulls = {name: null for name, null in kind.nulls().items() if null is not None}
-    effect = dc.replace(kind.at(point_of(kind, rng), AROUND), **nulls)
+    effect = dc.replace(drawn_of(kind, rng), **nulls)
     for beside in ([], [other]):
         one, plain = rolled(shape, body, push, [effect, *beside]), rolled(shape, body, push, beside)
         assert np.array_equal(one.poses, plain.poses) and np.array_equal(one.forces, plain.forces)
 
 
-# An elastic tip bounces, however stiff it is. A bounce, a lag and a swing change the steps of the twin, a pressure its
+# An elastic tip bounces, however stiff it is. A bounce, a lag and a swing change the twin's steps, a pressure its
 # points: these show how exact it is in fast, oblique pushes (measured 2.0, 2.0, .21 and .16 in 6000).
 OWN_STEPS = {"restitution": 5.0, "actuator_lag": 5.0, "sloshing": 1.0, "uneven_support": 1.0}
 
 
-@pytest.mark.parametrize("kind", [k for k in PLANAR if k.name != "hand_compliance"], ids=lambda kind: kind.name)
-@costly
+@of_each(*(name for name in BY_NAME if name != "hand_compliance"))
 @given(shape=shapes, body=bodies(), push=pushes)
 def test_an_effect_that_vanishes_changes_any_rollout_by_nothing(kind, shape, body, push):
     family, chart = kind.families(AROUND)[0], kind.chart(AROUND)
@@ -85,34 +99,40 @@ def test_an_effect_that_vanishes_changes_any_rollout_by_nothing(kind, shape, bod
 # -------------------------------------------------------------------------------------------------------- symmetries
 
 
-@given(shapes, bodies(), pushes, effects(), numbers(-3.0, 3.0), st.tuples(numbers(-1.0, 1.0), numbers(-1.0, 1.0)))
-def test_turning_and_moving_the_whole_scene_turns_and_moves_the_result(shape, body, push, effect, angle, shift):
+@of_each()
+@given(shape=shapes, body=bodies(), push=pushes, rng=generators(), angle=numbers(-3.0, 3.0), x=numbers(-1.0, 1.0))
+def test_turning_and_moving_the_whole_scene_turns_and_moves_the_result(kind, shape, body, push, rng, angle, x):
+    effect = drawn_of(kind, rng)
     # These are about the world's origin, which is turned and stays.
     about_origin = effect.name in ("friction_gradient", "tracker_scale")
-    shift = np.zeros(2) if about_origin else np.array(shift)
+    shift = np.zeros(2) if about_origin else np.array([x, 0.3])
     there, along = turned(push, [effect], angle, shift)
     one, other = rolled(shape, body, push, [effect]), rolled(shape, body, there, along)
     places = one.poses[:, :2] @ rotation(angle).T + shift
     want = np.column_stack([places, one.poses[:, 2] + angle])
-    assert apart(other.poses, want) < ROUNDING
+    assert apart(other.poses, want) < ROUGHLY.get(effect.name, ROUNDING)
 
 
-@given(shapes, bodies(), pushes, effects())
-def test_a_push_in_a_mirror_moves_its_object_as_in_the_mirror(shape, body, push, effect):
+@of_each()
+@given(shape=shapes, body=bodies(), push=pushes, rng=generators())
+def test_a_push_in_a_mirror_moves_its_object_as_in_the_mirror(kind, shape, body, push, rng):
+    effect = drawn_of(kind, rng)
     there, along = mirrored(push, [effect])
     one, other = rolled(shape, body, push, [effect]), rolled(mirror_of(shape), body, there, along)
     assert apart(other.poses, one.poses * [1.0, -1.0, -1.0]) < IN_A_MIRROR.get(effect.name, ROUNDING)
 
 
-@given(shapes, bodies(), pushes, effects(), numbers(-1e3, 1e3))
-def test_the_same_push_at_another_time_is_the_same_motion(shape, body, push, effect, late):
+@of_each()
+@given(shape=shapes, body=bodies(), push=pushes, rng=generators(), late=numbers(-1e3, 1e3))
+def test_the_same_push_at_another_time_is_the_same_motion(kind, shape, body, push, rng, late):
+    effect = drawn_of(kind, rng)
     path = push.path
     later = dc.replace(
         push, begin=push.begin + late, end=push.end + late,
         path=None if path is None else dc.replace(path, times=path.times + late),
     )  # fmt: skip
     one, other = rolled(shape, body, push, [effect]), rolled(shape, body, later, [effect], TIMES + late)
-    assert apart(one.poses, other.poses) < ROUNDING
+    assert apart(one.poses, other.poses) < ROUGHLY.get(effect.name, ROUNDING)
 
 
 NOT_IN_OBJECT = [kind.name for kind in PLANAR if kind.element != "object" and kind.name != "tracker_bias"]
@@ -172,18 +192,24 @@ BY_FORCE = {
 }
 
 
-@given(shapes, bodies(), slides(), effects(*BY_WEIGHT, *BY_FORCE), numbers(0.1, 10.0))
-def test_mass_cancels_in_a_free_slide_where_forces_are_in_proportion_to_it(shape, body, push, effect, ratio):
+@of_each(*BY_WEIGHT, *BY_FORCE)
+@given(shape=shapes, body=bodies(), push=slides(), rng=generators(), ratio=numbers(0.1, 10.0))
+def test_mass_cancels_in_a_free_slide_where_forces_are_in_proportion_to_it(kind, shape, body, push, rng, ratio):
+    effect = drawn_of(kind, rng)
     name = BY_FORCE.get(effect.name)
     scaled = effect if name is None else dc.replace(effect, **{name: ratio * getattr(effect, name)})
     heavier = dc.replace(body, mass=ratio * body.mass)
     one, other = rolled(shape, body, push, [effect]), rolled(shape, heavier, push, [scaled])
-    assert apart(one.poses, other.poses) < ROUNDING
+    assert apart(one.poses, other.poses) < ROUGHLY.get(effect.name, ROUNDING)
 
 
-@given(shapes, bodies(), pushes, effects(*BY_WEIGHT), st.integers(-3, 3))
-def test_twice_the_mass_takes_twice_the_force_and_moves_alike_to_the_last_bit(shape, body, push, effect, doublings):
+@of_each(*BY_WEIGHT)
+@given(shape=shapes, body=bodies(), push=pushes, rng=generators(), doublings=st.integers(-3, 3))
+def test_twice_the_mass_takes_twice_the_force_and_moves_alike_to_the_last_bit(
+    kind, shape, body, push, rng, doublings
+):
     """A hand goes its way whatever it pushes; and what is doubled is not rounded."""
+    effect = drawn_of(kind, rng)
     ratio = 2.0**doublings
     one = rolled(shape, body, push, [effect])
     other = rolled(shape, dc.replace(body, mass=ratio * body.mass), push, [effect])
@@ -192,7 +218,7 @@ def test_twice_the_mass_takes_twice_the_force_and_moves_alike_to_the_last_bit(sh
 
 # ------------------------------------------------------------------------------------------------------------ energy
 
-FINE = np.linspace(0.0, END, 1401)
+FINE = np.linspace(0.0, END, 7001)
 DISSIPATING = tuple(name for name in (*BY_WEIGHT, *BY_FORCE) if name != "sloshing")  # whose own energy is not seen
 
 
@@ -201,7 +227,8 @@ def energies(shape, body, push, effect):
     poses = rolled(shape, body, push, [effect], FINE).poses
     shape = effect.reshaped(shape)
     com = np.array([effect.x, effect.y]) if effect.name == "com_offset" else np.zeros(2)
-    x, y = poses[:, :2].T + np.array([rotation(yaw) @ com for yaw in poses[:, 2]]).T
+    c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    x, y = poses[:, 0] + c * com[0] - s * com[1], poses[:, 1] + s * com[0] + c * com[1]
     vx, vy, spin = (np.diff(one) / np.diff(FINE) for one in (x, y, poses[:, 2]))
     ratio = effect.ratio if effect.name == "rotational_inertia" else 1.0
     inertia = ratio * twin_of(Geometry(shape=shape)).solid.gyration[2]
@@ -221,12 +248,18 @@ def potential(effect, mass, x, y):
     return effect.strength / effect.core * np.arctan(far / effect.core)
 
 
-@given(shapes, bodies(), slides(), effects(*DISSIPATING))
-def test_energy_never_grows_once_no_hand_is_there(shape, body, push, effect):
-    """Of motion and of what pulls, together: a spring and a magnet give back no more than they took."""
+@of_each(*DISSIPATING)
+@given(shape=shapes, body=bodies(least_friction=1e-3), push=slides(), rng=generators())
+def test_energy_never_grows_once_no_hand_is_there(kind, shape, body, push, rng):
+    """Of motion and of what pulls, together: a spring and a magnet give back no more than they took.
+
+    Where hardly any friction is left, nothing else hides what a law gives.
+    """
+    effect = drawn_of(kind, rng)
     whole = energies(shape, body, push, effect)
-    # Of a motion of 1.7 mm/s: measured 3e-7, between the steps of a slide that soon stops, 4e-8 of 6000 others.
-    assert np.diff(whole).max() < 1.5e-6 * body.mass
+    # Measured, of all that is lost, 4e-6; and 3e-3 where the core of a strong magnet is passed in a step or two.
+    share = 2e-2 if effect.name == "magnet" else 1e-4
+    assert np.diff(whole).max() < share * np.ptp(whole) + 1e-6 * body.mass
     assert whole[-1] < whole[0]
 
 

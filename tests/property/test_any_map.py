@@ -4,6 +4,7 @@ import itertools
 import math
 
 import numpy as np
+import pytest
 from drawn import arrays, costly, folder, generators, numbers
 from hypothesis import given
 from hypothesis import strategies as st
@@ -40,6 +41,14 @@ hand: {{position: {{columns: [hx, hy, hz], unit: {length}}}, rotation: none}}
 force: {{columns: [fx, fy, fz], unit: {force}}}
 pushes: {{cut: whole}}
 """
+# By their definitions: an inch, a foot, the standard fall, a pound.
+FALL, POUND = 9.80665, 0.45359237
+SIZES = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
+    "length": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "inch": 0.0254, "in": 0.0254, "ft": 12 * 0.0254},
+    "angle": {"rad": 1.0, "deg": math.pi / 180.0, "mrad": 1e-3},
+    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3, "kgf": FALL, "gf": 1e-3 * FALL, "lbf": POUND * FALL},
+}
 SI = {"time": "s", "length": "m", "angle": "rad", "force": "N"}
 AXES = [
     [sign + axis for sign, axis in zip(signs, order, strict=True)]
@@ -77,13 +86,24 @@ def converted(values, world="{}", order="XYZ", **units):
 
 
 @costly
-@given(generators(), *(st.sampled_from(sorted(kind)) for kind in (TIMES, LENGTHS, ANGLES, FORCES)))
-def test_a_table_in_other_units_is_that_table_in_si_units_to_the_last_digit(rng, time, length, angle, force):
+@given(generators(), *(st.sampled_from(sorted(kind)) for kind in SIZES.values()))
+def test_a_table_in_other_units_is_that_table_in_si_units(rng, time, length, angle, force):
     values = table(rng)
-    sizes = np.repeat([TIMES[time], LENGTHS[length], ANGLES[angle], LENGTHS[length], FORCES[force]], [1, 3, 3, 3, 3])
-    values = values / sizes  # as numbers in these units; then again in SI, rounded as a reader must
+    sizes = [SIZES["time"][time], SIZES["length"][length], SIZES["angle"][angle], SIZES["force"][force]]
+    sizes = np.repeat([*sizes[:3], sizes[1], sizes[3]], [1, 3, 3, 3, 3])
+    values = values / sizes
     push = converted(values, time=time, length=length, angle=angle, force=force)
-    assert push == converted(values * sizes)
+    same = converted(values * sizes)
+    for one, other in ((push.object, same.object), (push.hand, same.hand)):
+        assert one.times == pytest.approx(other.times, rel=1e-15, abs=1e-15)
+        assert one.positions == pytest.approx(other.positions, rel=1e-15, abs=1e-15)
+        assert one.quaternions == pytest.approx(other.quaternions, abs=1e-14)
+    assert push.force.forces == pytest.approx(same.force.forces, rel=1e-15)
+
+
+def test_every_unit_of_a_map_is_as_large_as_it_is_defined():
+    for kind, units in (("time", TIMES), ("length", LENGTHS), ("angle", ANGLES), ("force", FORCES)):
+        assert dict(units) == pytest.approx(SIZES[kind], rel=1e-14)
 
 
 @costly
