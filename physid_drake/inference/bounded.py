@@ -25,8 +25,10 @@ def bounded(precision: Array, right: Array, bounds: Bounds | None) -> Array:
     least, most = np.append(bounds[0], [-np.inf] * free), np.append(bounds[1], [np.inf] * free)
     if np.all((least <= beta) & (beta <= most)):
         return beta
-    values, vectors = np.linalg.eigh(precision)
+    # In units in which each alone is known to one: theirs are far apart, and what is least known is not rounding.
+    scale = np.diag(precision) ** -0.5
+    values, vectors = np.linalg.eigh(precision * np.outer(scale, scale))
     roots = np.sqrt(np.maximum(values, 1e-14 * values[-1]))
-    root = roots[:, None] * vectors.T
-    within: Array = lsq_linear(root, (vectors.T @ right) / roots, (least, most), method="bvls").x
-    return within
+    root, scaled = roots[:, None] * vectors.T, (least / scale, most / scale)
+    within = lsq_linear(root, (vectors.T @ (right * scale)) / roots, scaled, method="bvls").x
+    return np.asarray(np.clip(scale * within, least, most))

@@ -99,15 +99,16 @@ class PoseStream:
 
     __hash__ = None  # type: ignore[assignment]
 
+    @property
+    def headings(self) -> Array:
+        """(n,) the yaw within one turn, in rad: that of the object's y axis, which a cylinder that rolls keeps."""
+        w, x, y, z = self.quaternions.T
+        return np.asarray(np.arctan2(2.0 * (w * z - x * y), 1.0 - 2.0 * (x * x + z * z)))
+
     @cached_property
     def planar(self) -> Array:
-        """(n, 3), read-only: x and y in m, and the yaw in rad, unwrapped so that it has no steps of a full turn.
-
-        Yaw is the heading of the object's y axis, which a cylinder that rolls about it keeps.
-        """
-        w, x, y, z = self.quaternions.T
-        yaw = np.arctan2(2.0 * (w * z - x * y), 1.0 - 2.0 * (x * x + z * z))
-        planar = np.column_stack([self.positions[:, :2], unwrapped(self.times, yaw)])
+        """(n, 3), read-only: x and y in m, and the yaw in rad, unwrapped so that it has no steps of a full turn."""
+        planar = np.column_stack([self.positions[:, :2], unwrapped(self.times, self.headings)])
         planar.setflags(write=False)
         return planar
 

@@ -127,8 +127,8 @@ def _add_poses(
         values = np.column_stack([values, stream.quaternions])
     elif stream.rotation == "yaw":
         columns.append(OBJECT_YAW)
-        # One digit more than counts: whole turns are no round numbers.
-        values = np.column_stack([values, np.round(stream.planar[:, 2], YAW_DIGITS + 1)])
+        # Within one turn, as the reader takes it: how many were made over a gap is a guess, and may be very many.
+        values = np.column_stack([values, np.round(stream.headings, YAW_DIGITS)])
     for time, row in zip(stream.times, values, strict=True):
         rows.setdefault(float(time), {}).update(zip(columns, row, strict=True))
     return columns
