@@ -63,7 +63,7 @@ def test_what_cannot_be_wanted_is_refused(robot, table, start, said):
 def test_what_lies_beyond_the_robots_is_said_on_the_shipped_table_alone():
     hand, end = np.array([[-0.4, 0.0], [0.0, 0.0]]), np.array([0.0, 0.0])
     assert beyond_reach(TABLE, hand, end) == [
-        "the hand would go 180 mm beyond where the Motoman reaches",
+        "the hand goes 180 mm beyond where the Motoman reaches",
         "the object stops 109 mm beyond where the Baxter reaches",
     ]
     assert beyond_reach(TABLE, np.array([[-0.4, 0.0]]), np.array([0.3, 0.0])) == []
@@ -82,4 +82,4 @@ def test_a_push_can_be_planned_to_where_the_baxter_reaches(tmp_path, capsys):
     assert content["goal_m"] is None and content["goal_within"]["radius_m"] == pytest.approx(reach.radius - INSIDE)
     end = np.array([[content["predicted"]["end"]["x_m"], content["predicted"]["end"]["y_m"]]])
     assert content["predicted"]["cost_m"] > 0.01 or reach.beyond(end)[0] == 0.0
-    assert "where a robot reaches" in " ".join(capsys.readouterr().out.split())
+    assert "within a robot's reach" in " ".join(capsys.readouterr().out.split())

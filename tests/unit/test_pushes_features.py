@@ -98,4 +98,4 @@ def test_pushes_that_are_not_looked_at_are_said(case):
     assert case.warnings == case.noise.warnings
     some = case_of(shipped_pushes(5), case.config, ThetaConfig(), jobs=1, most=2)
     assert [problem.order for problem in some.problems] == [0, 4]
-    assert some.warnings[0].startswith("2 of the 5 pushes were looked at")
+    assert some.warnings[0].startswith("2 of the 5 pushes were used")

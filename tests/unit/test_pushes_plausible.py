@@ -159,9 +159,9 @@ def test_noise_far_above_what_is_left_is_no_explanation():
     assert quieter_by(0.2, 4) is None  # by chance
     assert quieter_by(0.5, 500) is None and quieter_by(1.0, 500) is None and quieter_by(0.0, 0) is None
     said = sentence("consistent", (), None, quieter=quieter_by(1e-4, 500))
-    assert "is 100 times what is left, and nothing smaller than it can be seen" in said
+    assert "100 times the remaining errors, and effects smaller than it cannot be detected" in said
     result = SimpleNamespace(reduced_chi2=1e-4, explains=True, degrees=500)
-    assert "nothing smaller than it can be seen" in verdict(result) and "explains" not in verdict(result)
+    assert "smaller effects cannot be detected" in verdict(result) and "explains" not in verdict(result)
 
 
 def test_an_object_in_a_box_of_another_height_is_doubted(recording):
