@@ -48,7 +48,7 @@ def read_array_table(path: Path) -> Columns:
     Raises:
         RecordingError: if it cannot be read, or what reads it is not installed; one line that names the file.
     """
-    read = _READERS[path.suffix.lower()]
+    read = READERS[path.suffix.lower()]
     try:
         arrays = read(path)
     except RecordingError:
@@ -70,7 +70,16 @@ def read_array_table(path: Path) -> Columns:
         raise RecordingError(f"{named(path)}: holds no columns of numbers; its arrays are {_shapes(arrays)}.")
     if sum(map(len, numbers.values())) > MOST_NUMBERS:
         raise RecordingError(f"{named(path)}: has more than {MOST_NUMBERS:,} numbers; cut the pushes out of it.")
-    return Columns(source=named(path.name), numbers=numbers, texts=texts)
+    return Columns(source=named(path.name), numbers=_without_empty_rows(numbers), texts=texts)
+
+
+def _without_empty_rows(numbers: Mapping[str, Array]) -> dict[str, Array]:
+    """The columns without rows in which all of their length are empty, as a text's empty lines are passed over."""
+    kept = {}
+    for length in {len(column) for column in numbers.values()}:
+        table = np.array([column for column in numbers.values() if len(column) == length])
+        kept[length] = ~np.isnan(table).all(axis=0)
+    return {name: column[kept[len(column)]] for name, column in numbers.items()}
 
 
 def _why(error: Exception) -> str:
@@ -240,6 +249,6 @@ def _read_parquet(path: Path) -> dict[str, Any]:
     return found
 
 
-_READERS: Final[Mapping[str, Callable[[Path], dict[str, Any]]]] = {
+READERS: Final[Mapping[str, Callable[[Path], dict[str, Any]]]] = {
     ".npz": read_arrays, ".h5": _read_hdf5, ".hdf5": _read_hdf5, ".mat": _read_matlab, ".parquet": _read_parquet,
 }  # fmt: skip

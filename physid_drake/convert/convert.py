@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import tempfile
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from physid_drake.convert.arrays import read_array_table
+from physid_drake.convert.arrays import READERS, read_array_table
 from physid_drake.convert.bag import ENDINGS, RECEIVE, STAMP, bag_files, read_bag
 from physid_drake.convert.columns import Columns
 from physid_drake.convert.cutting import Piece, pieces_of, rows_by_value, sizes_said
@@ -39,7 +40,7 @@ from physid_drake.recording.adapters.sources import source_files
 from physid_drake.wording import named, shown
 
 TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".trc")
-ARRAYS: Final = (".npz", ".h5", ".hdf5", ".mat", ".parquet")
+ARRAYS: Final = tuple(READERS)
 LARGEST_REACH: Final = 1.0
 """m: of a mesh, whose file is not read here."""
 
@@ -175,7 +176,14 @@ def _table_parts(columns: Columns, chart: Map) -> Parts:
     values = columns.numbers[name]
     alike = [one for one in columns.numbers if len(columns.numbers[one]) == len(values)]
     parts: Parts = []
-    for value, rows in rows_by_value(values):
+    pieces = list(rows_by_value(values))
+    for value, count in Counter(value for value, _ in pieces).items():
+        if count > 1:
+            warnings.warn(
+                f"{columns.source}: {name} {value:g} comes in {count} pieces, and each is taken for a push.",
+                UserWarning, stacklevel=2,
+            )  # fmt: skip
+    for value, rows in pieces:
         numbers = {one: columns.numbers[one][rows] for one in alike}
         parts.append((f", {name} {value:g}", chart, _shared(replace(columns, numbers=numbers, texts={}, rows=()))))
     return parts

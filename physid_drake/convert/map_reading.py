@@ -197,18 +197,19 @@ def _pose(section: Section) -> PoseMap:
     """One body; where a row is a push, what it is at first, with what it is at last."""
     if not section.has("start"):
         return _one_pose(section)
-    section.check_keys("start", "end", "speed")
+    section.check_keys("start", "end", "speed", "world")
     first, last = (_one_pose(cast(Section, section.section(key))) for key in ("start", "end"))
     speed: Quantity | float | None = None
     if isinstance(section.values.get("speed"), dict):
         speed = _quantity(cast(Section, section.section("speed")), SPEEDS, (1,))
     elif section.has("speed"):
         speed = positive(section, "speed", 1.0)
-    return replace(first, end=last, speed=speed)
+    world = _maybe(section, "world", _world)
+    return replace(first, end=replace(last, world=world), speed=speed, world=world)
 
 
 def _one_pose(section: Section) -> PoseMap:
-    section.check_keys("topic", "frame", "time", "position", "rotation", "offset", "height_m")
+    section.check_keys("topic", "frame", "time", "position", "rotation", "offset", "height_m", "world")
     position = _maybe(section, "position", lambda inner: _quantity(inner, LENGTHS, (2, 3)))
     topic = section.text("topic") if section.has("topic") else None
     if position is None and topic is None:
@@ -221,6 +222,7 @@ def _one_pose(section: Section) -> PoseMap:
         turn=_turn(section),
         offset=_maybe(section, "offset", _offset) or Offset(),
         height=section.maybe_number("height_m"),
+        world=_maybe(section, "world", _world),
     )
 
 
@@ -255,7 +257,7 @@ def _bad_order(order: str) -> bool:
 
 
 def _force(section: Section) -> ForceMap:
-    section.check_keys("topic", "time", "columns", "unit", "axes", "offset", "acts_on", "weight_n", "tare_s")
+    section.check_keys("topic", "time", "columns", "unit", "axes", "offset", "acts_on", "weight_n", "tare_s", "world")
     topic = section.text("topic") if section.has("topic") else None
     columns = _names(section, (2, 3)) if topic is None or section.has("columns") else ()
     return ForceMap(
@@ -267,6 +269,7 @@ def _force(section: Section) -> ForceMap:
         on_hand=section.has("acts_on") and section.choice("acts_on", "object", "hand") == "hand",
         weight=not_negative(section, "weight_n", 0.0),
         tare=not_negative(section, "tare_s", 0.0),
+        world=_maybe(section, "world", _world),
     )
 
 

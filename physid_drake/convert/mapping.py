@@ -140,6 +140,7 @@ class PoseMap:
         height: z [m] of the body's origin, where nothing measured it.
         end: of a table with a row for each push: the same columns of where the body is at last.
         speed: of the hand there: its column, or the number [m/s].
+        world: where W lies in the frame that this body is measured in, if that is not the source's.
     """
 
     topic: str | None = None
@@ -151,6 +152,7 @@ class PoseMap:
     height: float | None = None
     end: PoseMap | None = None
     speed: Quantity | float | None = None
+    world: World | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,6 +168,7 @@ class ForceMap:
         on_hand: whether it is the force of the object on the hand.
         weight: of the tool below the sensor [N], which it feels too.
         tare: so long [s] from a push's begin nothing is touched, and the mean is taken away.
+        world: where W lies in the frame that it is measured in, if that is not the source's.
     """
 
     topic: str | None = None
@@ -176,6 +179,7 @@ class ForceMap:
     on_hand: bool = False
     weight: float = 0.0
     tare: float = 0.0
+    world: World | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -247,3 +251,7 @@ class Map:
     hand_path: PoseMap | None
     force: ForceMap | None
     cut: Cut
+
+    def world_of(self, stream: PoseMap | ForceMap) -> World:
+        """Where W lies in the frame that a stream is measured in."""
+        return stream.world or self.world

@@ -20,7 +20,7 @@ from physid_drake.convert.conventions import (
     with_offset,
     wxyz_of,
 )
-from physid_drake.convert.mapping import Clock, ForceMap, Map, PoseMap, Quantity, Turn
+from physid_drake.convert.mapping import Clock, ForceMap, Map, PoseMap, Quantity, Turn, World
 from physid_drake.convert.units import ANGLES, FORCES, LENGTHS, SPEEDS, TIMES, factor
 from physid_drake.errors import RecordingError
 from physid_drake.recording import ForceStream, PoseStream
@@ -149,7 +149,9 @@ def _placed(columns: Columns, pose: PoseMap, times: Array, chart: Map) -> PoseSt
     if not seen.any():
         raise RecordingError("no row has all of its columns filled.")
     times, place = times[seen], place[seen]
-    rotation = None if pose.turn is None or turn is None else _rotation(columns, pose.turn, turn[seen], chart)
+    rotation = (
+        None if pose.turn is None or turn is None else _rotation(columns, pose.turn, turn[seen], chart.world_of(pose))
+    )
     return pose_stream(times, place, rotation, pose, chart)
 
 
@@ -173,8 +175,9 @@ def pose_stream(times: Array, place: Array, rotation: Rotation | None, pose: Pos
         kind = "yaw"
     if place.shape[1] == 2:
         place = np.column_stack([place, np.zeros(len(place))])
-    positions = places_in_world(place, chart.world)
-    turned = None if rotation is None else rotations_in_world(rotation, chart.world)
+    world = chart.world_of(pose)
+    positions = places_in_world(place, world)
+    turned = None if rotation is None else rotations_in_world(rotation, world)
     positions, turned = with_offset(positions, turned, pose.offset)
     if pose.height is not None:
         positions[:, 2] = pose.height
@@ -197,7 +200,7 @@ def _forces(columns: Columns, force: ForceMap, hand: PoseStream | None, chart: M
     order = _order(times)
     times, values = times[order], values[order]
     turns = _turns_at(times, hand) if force.in_hand and hand is not None else None
-    return ForceStream(times=times, forces=forces_in_world(values, force, turns, chart.world))
+    return ForceStream(times=times, forces=forces_in_world(values, force, turns, chart.world_of(force)))
 
 
 def _times(columns: Columns, clock: Clock, chart: Map) -> Array:
@@ -233,7 +236,7 @@ def _turns(columns: Columns, turn: Turn) -> Array:
     return columns.stack(turn.columns)
 
 
-def _rotation(columns: Columns, turn: Turn, values: Array, chart: Map) -> Rotation:
+def _rotation(columns: Columns, turn: Turn, values: Array, world: World) -> Rotation:
     stated = next((columns.units[n] for n in map(columns.find, turn.columns) if n in columns.units), None)
     unit = turn.unit or (stated if stated in ANGLES else None)
     if unit is None and turn.kind not in ("wxyz", "xyzw", "matrix"):
@@ -241,7 +244,7 @@ def _rotation(columns: Columns, turn: Turn, values: Array, chart: Map) -> Rotati
     largest = float(np.abs(values).max(initial=0.0))
     if unit == "rad" and turn.kind in ("euler", "rotation_vector") and largest > MOST_ANGLE:
         raise RecordingError(f"rotation: angles are said to be in rad, but one is {largest:.4g}; are they in deg?")
-    return rotation_of(turn, values, ANGLES[unit or "rad"], chart.world)
+    return rotation_of(turn, values, ANGLES[unit or "rad"], world)
 
 
 def _turns_at(times: Array, hand: PoseStream) -> Rotation:

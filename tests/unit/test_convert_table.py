@@ -343,6 +343,43 @@ class TestRefusals:
             convert_table(tmp_path / "log.h5", tmp_path / "out", tmp_path / "map.yaml")
 
 
+def test_a_hand_in_the_frame_of_its_robot_is_brought_into_that_of_the_tracker(tmp_path: Path) -> None:
+    rows = [line.split(",") for line in TABLE.splitlines()[1:]]
+    # The robot's base is at (0.6, -0.1, 0.02) in W, turned by 90 degrees: p_robot = R^T (p_W - t).
+    moved = [[t, x, y, yaw, f"{1e3 * (float(hy) + 0.1):.3f}", f"{-1e3 * (float(hx) - 0.6):.3f}"]
+             for t, x, y, yaw, hx, hy in rows]  # fmt: skip
+    (tmp_path / "log.csv").write_text("t,x,y,yaw,hx,hy\n" + "\n".join(map(",".join, moved)), encoding="utf-8")
+    chart = MAP.replace(
+        "hand: {position: {columns: [hx, hy]}, rotation: none, height_m: 0.023}",
+        "hand: {position: {columns: [hx, hy], unit: mm}, rotation: none, height_m: 0.023,"
+        " world: {pose: {translation: [600, -100, 20], unit: mm, yaw_deg: 90}}}",
+    )
+    (tmp_path / "map.yaml").write_text(chart, encoding="utf-8")
+    hand = convert_table(tmp_path / "log.csv", tmp_path / "found", tmp_path / "map.yaml").pushes[0].hand
+    assert hand is not None
+    expected = [[float(hx), float(hy), 0.023] for *_, hx, hy in rows]
+    np.testing.assert_allclose(hand.positions, expected, atol=1e-9)
+
+
+def test_rows_without_any_number_do_not_cut_a_push(tmp_path: Path) -> None:
+    table = np.array([[float(v) for v in line.split(",")] for line in TABLE.splitlines()[1:]])
+    table = np.insert(table, 4, np.nan, axis=0)
+    trial = np.where(np.isnan(table[:, 0]), np.nan, 3.0)
+    np.savez(tmp_path / "log.npz", trial=trial, **dict(zip(("t", "x", "y", "yaw", "hx", "hy"), table.T, strict=True)))
+    (tmp_path / "map.yaml").write_text(MAP + "pushes: {cut: column, column: trial}\n", encoding="utf-8")
+    found = convert_table(tmp_path / "log.npz", tmp_path / "found", tmp_path / "map.yaml")
+    assert [len(push.object) for push in found.pushes] == [9]
+
+
+def test_a_value_that_comes_again_is_said(tmp_path: Path) -> None:
+    lines = TABLE.splitlines()
+    numbered = [f"{line},{1 if k < 5 or k > 6 else 2}" for k, line in enumerate(lines[1:])]
+    (tmp_path / "log.csv").write_text("\n".join([f"{lines[0]},trial", *numbered]), encoding="utf-8")
+    (tmp_path / "map.yaml").write_text(MAP + "pushes: {cut: column, column: trial}\n", encoding="utf-8")
+    with pytest.warns(UserWarning, match="trial 1 comes in 2 pieces, and each is taken for a push"):
+        convert_table(tmp_path / "log.csv", tmp_path / "found", tmp_path / "map.yaml")
+
+
 def test_a_map_may_be_read_on_its_own(tmp_path: Path) -> None:
     (tmp_path / "map.yaml").write_text(MAP)
     chart = read_map(tmp_path / "map.yaml")
