@@ -175,7 +175,7 @@ def _fill(
     folder.write("result.json", result_json(examined, recording, scenario.seed, versions()))
     _show(examined.known, recording, console, alone=examined.diagnosis is None)
     if examined.diagnosis is not None:
-        show(console, examined.diagnosis)
+        show(console, examined.diagnosis, parameters=False)
     if plan is not None:
         console.print(plan_table(plan, hindsight=hindsight))
     console.print(f"written: {', '.join(files)} and pages; open {folder.path / INDEX}")

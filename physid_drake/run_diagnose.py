@@ -19,7 +19,14 @@ from physid_drake.pushes.config import ThetaConfig
 from physid_drake.pushes.kept_rollouts import KeptRollouts
 from physid_drake.recording import digest_of, read_recording, recording_folder
 from physid_drake.report.acts import acts_of, setting_of, unit_force_of
-from physid_drake.report.diagnosis import diagnosis_json, findings_table, fit_table, ranking_table, regime_table
+from physid_drake.report.diagnosis import (
+    diagnosis_json,
+    findings_table,
+    fit_table,
+    parameters_table,
+    ranking_table,
+    regime_table,
+)
 from physid_drake.report.diagnosis_page import MEANING, diagnosis_page, shown_pushes
 from physid_drake.report.pages import DIAGNOSIS, INDEX, SCENE, index_page
 from physid_drake.report.progress import DIAGNOSIS_STAGES, progress_bar
@@ -101,8 +108,8 @@ def run_case(
         return diagnose(case, seed=seed, alpha=alpha, effects=effects, progress=progress, kept=kept)
 
 
-def show(console: Console, diagnosis: Diagnosis) -> None:
-    """Print the diagnosis."""
+def show(console: Console, diagnosis: Diagnosis, *, parameters: bool = True) -> None:
+    """Print the diagnosis, with the parameters unless they were printed already."""
     console.print()
     p_value = f"p = {diagnosis.p_value:.2g}" if diagnosis.p_value > 0.0 else "p < 1e-300"
     console.print(Text.assemble((diagnosis.verdict, "bold"), f" ({p_value}). {diagnosis.sentence}"))
@@ -119,6 +126,8 @@ def show(console: Console, diagnosis: Diagnosis) -> None:
         console.print(f"{len(diagnosis.warnings) - MOST_NOTES} more warnings in diagnosis.json and on the page.")
     if diagnosis.effects:
         console.print(findings_table(diagnosis))
+    if parameters:
+        console.print(parameters_table(diagnosis))
     console.print(fit_table(diagnosis))
     if diagnosis.fit.regimes:
         console.print(regime_table(diagnosis))

@@ -68,7 +68,12 @@ def load_scenario(
     else:
         name, scenario, where = _named_scenario(config or DEFAULT)
     if override is not None:
-        scenario = _typed(parsed(override, "--set"), scenario, "--set")
+        before, scenario = scenario, _typed(parsed(override, "--set"), scenario, "--set")
+        try:
+            _checked(scenario, where)
+        except ConfigError:
+            _checked(before, where)  # what is wrong is the file's own; or else:
+            where = "--set"
     if recording is not None:
         scenario.recording = recording
     if seed is not None:

@@ -116,15 +116,12 @@ def _interval(effect: Effect, name: str, values: Sequence[Any]) -> Any:
 
 
 def theta_of(fitter: Fitter, fit: Fit, plain: Fit) -> dict[str, ThetaEstimate]:
-    """Theta under a model, which of it these pushes tell, and what the baseline had."""
+    """Theta under a model, which of it is identifiable, and what the baseline had."""
     before = plain.hypothesis.theta(plain.point.z)
     return {
-        e.name: ThetaEstimate(
-            value=e.value if e.identifiable else None, unit=e.unit, ci90=e.ci90 if e.identifiable else None,
-            identifiable=e.identifiable, before=float(was),
-        )
+        e.name: ThetaEstimate(value=e.value, unit=e.unit, ci90=e.ci90, identifiable=e.identifiable, before=float(was))
         for e, was in zip(estimates_of(fitter, fit), before, strict=True)
-    }  # fmt: skip
+    }
 
 
 def correlation_of(fitter: Fitter, fit: Fit) -> tuple[tuple[str, ...], Array]:

@@ -138,16 +138,16 @@ class ThetaEstimate:
     """One parameter of theta.
 
     Attributes:
-        value: with what was found in the model; None where these pushes cannot tell it.
+        value: with what was found in the model; where it is not identifiable, about what was known beforehand.
         unit: of the value.
-        ci90: 90 % interval; None where there is no value.
-        identifiable: whether these pushes tell it.
-        before: the baseline model's estimate; its prior's where these pushes cannot tell it.
+        ci90: 90 % interval; where it is not identifiable, no wider than the prior's.
+        identifiable: whether these pushes at least halve what was not known of it.
+        before: the baseline model's estimate.
     """
 
-    value: float | None
+    value: float
     unit: str
-    ci90: tuple[float, float] | None
+    ci90: tuple[float, float]
     identifiable: bool
     before: float
 

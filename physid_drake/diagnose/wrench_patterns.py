@@ -335,4 +335,4 @@ def _amount(wrenches: Sequence[MissingWrench], dof: Sequence[str]) -> str:
     forces, torques = amounts[:, :2].max(axis=1), amounts[:, 2]
     parts = [f"{np.median(forces[forces > 0.0]):.2g} N"] if (forces > 0.0).any() else []
     parts += [f"{1e3 * np.median(torques[torques > 0.0]):.2g} N mm"] if (torques > 0.0).any() else []
-    return f", about {' and '.join(parts)}" if parts else ""
+    return f", about {' and '.join(parts)} where it is clear" if parts else ""

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from physid_drake.effects.catalogue import sources_of_effects
 from physid_drake.files import MissingFileError, read_bytes
 from physid_drake.pushes.prediction import Prediction
 
@@ -38,8 +39,8 @@ def key_of(made_of: object, cell: str = "") -> bytes:
 
 @cache
 def magic() -> bytes:
-    """How a file begins: rollouts of other sources of this package are others."""
-    sources = sorted(Path(__file__).resolve().parents[1].rglob("*.py"))
+    """How a file begins: rollouts of other sources, of this package or of installed effects, are others."""
+    sources = sorted({*Path(__file__).resolve().parents[1].rglob("*.py"), *sources_of_effects()})
     digest = hashlib.blake2b(b"".join(file.read_bytes() for file in sources), digest_size=KEY)
     return b"physid-rollouts/1 " + digest.hexdigest().encode() + b"\n"
 

@@ -166,6 +166,17 @@ def _interval(ci90: Any) -> str:
     return f"{ci90[0]:.4g} to {ci90[1]:.4g}"
 
 
+def parameters_table(diagnosis: Diagnosis) -> Table:
+    """Friction, mass and the rest of theta with intervals, and whether they are identifiable from these pushes."""
+    table = narrow_table(
+        "parameters", words("parameter"), numbers("identified"), numbers("90 % interval"), words("identifiable")
+    )
+    for name, theta in diagnosis.theta.items():
+        identifiable = "yes" if theta.identifiable else "no (interval is the prior)"
+        table.add_row(name, _shown(theta.value, theta.unit), _interval(theta.ci90), identifiable)
+    return table
+
+
 def ranking_table(diagnosis: Diagnosis, most: int = 8) -> Table:
     """The effects of the catalogue, best first, and why others were rejected."""
     title = "why other effects were rejected" if diagnosis.effects else "effects of the catalogue, best first"

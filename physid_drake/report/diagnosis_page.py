@@ -115,7 +115,7 @@ def diagnosis_page(
         outline=outline_of(recording.object.shape),
         shown=shown,
         wrenches=wrenches,
-        friction=None if friction is None else _told(friction),
+        friction=None if friction is None else friction.value,
     )
     with drawn():
         scene = SCENE if SCENE in pages else None
@@ -222,10 +222,6 @@ def _frame(frame: str) -> str:
     return "none" if frame == "none" else f"of the {frame.replace('_', ' ')}"
 
 
-def _told(theta: ThetaEstimate) -> float:
-    return theta.before if theta.value is None else theta.value
-
-
 def _fits(diagnosis: Diagnosis) -> list[tuple[str, list[str]]]:
     """Rows of the table of held-out errors."""
     return [(name, [fixed(value) for value in figures]) for name, figures in held_out_figures(diagnosis)]
@@ -279,13 +275,12 @@ def _ranking(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _theta_row(name: str, theta: ThetaEstimate) -> dict[str, Any]:
-    identifiable = theta.identifiable and theta.value is not None
     return {
         "name": name.replace("_", " "),
         "before": quantity(theta.before, theta.unit),
-        "after": quantity(theta.value, theta.unit) if identifiable else "not identifiable",
-        "interval": interval(theta.ci90, theta.unit) if identifiable else "–",
-        "identifiable": identifiable,
+        "after": quantity(theta.value, theta.unit),
+        "interval": interval(theta.ci90, theta.unit),
+        "identifiable": theta.identifiable,
     }
 
 

@@ -198,7 +198,24 @@ def _propose(belief: Belief, search: Search, plan: _Plan, rng: np.random.Generat
         left = design[~belief.tried[design]]
         if len(left):
             return left[: min(wanted, plan.n_initial - belief.n_trials)]
-    return search.propose(belief, rng, wanted)
+    return _sound(search.propose(belief, rng, wanted), belief, wanted)
+
+
+def _sound(indices: Indices, belief: Belief, wanted: int) -> Indices:
+    """What a search proposed, if it kept to the protocol.
+
+    Raises:
+        ParameterError: if not.
+    """
+    found = np.asarray(indices)
+    if not len(found):
+        return np.zeros(0, dtype=np.intp)
+    whole = found.ndim == 1 and found.dtype.kind in "iu"
+    if not whole or found.min() < 0 or found.max() >= len(belief.tried) or len(found) > wanted:
+        raise ParameterError(f"search: propose must return at most {wanted} indices of candidates, got {found[:5]}.")
+    if belief.tried[found].any() or len(np.unique(found)) < len(found):
+        raise ParameterError(f"search: propose must return distinct candidates that were not tried, got {found[:5]}.")
+    return found.astype(np.intp)
 
 
 def _evaluate(objective: Objective, thetas: Array) -> Array:

@@ -90,7 +90,7 @@ def diagnosis_with(**changes):
             per_push=((NAMES[0], 2.0, 1.0), (NAMES[1], math.inf, 0.9)),
         ),
         theta={
-            "mass": ThetaEstimate(value=None, unit="kg", ci90=None, identifiable=False, before=0.1),
+            "mass": ThetaEstimate(value=0.1, unit="kg", ci90=(0.05, 0.2), identifiable=False, before=0.1),
             "support_friction": ThetaEstimate(
                 value=0.25, unit="-", ci90=(0.2, 0.3), identifiable=True, before=0.24
             ),
@@ -194,7 +194,7 @@ def test_a_page_is_well_formed_and_complete(page):
     # Law, next push, two views, arrows, and for each push its errors and its strip.
     assert tags.seen.count("svg") == 1 + 1 + 2 + 1 + 2 + 2
     for words in (
-        "explained", "Missing physics: stribeck_friction.", "1 × 10⁻⁹", "not identifiable", "0.2 to 0.3",
+        "explained", "Missing physics: stribeck_friction.", "1 × 10⁻⁹", "no (interval is the prior)", "0.2 to 0.3",
         "During free sliding, about 0.1 N", "too little", "< 10⁻³⁰⁰", "nothing beyond noise",
     ):  # fmt: skip
         assert words in text

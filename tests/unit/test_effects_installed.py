@@ -7,11 +7,14 @@ import sys
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
+import numpy as np
 import pytest
+from own_wind import OwnWind
 
-from physid_drake.effects import GROUP, SHIPPED, known_effects, of_models
-from physid_drake.effects.catalogue import _effects_of
+from physid_drake.effects import GROUP, SHIPPED, Coordinate, Effect, Surroundings, known_effects, of_models
+from physid_drake.effects.catalogue import _effects_of, _fault_of, _try, sources_of_effects
 from physid_drake.errors import ConfigError
+from physid_drake.pushes import kept_rollouts
 
 TESTS = Path(__file__).parents[1]
 
@@ -68,3 +71,64 @@ def test_an_effect_of_a_known_name_is_refused(monkeypatch):
         known_effects()
     monkeypatch.undo()
     assert known_effects()[: len(SHIPPED)] == SHIPPED and len(of_models()) == len(known_effects()) + 1
+
+
+class NoAmplitudes(Effect):
+    name, element, statement, frame = "twist", "world", "a twist", "world"
+
+
+class WrongFrame(OwnWind):
+    frame = "body"
+
+
+class WrongAmplitudes(OwnWind):
+    amplitudes = ("x", "z")
+
+
+class NotNull(OwnWind):
+    def __init__(self):
+        super().__init__(x=1.0, y=0.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        (NoAmplitudes, "has no 'amplitudes'"), (WrongFrame, "has the frame 'body', which is none of world"),
+        (WrongAmplitudes, "names amplitudes that are no fields of it: z"), (NotNull, "is not null at its defaults"),
+    ],
+)  # fmt: skip
+def test_what_an_effect_lacks_is_said_before_anything_is_simulated(kind, said):
+    assert _fault_of(OwnWind) is None
+    assert said in _fault_of(kind)
+
+
+class WrongChart(OwnWind):
+    @classmethod
+    def chart(cls, around):
+        return (Coordinate(name="torque", step=1.0),)
+
+
+class NoWrench(OwnWind):
+    def laws(self, facts):
+        return (object(),)
+
+
+@pytest.mark.parametrize(("kind", "said"), [(WrongChart, "do not fit: TypeError"), (NoWrench, "has no 'wrench'")])
+def test_a_chart_and_laws_are_tried_before_the_first_fit(kind, said):
+    scene = Surroundings(
+        mass=0.2, friction=0.3, size=np.array([0.1, 0.06]), height=0.04, region=np.array([[-0.5, -0.5], [0.5, 0.5]]),
+        top_speed=0.3, pushes=12, has_hand=True, rolls=False,
+    )  # fmt: skip
+    _try(OwnWind, scene)
+    with pytest.raises(ConfigError, match=said):
+        _try(kind, scene)
+
+
+def test_rollouts_with_another_law_of_an_installed_effect_are_others(monkeypatch, tmp_path):
+    source = tmp_path / "law.py"
+    source.write_text("FORCE = 1.0\n")
+    monkeypatch.setattr(kept_rollouts, "sources_of_effects", lambda: {source})
+    before = kept_rollouts.magic.__wrapped__()
+    source.write_text("FORCE = 2.0\n")
+    assert kept_rollouts.magic.__wrapped__() != before
+    assert sources_of_effects() == set()  # nothing is installed here

@@ -172,3 +172,22 @@ def test_more_candidates_than_the_limit_leave_out_the_unlikely_ones():
     # Half the total variation between the two: the share of functions whose minimum is another.
     assert 0.5 * np.abs(few.p_min - all_.p_min).sum() < 0.25
     assert few.entropy < all_.entropy + 0.05
+
+
+@pytest.mark.parametrize(
+    ("proposed", "said"),
+    [
+        ([0.5], "must return at most 1 indices"), ([400], "must return at most 1"), ([3, 4], "must return at most 1"),
+        (None, "distinct candidates that were not tried"),
+    ],
+)  # fmt: skip
+def test_a_search_that_does_not_keep_to_the_protocol_is_refused(proposed, said):
+    class Own:
+        def propose(self, belief, rng, batch=1):
+            return np.array(np.flatnonzero(belief.tried)[:1] if proposed is None else proposed)
+
+    candidates = np.linspace(0.0, 1.0, 20)[:, None]
+    with pytest.raises(ParameterError, match=said):
+        search_minimum(
+            lambda thetas: thetas[:, 0], space(), candidates, Own(), budget=12, rng=np.random.default_rng(0)
+        )

@@ -173,6 +173,11 @@ def test_theta_outside_its_bounds(refused, tmp_path, theta, said):
     assert said in refused("--set", f"{{theta: {theta}}}", *out(tmp_path))
 
 
+def test_what_an_override_has_wrong_is_not_put_down_to_the_file(refused, tmp_path):
+    said = refused("--set", "{search: {method: annealing}}", *out(tmp_path))
+    assert "--set, key 'search.method': must be one of" in said and "sealed.yaml" not in said
+
+
 @pytest.mark.parametrize(
     "contact",
     [

@@ -298,11 +298,11 @@ def _others_covered(true: Sequence[dict[str, Any]], effect: dict[str, Any]) -> l
 
 
 def _theta(true: dict[str, float], found: dict[str, Any]) -> list[tuple[float, bool]]:
-    """Relative error of each parameter of theta that the pushes tell, and whether its interval holds the truth."""
+    """Relative error of each parameter of theta that is identifiable, and whether its interval holds the truth."""
     return [
         (abs(one["value"] / true[name] - 1.0), _holds(one["ci90"], true[name]))
         for name, one in found.items()
-        if one["value"] is not None and true.get(name)
+        if one["value"] is not None and one.get("identifiable", True) and true.get(name)
     ]
 
 
