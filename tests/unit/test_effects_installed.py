@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from own_wind import OwnWind
+from own_world import recorded
 
 from physid_drake.effects import GROUP, SHIPPED, Coordinate, Effect, Surroundings, known_effects, of_models
 from physid_drake.effects.catalogue import _effects_of, _fault_of, _try, sources_of_effects
 from physid_drake.errors import ConfigError
 from physid_drake.pushes import kept_rollouts
+from physid_drake.recording import read_recording, write_recording
 
 TESTS = Path(__file__).parents[1]
 
@@ -132,3 +134,11 @@ def test_rollouts_with_another_law_of_an_installed_effect_are_others(monkeypatch
     source.write_text("FORCE = 2.0\n")
     assert kept_rollouts.magic.__wrapped__() != before
     assert sources_of_effects() == set()  # nothing is installed here
+
+
+def test_pushes_of_a_world_of_ones_own_are_a_recording(tmp_path):
+    write_recording(recorded(OwnWind(x=-0.04, y=0.015), count=2), tmp_path / "own")
+    with_wind, without = (recorded(OwnWind(x=x), count=2).pushes for x in (-0.1, 0.0))
+    assert len(read_recording(tmp_path / "own").pushes) == 2
+    ends = [np.mean([push.object.positions[-1, 0] for push in pushes]) for pushes in (with_wind, without)]
+    assert ends[0] < ends[1] - 1e-3  # measured: 7 mm
