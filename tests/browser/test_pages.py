@@ -5,7 +5,9 @@ They need Chromium (``apt install chromium``) and the Python package playwright.
 
 import io
 import json
+import os
 import shutil
+from pathlib import Path
 
 import matplotlib.image as mpimg
 import numpy as np
@@ -29,6 +31,9 @@ FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-
 
 @pytest.fixture(scope="module")
 def job(tmp_path_factory):
+    """The folder of a main job: that which PHYSID_RUN names, or one of its own."""
+    if "PHYSID_RUN" in os.environ:
+        return Path(os.environ["PHYSID_RUN"])
     out = tmp_path_factory.mktemp("job") / "out"
     assert run_cell.main(["--out", str(out), "--no-view"]) == 0
     return out

@@ -133,7 +133,7 @@ def test_a_noise_that_nothing_tells_is_what_the_plain_cell_leaves():
     assert diagnosis.verdict in ("consistent", "underpowered")
     # Two poses a push tell a noise of 0.3 mm to a few tens of percent.
     assert 0.15e-3 < evidence.case.noise.position < 1.2e-3
-    assert any("what the baseline model leaves" in warning for warning in diagnosis.warnings)
+    assert any("as large as the errors of the baseline model" in warning for warning in diagnosis.warnings)
 
 
 def test_where_no_noise_is_known_an_effect_is_found_by_the_quiet_that_it_leaves():

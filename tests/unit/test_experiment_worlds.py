@@ -167,7 +167,7 @@ def test_motion_prediction_runs_from_end_to_end_and_is_resumed(tmp_path):
         seed=0, repetitions=2, pushes=4, training=2, testing=1, subsets=(1, 2), budget=4, time_step_s=4e-3
     )  # fmt: skip
     with claim("motion_prediction", experiment, tmp_path) as folder:
-        records = run_all(experiment, folder, jobs=1, time_step=lambda stage, done, total: None)
+        records = run_all(experiment, folder, jobs=1, progress=lambda stage, done, total: None)
         result = experiment.result(records)
         write(folder, result, "motion_prediction", "the command")
     names = {"command.txt", "figure.svg", "result.json", "result.md", "budget.csv", "training_pushes.csv"}
@@ -178,5 +178,5 @@ def test_motion_prediction_runs_from_end_to_end_and_is_resumed(tmp_path):
         assert record["true_theta"]["mm"] < 5.0
     kept = (tmp_path / "repetitions" / "001.json").read_text()
     with claim("motion_prediction", experiment, tmp_path) as folder:
-        again = run_all(experiment, folder, jobs=1, time_step=lambda s, d, t: None)
+        again = run_all(experiment, folder, jobs=1, progress=lambda s, d, t: None)
     assert again == records and (tmp_path / "repetitions" / "001.json").read_text() == kept
