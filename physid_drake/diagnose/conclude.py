@@ -18,12 +18,15 @@ from physid_drake.diagnose.sentence import sentence
 from physid_drake.diagnose.values import Detectable, Diagnosis, EffectFinding, FitQuality, Location, Partly
 from physid_drake.diagnose.wrench_patterns import locate
 from physid_drake.identify.accuracy import accuracy_of
+from physid_drake.inference.fit import Fit
+from physid_drake.inference.push import TAIL
 from physid_drake.inference.replicates import p_value, without_best
 from physid_drake.pushes.case import UNIT_SCATTER
 from physid_drake.pushes.stated import quieter_by
 
 GOOD_PART = 0.25  # of the squared error: less is not worth a word
 VISIBLE = 10.0  # standard deviations of motion: pushes that would not show such an effect show nothing
+ODD = 0.001  # chance that any push of a recording is as far off as those that are named for it
 
 
 def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
@@ -65,7 +68,7 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
         reduced_chi2_after=left,
         friction_scatter=UNIT_SCATTER * after.scatter,
         noise=evidence.known.noise,
-        warnings=(*case.warnings, *_by_cell(evidence)),
+        warnings=(*_odd(evidence), *case.warnings, *_by_cell(evidence)),
         rollouts=found.fitter.predictor.count + evidence.fitter.predictor.count,
         pushes=case.pushes,
     )
@@ -159,8 +162,29 @@ def _quality(evidence: Evidence) -> FitQuality:
     )  # fmt: skip
 
 
+def odd_pushes(fit: Fit) -> tuple[int, ...]:
+    """Pushes that are further off than the noise's heavy tail makes any push by chance (Bonferroni).
+
+    Of a push whose m errors are t distributed as one, their mean square is distributed as F of m and ``TAIL``.
+    """
+    counts = np.array([len(push.residual) for push in fit.pushes])
+    squares = np.array([one.square for one in fit.weighed]) / fit.noise_scale**2
+    chances = stats.f.sf(squares / counts, counts, TAIL)
+    return tuple(np.flatnonzero(chances * len(counts) < ODD).tolist())
+
+
+def _odd(evidence: Evidence) -> list[str]:
+    """A line on the pushes that nothing explains."""
+    odd = odd_pushes(evidence.corrected)
+    if not odd:
+        return []
+    errors = accuracy_of(evidence.case, evidence.errors_after).per_push
+    said = ", ".join(f"{evidence.case.problems[k].name} ({errors[k]:.0f} sigma)" for k in odd)
+    return [f"pushes that differ from all others hardly count; look at their cut and their track: {said}"]
+
+
 def _left(evidence: Evidence) -> str:
-    """What the model that leaves does not account for, in words."""
+    """What the final model does not account for, in words."""
     if is_own_error(accuracy_of(evidence.case, evidence.errors_before)):
         return "no more than the difference between two simulators"
     after = evidence.corrected
@@ -172,5 +196,6 @@ def _left(evidence: Evidence) -> str:
         friction += f", within a push {100 * rough.table:.0f} % ({100 * rough.tip:.0f} % at the tip)"
     nameless = "" if evidence.named or evidence.best is None else "beside an unnamed force, "
     if after.noise_scale <= most_noise_scale(evidence.case.noise):
-        return f"{nameless}no more than noise; {friction}"
+        but = ", but for pushes that differ from all others" if odd_pushes(after) else ""
+        return f"{nameless}no more than noise{but}; {friction}"
     return f"{nameless}{after.noise_scale:.1f} times the noise and the simulator's own error; {friction}"
