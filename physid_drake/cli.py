@@ -137,9 +137,11 @@ def _run_convert(arguments: argparse.Namespace) -> int:
         # Drake takes a second to import, which published layouts, whose frames are known, need not wait for.
         from physid_drake.run_inspect import look  # noqa: PLC0415
 
-        for why in look(recording)[:1]:
+        refused = look(recording)[:1]
+        for why in refused:
             say_error(why)
         print(f"next: physid_drake inspect {arguments.folder}")
+        return 1 if refused else 0
     return 0
 
 
