@@ -140,10 +140,8 @@ def effect_named(name: str, among: Sequence[type[Effect]] | None = None) -> type
     for kind in among:
         if kind.name == name:
             return kind
-    raise ConfigError(
-        f"effect '{named(name)}' is unknown; known are {', '.join(kind.name for kind in among)}. One of another"
-        " package is known where that package is installed."
-    )
+    known = ", ".join(kind.name for kind in among)
+    raise ConfigError(f"effect '{named(name)}' is unknown; known are {known}. Is its package installed?")
 
 
 def applicable(around: Surroundings, names: Sequence[str] | None = None) -> tuple[type[Effect], ...]:

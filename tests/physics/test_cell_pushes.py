@@ -77,6 +77,7 @@ def test_other_pushes_are_followed_within_half_a_sigma(model):
     assert rms(np.concatenate(errors("sixty", 1, model, pick=slice(20)))) < WANTED
 
 
+@pytest.mark.slow
 @both_models
 def test_pushes_that_nearly_topple_a_bottle_are_followed(model, request):
     # Seed 1, push 42: friction 0.24 of a bottle that tips at 0.33; part of its base is lifted a fifth of the time.
@@ -114,7 +115,7 @@ def test_a_slow_push_needs_no_short_ticks():
     assert abs(parted - moved)[2] < 1e-4
 
 
-@pytest.mark.parametrize("remedy", ["impact_law", "drift_feedforward"])
+@pytest.mark.parametrize("remedy", [pytest.param("impact_law", marks=pytest.mark.slow), "drift_feedforward"])
 def test_each_remedy_matters(remedy):
     # Low objects only: without the impact law some Drake releases topple a bottle.
     low = [k for k, (body, *_) in enumerate(sixty(0)) if body.height < 0.08][:18]
