@@ -96,7 +96,7 @@ class Cell:
             ApplySimulatorConfig(
                 SimulatorConfig(
                     integration_scheme="cenic",
-                    # A hair above the time_step: rounding would else split every other time step in two. Never a part
+                    # A hair above the time step: rounding would else split every other time step in two. Never a part
                     # of it: what laws give for a time step would act in its first step.
                     max_step_size=1.001 * max(solver.slide_time_step_s, solver.time_step_s),
                     use_error_control=False,

@@ -330,7 +330,7 @@ class MotionTable:
     speeds: Speeds
 
     def wrench(self, state: ObjectState) -> Wrench:
-        """The mean force over the time_step: of a speed that grows evenly or, below the slowest, by its own size.
+        """The mean force over the time step: of a speed that grows evenly or, below the slowest, by its own size.
 
         The velocity turns by what the force across says and keeps its size; a brake never drives backwards.
         """

@@ -72,7 +72,7 @@ class Log:
     impacts: list[float] = field(default_factory=list)
 
     def add(self, time: float, pose: Array, force: tuple[float, float, float]) -> None:
-        """Append a time_step: time [s], pose (7,), hand force [N]."""
+        """Append a time step: time [s], pose (7,), hand force [N]."""
         self.times.append(time)
         self.poses.append(pose)
         self.forces.append(force)

@@ -37,7 +37,7 @@ class Piece:
 
 
 def pieces_of(streams: Streams, cut: Cut, reach: float) -> tuple[list[Piece], list[str]]:
-    """The pushes of one log, and a line for each piece that was held out.
+    """The pushes of one log, and a line for each piece that was left out.
 
     Args:
         streams: of the log.

@@ -122,7 +122,7 @@ class Swing:
 
     def _advance(self, state: ObjectState, span: float) -> None:
         """Move by what has passed since the last look."""
-        if span > 1.001 * self._span:  # more than its time_step: the object stood still, and the rollout skipped it
+        if span > 1.001 * self._span:  # more than its time step: the object stood still, and the rollout skipped it
             start = complex(*state.p_WBcm)
             offset, self._velocity = self._flow(self._place - start, self._velocity, 0.0, span)
             self._place = start + offset

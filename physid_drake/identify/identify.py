@@ -30,7 +30,7 @@ from physid_drake.search import SearchResult
 Array = NDArray[np.float64]
 
 EXPLAINED = 1.5  # reduced chi-square below which the baseline model leaves no more than noise and its own error
-MOST_SCATTER = 0.08  # of friction from push to push: pushes that differ by more differ in something that is held out
+MOST_SCATTER = 0.08  # of friction between pushes: those that differ by more differ in something that the model lacks
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)

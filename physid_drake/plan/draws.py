@@ -171,7 +171,7 @@ def moved(model: Model, scores: dict[str, float], scatter: float) -> Model:
             value, allowed = float(getattr(effects[owner], parameter)), effects[owner].ranges()[parameter]
             effects[owner] = dc.replace(effects[owner], **{parameter: shift(value, allowed)})
         elif owner not in effects:
-            continue  # of an effect that was held out
+            continue  # of an effect that was left out
         else:
             raise ConfigError(f"model: the interval '{name}' belongs to no parameter.")
     friction = np.maximum(LEAST_FRICTION, body.support_friction * (1.0 + scatter))

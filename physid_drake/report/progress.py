@@ -40,7 +40,7 @@ class Forecast:
     """How much of a job is left, by how long those of its stages that are over have lasted."""
 
     def __init__(self, stages: Mapping[str, float]) -> None:
-        """``stages``: in their order, how long each lasts beside the others; those that are held out take no time."""
+        """``stages``: in their order, how long each lasts beside the others; those that are left out take no time."""
         self._lasts = dict(stages)
         self._over: dict[str, float] = {}  # how long they have lasted [s]
         self._stage, self._began = "", time.monotonic()

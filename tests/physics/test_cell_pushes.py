@@ -97,7 +97,7 @@ def test_an_object_of_uneven_density_is_followed_within_half_a_sigma(model):
 
 
 def test_a_slow_push_needs_no_short_ticks():
-    # A contact that sticks must not creep because the hand gives way within a time_step: 2 mm/s, off the centre.
+    # A contact that sticks must not creep because the hand gives way within a time step: 2 mm/s, off the centre.
     body = OBJECTS["box"]
     push = draw_push(
         np.random.default_rng(5), body, speed=0.002, offset=0.5, heading=0.1, push_time=4.0, pose=(0, 0, 0)

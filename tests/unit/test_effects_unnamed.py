@@ -37,7 +37,7 @@ def test_each_block_is_a_law_of_its_own(block, law):
 
 
 def test_a_draw_is_as_large_as_its_prior_says():
-    """Modes that are held out are a part of the variance: 5 % of a force, 4 % of a friction."""
+    """Modes that are left out are a part of the variance: 5 % of a force, 4 % of a friction."""
     draws = np.random.default_rng(0).normal(size=(400, COUNT))
     effects = [UnnamedForce.at(point, AROUND) for point in draws]
     held = AROUND.friction * AROUND.weight
