@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from physid_drake.errors import ConfigError
@@ -17,8 +18,20 @@ def recording_folder(text: str) -> Path:
     """
     path = Path(text)
     try:
-        if not path.exists() and path.parent == Path() and (shipped("recordings") / text).is_dir():
-            return shipped("recordings") / text
+        path.exists()
     except (OSError, ValueError) as error:  # too long a name, a NUL in it
         raise ConfigError(f"recording {shown(text)}: nothing can have such a name.") from error
-    return path
+    return shipped_recording(path) or path
+
+
+def shipped_recording(name: Path) -> Path | None:
+    """The folder of a recording that ships with the project; None where none is called so, or a file or folder is."""
+    if os.path.lexists(name) or name.parent != Path():
+        return None
+    folder = shipped("recordings") / name
+    return folder if os.path.isdir(folder) else None  # noqa: PTH112  # Path.is_dir raises for a name that is too long
+
+
+def shipped_names() -> tuple[str, ...]:
+    """The names of the recordings that ship with the project."""
+    return tuple(sorted(folder.name for folder in shipped("recordings").iterdir() if folder.is_dir()))

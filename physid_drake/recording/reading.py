@@ -19,6 +19,7 @@ from physid_drake.errors import RecordingError
 from physid_drake.recording import description
 from physid_drake.recording.clocks import check_seconds
 from physid_drake.recording.limits import FURTHEST, STRONGEST, first_beyond
+from physid_drake.recording.naming import shipped_names, shipped_recording
 from physid_drake.recording.screening import gap_warnings, screen_poses
 from physid_drake.recording.values import (
     QUATERNION_TOLERANCE,
@@ -80,11 +81,11 @@ class _PushTable:
         return np.flatnonzero(present.all(axis=1))
 
 
-def read_recording(folder: Path) -> Recording:
+def read_recording(folder: str | Path) -> Recording:
     """Reads a recording.
 
     Args:
-        folder: the folder with ``recording.yaml`` and its tables.
+        folder: the folder with ``recording.yaml`` and its tables, or the name of a recording that ships.
 
     Returns:
         The recording; each push carries the warnings about its streams.
@@ -92,11 +93,7 @@ def read_recording(folder: Path) -> Recording:
     Raises:
         RecordingError: if a rule of ``physid-recording/1`` is broken; one line naming file, row and column.
     """
-    folder = Path(folder)
-    if not os.path.isdir(folder):  # noqa: PTH112  # Path.is_dir raises for a name that is too long
-        raise RecordingError(
-            f"{named(folder)}: is not a folder; give the folder that holds {description.DESCRIPTION_FILE}."
-        )
+    folder = _folder_of(Path(folder))
     top = description.load_description(folder)
     name = top.text("name")
     hand = description.hand_from(top)
@@ -119,6 +116,17 @@ def read_recording(folder: Path) -> Recording:
             folder=folder,
             conversion=conversion,
         )
+
+
+def _folder_of(given: Path) -> Path:
+    """The folder that somebody gives, or of the recording that ships under this name."""
+    folder = shipped_recording(given) or given
+    if not os.path.isdir(folder):  # noqa: PTH112  # Path.is_dir raises for a name that is too long
+        raise RecordingError(
+            f"{named(folder)}: is not a folder; give the folder that holds {description.DESCRIPTION_FILE}, or one of"
+            f" the names {', '.join(shipped_names())}."
+        )
+    return folder
 
 
 def _read_push(file: Path, name: str, note: str, *, with_hand: bool) -> Push:

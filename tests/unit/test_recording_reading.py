@@ -1,5 +1,6 @@
 import os
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -365,3 +366,15 @@ def test_a_rotation_that_was_not_measured_is_none(written, tmp_path):
 )
 def test_a_rotation_is_said_in_one_way(written, header, rows, expected):
     assert expected in refusal(written(header=header, rows=rows))
+
+
+def test_a_recording_that_ships_is_read_by_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert read_recording("eraser_reference").name == "eraser_reference"
+    assert read_recording(Path("sealed_01")).folder.is_dir()
+    assert "eraser_reference, sealed_01" in refusal("eraser_referenz")
+    # What somebody has themselves goes first.
+    (tmp_path / "sealed_01").mkdir()
+    assert "missing file" in refusal("sealed_01")
+    (tmp_path / "eraser_reference").write_text("no folder")
+    assert "is not a folder" in refusal("eraser_reference")
