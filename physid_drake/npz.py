@@ -18,7 +18,7 @@ from physid_drake.files import FileError, read_bytes
 from physid_drake.wording import named, one_line, shown
 
 MOST_UNPACKED: Final = 1_000_000_000  # bytes of all arrays together
-_KINDS: Final = "biufU"  # truth values, whole and real numbers, text: no pickles, no records
+_KINDS: Final = "biufUmM"  # truth values, whole and real numbers, text, durations, dates: no pickles, no records
 _BROKEN: Final = (
     OSError, ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError, OverflowError, MemoryError,
     RuntimeError, SyntaxError, zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, tokenize.TokenError,

@@ -2,7 +2,7 @@
 
 An array (n, k) becomes k columns ``name[0]`` to ``name[k-1]``; one of three axes (pushes, n, k) becomes the same with
 its pushes one after the other, counted in ``[push]``. So do groups of an HDF5 file that hold the same, one each.
-Matrices (n, 3, 3), (n, 3, 4) or (n, 4, 4) become ``name[row,column]``.
+Matrices (n, 3, 3), (n, 3, 4) or (n, 4, 4) become ``name[row,column]``. Dates and durations become seconds.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import importlib
 import io
 import zlib
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -28,10 +29,17 @@ MOST_BYTES: Final = 1_000_000_000
 MOST_NUMBERS: Final = 40_000_000
 MOST_COLUMNS: Final = 64
 """Of one array: an image is no column."""
+MOST_AXES: Final = 4
+"""Of pushes of matrices."""
 
 _PACKED: Final = 15
 """MATLAB's code of an element that is packed by zlib."""
 _PIECE: Final = 1 << 20
+
+_SECONDS: Final = {
+    "W": 604800.0, "D": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "ps": 1e-12,
+}  # fmt: skip
+"""Of NumPy's units of dates and durations; a month has no length."""
 
 _BROKEN: Final = (
     OSError, ValueError, TypeError, RuntimeError, MemoryError, OverflowError, AttributeError, LookupError,
@@ -39,8 +47,15 @@ _BROKEN: Final = (
 )  # fmt: skip
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Unread:
+    """What a file holds and no column can be made of, and why."""
+
+    why: str
+
+
 def read_array_table(path: Path) -> Columns:
-    """The columns of an npz, HDF5, MATLAB or Parquet file; what is no number and no text is passed over.
+    """The columns of an npz, HDF5, MATLAB or Parquet file; what is no number, no time and no text is passed over.
 
     Args:
         path: of the file; its ending says what it is.
@@ -61,16 +76,26 @@ def read_array_table(path: Path) -> Columns:
         ) from error
     numbers: dict[str, Array] = {}
     texts: dict[str, list[str]] = {}
+    unread: dict[str, str] = {}
+    units: dict[str, str] = {}
     for name, array in arrays.items():
-        if array.dtype.kind in "UO" and array.ndim == 1:
+        if not isinstance(array, _Unread) and array.dtype.kind in "UO" and array.ndim == 1:
             texts[name] = [str(value) for value in array[:MOST_NUMBERS]]
-        elif array.dtype.kind in "biuf" and 1 <= array.ndim <= 4:
-            numbers |= _columns(name, array)
+            continue
+        found = _columns(name, array)
+        if isinstance(found, _Unread):
+            unread[name] = found.why
+            continue
+        numbers |= found
+        if array.dtype.kind in "mM":
+            units |= dict.fromkeys(found.keys() - {PUSH}, "s")
     if not numbers:
         raise RecordingError(f"{named(path)}: holds no columns of numbers; its arrays are {_shapes(arrays)}.")
     if sum(map(len, numbers.values())) > MOST_NUMBERS:
         raise RecordingError(f"{named(path)}: has more than {MOST_NUMBERS:,} numbers; cut the pushes out of it.")
-    return Columns(source=named(path.name), numbers=_without_empty_rows(numbers), texts=texts)
+    return Columns(
+        source=named(path.name), numbers=_without_empty_rows(numbers), texts=texts, units=units, unread=unread
+    )
 
 
 def _without_empty_rows(numbers: Mapping[str, Array]) -> dict[str, Array]:
@@ -86,17 +111,40 @@ def _why(error: Exception) -> str:
     return "it claims more than it holds" if isinstance(error, MemoryError) else one_line(error)
 
 
-def _columns(name: str, array: Any) -> dict[str, Array]:
+def _columns(name: str, array: Any) -> dict[str, Array] | _Unread:
+    """What an array's columns are, or why it has none."""
+    if not isinstance(array, _Unread) and array.dtype.kind in "mM":
+        array = _seconds(array)
+    if isinstance(array, _Unread):
+        return array
+    why = _no_columns(array)
+    return _Unread(why=why) if why else _columns_of_numbers(name, array)
+
+
+def _no_columns(array: Any) -> str:
+    """Why an array has no columns; nothing where it has some."""
+    if array.dtype.kind not in "biuf":
+        return f"it holds {array.dtype}, which is no number"
+    if array.ndim == 0:
+        return "it is a single number"
+    if array.ndim > 1 and array.shape[-1] > MOST_COLUMNS:
+        return _too_wide(array.shape[-1])
+    if array.ndim > MOST_AXES or (array.ndim == MOST_AXES and not _holds_matrices(array)):
+        return f"it has {array.ndim} axes, as images have"
+    return ""
+
+
+def _too_wide(width: int) -> str:
+    return f"it has {width} numbers in a row, and a column at most {MOST_COLUMNS}"
+
+
+def _columns_of_numbers(name: str, array: Any) -> dict[str, Array]:
     if array.ndim == 1:
         return {name: _floats(array)}
-    if array.shape[-1] > MOST_COLUMNS:
-        return {}
     if _holds_matrices(array):
         return _matrices(name, array)
     if array.ndim == 2:
         return {f"{name}[{k}]": _floats(array[:, k]) for k in range(array.shape[1])}
-    if array.ndim != 3:
-        return {}
     pushes, rows, count = array.shape
     columns = {f"{name}[{k}]": _floats(array[:, :, k].ravel()) for k in range(count)}
     return columns | {PUSH: np.repeat(np.arange(pushes, dtype=np.float64), rows)}
@@ -115,6 +163,14 @@ def _matrices(name: str, array: Any) -> dict[str, Array]:
     return found | {PUSH: np.repeat(np.arange(len(array), dtype=np.float64), array.shape[1])}
 
 
+def _seconds(array: Any) -> Any:
+    """Dates as seconds since 1970, durations as seconds; NaN where there is none."""
+    unit, count = np.datetime_data(array.dtype)
+    if unit not in _SECONDS:
+        return _Unread(why=f"it holds {array.dtype}, which is no time in seconds")
+    return np.where(np.isnat(array), np.nan, array.astype(np.int64) * (count * _SECONDS[unit]))
+
+
 def _floats(array: Any) -> Array:
     values: Array = np.array(array, dtype=np.float64)
     values[~np.isfinite(values)] = np.nan
@@ -122,8 +178,10 @@ def _floats(array: Any) -> Array:
 
 
 def _shapes(arrays: Mapping[str, Any]) -> str:
-    said = ", ".join(f"{named(name)} {array.shape}" for name, array in list(arrays.items())[:8])
-    return said or "none"
+    def said(array: Any) -> str:
+        return f"({array.why})" if isinstance(array, _Unread) else str(array.shape)
+
+    return ", ".join(f"{named(name)} {said(array)}" for name, array in list(arrays.items())[:8]) or "none"
 
 
 def _needs(module: str, path: Path, extra: str) -> Any:
@@ -144,7 +202,9 @@ def _read_hdf5(path: Path, *, turned: bool = False) -> dict[str, Any]:
     with h5py.File(io.BytesIO(read_bytes(path, most=MOST_BYTES)), "r") as opened:
         found: dict[str, Any] = {}
         _collect(h5py, opened, "", found, depth=0)
-    return _joined({name: array.T.squeeze() for name, array in found.items()} if turned else found)
+    if turned:
+        found = {n: array if isinstance(array, _Unread) else array.T.squeeze() for n, array in found.items()}
+    return _joined(found)
 
 
 def _collect(h5py: Any, group: Any, prefix: str, found: dict[str, Any], depth: int) -> None:
@@ -157,8 +217,8 @@ def _collect(h5py: Any, group: Any, prefix: str, found: dict[str, Any], depth: i
         item = group[name]
         if isinstance(item, h5py.Group):
             _collect(h5py, item, f"{prefix}{name}/", found, depth + 1)
-        elif isinstance(item, h5py.Dataset) and _is_plain(item):
-            found[f"{prefix}{name}"] = item[()]
+        elif isinstance(item, h5py.Dataset):
+            found[f"{prefix}{name}"] = item[()] if _is_plain(item) else _Unread(why=_no_plain(item))
 
 
 def _is_plain(item: Any) -> bool:
@@ -166,8 +226,23 @@ def _is_plain(item: Any) -> bool:
     return plain and item.external is None and not item.is_virtual and item.size <= MOST_NUMBERS
 
 
+def _no_plain(item: Any) -> str:
+    """Why a dataset is none that is read."""
+    if item.dtype.kind not in "biuf":
+        return f"it holds {item.dtype}, which is no number"
+    if item.external is not None or item.is_virtual:
+        return "it lies in another file"
+    return f"it has the shape {item.shape}, which is no column's"
+
+
 def _joined(found: dict[str, Any]) -> dict[str, Any]:
     """Groups at the top that hold the same arrays, one after the other: robots' logs keep one for each push."""
+    unread = {name: array for name, array in found.items() if isinstance(array, _Unread)}
+    arrays = {name: array for name, array in found.items() if name not in unread}
+    return unread | _joined_groups(arrays)
+
+
+def _joined_groups(found: dict[str, Any]) -> dict[str, Any]:
     groups: dict[str, dict[str, Any]] = {}
     for name, array in found.items():
         head, _, rest = name.partition("/")
@@ -205,8 +280,9 @@ def _fields(name: str, value: Any, found: dict[str, Any], depth: int) -> None:
     if not isinstance(value, np.ndarray):
         return
     if value.dtype.names is None:
-        if value.dtype.kind in "biufU" and value.ndim >= 1:
-            found[name] = value
+        if value.ndim >= 1:
+            plain = value.dtype.kind in "biufU"
+            found[name] = value if plain else _Unread(why="it holds cells or objects, which are no numbers")
         return
     # One structure, or an array of them: one for each push.
     for k, one in enumerate(np.atleast_1d(value)[:1000]):
@@ -235,18 +311,37 @@ def _check_unpacked(content: bytes) -> None:
 def _read_parquet(path: Path) -> dict[str, Any]:
     parquet = _needs("pyarrow.parquet", path, "tables")
     table = parquet.read_table(io.BytesIO(read_bytes(path, most=MOST_BYTES)))
-    found: dict[str, Any] = {}
-    for name in dict.fromkeys(table.column_names):
-        column = table.column(name)
-        kind = str(column.type)
-        if kind.startswith(("list", "fixed_size_list", "large_list")):
-            rows = column.to_pylist()
-            width = len(rows[0]) if rows and rows[0] is not None else 0
-            if 0 < width <= MOST_COLUMNS and all(row is not None and len(row) == width for row in rows):
-                found[name] = np.array(rows)
-        elif kind.startswith(("int", "uint", "float", "double", "half", "bool", "string")):
-            found[name] = column.to_numpy()
-    return found
+    return {name: _of_arrow(table.column(name)) for name in dict.fromkeys(table.column_names)}
+
+
+def _of_arrow(column: Any) -> Any:
+    """An array of a column of Arrow: numbers, lists of equally many, dates, times of the day, durations, text."""
+    arrow = importlib.import_module("pyarrow")
+    types, kind = arrow.types, column.type
+    if types.is_dictionary(kind):
+        column, kind = column.cast(kind.value_type), kind.value_type
+    if types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind):
+        return _of_lists(column)
+    if types.is_decimal(kind):
+        return column.cast(arrow.float64()).to_numpy()
+    if types.is_time(kind):
+        whole = column.cast(arrow.int32() if types.is_time32(kind) else arrow.int64())
+        return whole.cast(arrow.int64()).cast(arrow.duration(kind.unit)).to_numpy()
+    if (
+        types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind) or types.is_temporal(kind)
+        or types.is_string(kind) or types.is_large_string(kind)
+    ):  # fmt: skip
+        return column.to_numpy()
+    return _Unread(why=f"it holds {named(kind)}, which is no number")
+
+
+def _of_lists(column: Any) -> Any:
+    rows = column.to_pylist()
+    widths = {0 if row is None else len(row) for row in rows}
+    width = min(widths, default=0)
+    if width == 0 or len(widths) > 1:
+        return _Unread(why="its lists are not equally long")
+    return np.array(rows) if width <= MOST_COLUMNS else _Unread(why=_too_wide(width))
 
 
 READERS: Final[Mapping[str, Callable[[Path], dict[str, Any]]]] = {

@@ -29,6 +29,7 @@ class Columns:
         units: of the columns whose header states one.
         length: the unit of all lengths, where the file's preamble states one.
         rows: (n,) the line of each row in a text, or its index, for messages.
+        unread: what else the log holds, by name, and why it is no column.
     """
 
     source: str
@@ -37,6 +38,7 @@ class Columns:
     units: Mapping[str, str] = field(default_factory=dict)
     length: str | None = None
     rows: Sequence[int] = ()
+    unread: Mapping[str, str] = field(default_factory=dict)
 
     def find(self, name: str) -> str:
         """The column that a map means: by its whole name, or by the end of it where only one has that end.
@@ -54,6 +56,8 @@ class Columns:
         if name in self.texts:
             first = next((text for text in self.texts[name] if text), "")
             raise RecordingError(f"column {shown(name)} holds text, such as {shown(first)}; give one of numbers.")
+        if name in self.unread:
+            raise RecordingError(f"column {shown(name)} cannot be read: {self.unread[name]}.")
         raise RecordingError(f"{self.source} has no column {shown(name)}; {self._offer(name)}")
 
     def stack(self, names: Sequence[str]) -> Array:
@@ -70,7 +74,7 @@ class Columns:
         return np.column_stack([self.numbers[name] for name in found])
 
     def _offer(self, name: str) -> str:
-        known = [*self.numbers, *self.texts]
+        known = [*self.numbers, *self.texts, *self.unread]
         alike = [one for one in known if one.lower() == name.lower()]
         close = alike or difflib.get_close_matches(name, known, n=MOST_NAMED, cutoff=0.5)
         if close:

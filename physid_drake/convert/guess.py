@@ -21,6 +21,7 @@ from physid_drake.convert.convert import ARRAYS, TEXTS, read_columns
 from physid_drake.convert.units import FORCES, LENGTHS, TIMES
 from physid_drake.recording.adapters.sources import source_files
 from physid_drake.recording.clocks import LIKELY
+from physid_drake.wording import named
 
 OBJECT_WORDS: Final = ("object", "obj", "mug", "box", "block", "cube", "slider", "target", "item", "payload")
 HAND_WORDS: Final = (
@@ -32,6 +33,9 @@ FAR_AWAY: Final = 0.3
 
 FIXED: Final = 0.05
 """Of the object's way: what keeps its distance to it as well as this is fixed to it."""
+
+MOST_UNREAD: Final = 8
+"""Of what a log holds and is no column: so many are named in a map."""
 
 METRES, CENTIMETRES = 5.0, 60.0
 """Places on a table that are nowhere larger are in m, or in cm."""
@@ -76,6 +80,7 @@ def _guess_table(source: Path) -> Guess:
     clock = None if time is None else columns.numbers[time] * TIMES.get(unit, np.nan)
     rows = [_row(name, values, clock) for name, values in columns.numbers.items()]
     rows += [(name, str(len(texts)), "", "text", "") for name, texts in columns.texts.items()]
+    rows += [(name, "", "", "not read", "") for name in columns.unread]
     bodies = bodies_of(columns)
     body, hand, force = _roles(bodies, columns)
     doubt = _set_units([one for one in (body, hand) if one is not None], columns)
@@ -96,6 +101,7 @@ def _guess_table(source: Path) -> Guess:
     left = [name for name in columns.numbers if _quoted(name) not in text]
     if left:
         lines.append(f"# not used: {', '.join(left)}")
+    lines += [f"# not read: {named(name)} ({why})" for name, why in list(columns.unread.items())[:MOST_UNREAD]]
     return Guess(text="\n".join(lines) + "\n", rows=tuple(rows))
 
 

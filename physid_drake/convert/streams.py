@@ -210,7 +210,10 @@ def _times(columns: Columns, clock: Clock, chart: Map) -> Array:
         raise RecordingError("there are no times; name their column in time.column.")
     name = columns.find(column)
     own = clock if clock.column is not None else chart.clock
-    unit = own.unit or columns.units.get(name, "s")
+    stated = columns.units.get(name)
+    if own.unit is not None and stated in TIMES and own.unit != stated:
+        raise RecordingError(f"the map says {own.unit}, but times in column {shown(name)} are in {stated}.")
+    unit = own.unit or stated or "s"
     scale = factor(unit, TIMES, f"times in column {shown(name)}") if own.rate is None else 1.0 / own.rate
     times: Array = columns.numbers[name] * scale + (clock.offset or chart.clock.offset)
     return times

@@ -10,7 +10,7 @@ import pytest
 import scipy.io
 from scipy.spatial.transform import Rotation
 
-from physid_drake.convert import arrays
+from physid_drake.convert import arrays, guess_map
 from physid_drake.convert.arrays import PUSH, read_array_table
 from physid_drake.convert.conventions import rotation_of
 from physid_drake.convert.mapping import Turn, World
@@ -81,3 +81,85 @@ class TestMatlab:
         with pytest.raises(RecordingError, match=r"log\.mat: ") as caught:
             read_array_table(tmp_path / "log.mat")
         assert "\n" not in str(caught.value)
+
+
+STAMPS = 1_750_000_000_123_456_000 + 20_000_000 * np.arange(5)  # ns since 1970
+PLACES = np.linspace(0.0, 0.1, 5)
+
+
+class TestTimes:
+    """Dates, times of the day and durations are times; what is no column is said by name."""
+
+    @pytest.mark.parametrize("unit", ["ns", "us", "ms"])
+    def test_dates_of_numpy_are_seconds_since_1970(self, unit: str, tmp_path: Path) -> None:
+        stamps = STAMPS.astype("M8[ns]").astype(f"M8[{unit}]")
+        stamps[3] = np.datetime64("NaT")
+        np.savez(tmp_path / "log.npz", when=stamps, since=stamps - stamps[0], x=PLACES)
+        columns = read_array_table(tmp_path / "log.npz")
+        when, since = columns.numbers["when"], columns.numbers["since"]
+        assert np.isnan([when[3], since[3]]).all() and columns.units == {"when": "s", "since": "s"}
+        assert when[[0, 4]] == pytest.approx(STAMPS[[0, 4]] * 1e-9, rel=0.0, abs=1.1e-3 if unit == "ms" else 3e-7)
+        assert since[4] == pytest.approx(0.08, abs=1e-12)
+
+    def test_months_have_no_length(self, tmp_path: Path) -> None:
+        np.savez(tmp_path / "log.npz", when=np.arange(5).astype("M8[M]"), x=PLACES)
+        with pytest.raises(RecordingError, match=r"'when' cannot be read: it holds datetime64\[M\], which is no"):
+            read_array_table(tmp_path / "log.npz").find("when")
+
+    @pytest.mark.parametrize(
+        ("kind", "values"),
+        [
+            (("timestamp", "ns"), STAMPS), (("timestamp", "us", "UTC"), STAMPS // 1000),
+            (("duration", "us"), 20_000 * np.arange(5)), (("time64", "us"), 20_000 * np.arange(5)),
+            (("time32", "ms"), 20 * np.arange(5, dtype=np.int32)), (("decimal128", 10, 2), None),
+        ],
+    )  # fmt: skip
+    def test_columns_of_arrow(self, kind: tuple[object, ...], values: np.ndarray | None, tmp_path: Path) -> None:
+        arrow = pytest.importorskip("pyarrow")
+        parquet = pytest.importorskip("pyarrow.parquet")
+        name, *rest = kind
+        whole = arrow.array(0.02 * np.arange(5) if values is None else values)
+        stamps = whole.cast(getattr(arrow, str(name))(*rest))
+        parquet.write_table(arrow.table({"timestamps": stamps, "x": PLACES}), tmp_path / "log.parquet")
+        columns = read_array_table(tmp_path / "log.parquet")
+        assert np.diff(columns.numbers["timestamps"]) == pytest.approx(0.02, abs=3e-7)
+        assert columns.units == ({} if name == "decimal128" else {"timestamps": "s"})
+        text = guess_map(tmp_path / "log.parquet").text
+        assert 'time: {column: "timestamps", unit: s}' in text
+
+    def test_categories_are_what_they_stand_for(self, tmp_path: Path) -> None:
+        arrow = pytest.importorskip("pyarrow")
+        parquet = pytest.importorskip("pyarrow.parquet")
+        table = {"x": arrow.array(PLACES).dictionary_encode(), "who": arrow.array(["a"] * 5).dictionary_encode()}
+        parquet.write_table(arrow.table(table), tmp_path / "log.parquet")
+        columns = read_array_table(tmp_path / "log.parquet")
+        assert columns.numbers["x"].tolist() == PLACES.tolist() and columns.texts == {"who": ["a"] * 5}
+
+    def test_what_is_no_column_is_said(self, tmp_path: Path) -> None:
+        arrow = pytest.importorskip("pyarrow")
+        parquet = pytest.importorskip("pyarrow.parquet")
+        odd = {
+            "timestamps": ([{"sec": 1, "nanosec": 2}] * 5, "it holds struct<sec: int64, nanosec: int64>, which"),
+            "image": ([[0.0] * 100] * 5, "it has 100 numbers in a row, and a column at most 64"),
+            "words": ([[0.0], [0.0, 1.0]] + [[0.0]] * 3, "its lists are not equally long"),
+        }
+        table = {name: arrow.array(values) for name, (values, _) in odd.items()}
+        parquet.write_table(arrow.table({**table, "x": PLACES}), tmp_path / "log.parquet")
+        columns = read_array_table(tmp_path / "log.parquet")
+        for name, (_, why) in odd.items():
+            with pytest.raises(RecordingError, match=f"column '{name}' cannot be read: {why}"):
+                columns.find(name)
+        guess = guess_map(tmp_path / "log.parquet")
+        assert "# not read: timestamps (it holds struct<" in guess.text
+        assert ("image", "", "", "not read", "") in guess.rows
+        with pytest.raises(RecordingError, match="did you mean 'timestamps'"):
+            columns.find("timestamp")
+
+    def test_groups_that_hold_text_too_are_joined(self, tmp_path: Path) -> None:
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(tmp_path / "log.h5", "w") as opened:
+            for k in range(2):
+                opened[f"demo_{k}/x"], opened[f"demo_{k}/who"] = PLACES, "me"
+        columns = read_array_table(tmp_path / "log.h5")
+        assert columns.numbers["x"].tolist() == 2 * PLACES.tolist() and PUSH in columns.numbers
+        assert columns.unread == {f"demo_{k}/who": "it holds object, which is no number" for k in range(2)}

@@ -290,6 +290,8 @@ class TestRefusals:
         table = TABLE.replace("hx,hy\n", "hx,hy\ns,mm,mm,rad,mm,mm\n")
         with pytest.raises(RecordingError, match="the map says m, but the table's header says mm"):
             self.convert(tmp_path, MAP.replace("columns: [x, y]", "columns: [x, y], unit: m"), table)
+        with pytest.raises(RecordingError, match="the map says ms, but times in column 't' are in s"):
+            self.convert(tmp_path, MAP.replace("column: t}", "column: t, unit: ms}"), table)
         found = self.convert(tmp_path, MAP, table)
         assert found.pushes[0].object.positions[-1, 0] == pytest.approx(8e-6)
 

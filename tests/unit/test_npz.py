@@ -55,8 +55,8 @@ def test_a_header_that_numpy_does_not_write_is_refused_in_words_of_ours(tmp_path
     assert refusal(archive(tmp_path / "a.npz", header)).endswith("'traj.npy' has no header as NumPy writes it")
 
 
-@pytest.mark.parametrize("descr", ["|O", [("a", "<f8"), ("b", "|O")], "|V8", "<M8[s]", "<c16"])
-def test_only_numbers_and_text_are_read(tmp_path, descr):
+@pytest.mark.parametrize("descr", ["|O", [("a", "<f8"), ("b", "|O")], "|V8", "<c16"])
+def test_only_numbers_times_and_text_are_read(tmp_path, descr):
     refusal(archive(tmp_path / "a.npz", header_of((1,), descr) + bytes(16)))
 
 
