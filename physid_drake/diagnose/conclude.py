@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import dataclasses as dc
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from scipy import stats
 
 from physid_drake.diagnose.decide import FEWEST_PUSHES, is_own_error, kinds_of, most_noise_scale, probability
-from physid_drake.diagnose.estimates import parameters_of, smallest, theta_of
+from physid_drake.diagnose.estimates import least_motions, parameters_of, smallest, theta_of
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.frictions import friction_trend
 from physid_drake.diagnose.ranking import ranking_of
 from physid_drake.diagnose.regimes import regime_gains, standard_error
 from physid_drake.diagnose.sentence import sentence
-from physid_drake.diagnose.values import Detectable, Diagnosis, EffectFinding, FitQuality, Location, Partly
+from physid_drake.diagnose.values import Diagnosis, EffectFinding, FitQuality, Location, Partly
 from physid_drake.diagnose.wrench_patterns import locate
 from physid_drake.identify.accuracy import accuracy_of
 from physid_drake.inference.fit import Fit
@@ -32,9 +33,9 @@ ODD = 0.001  # chance that any push of a recording is as far off as those that a
 def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
     """The verdict and all figures, from evidence; no rollouts."""
     case, found, plain, after = evidence.case, evidence.found, evidence.baseline, evidence.corrected
-    detectable = smallest(found)
+    motions = least_motions(found)
     verdict = evidence.decision.verdict
-    if verdict == "consistent" and _blind(evidence, detectable):
+    if verdict == "consistent" and _blind(motions):
         verdict = "underpowered"
     findings = _findings(evidence) if evidence.named else ()
     partly = _partly(evidence)
@@ -61,7 +62,8 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
         next_push=evidence.next_push,
         seed=seed,
         ranking=ranking_of(evidence, evidence.decision.classes() if evidence.named else ()),
-        detectable=detectable,
+        detectable=smallest(found),
+        undetectable=tuple(name for name, motion in motions.items() if math.isinf(motion)),
         left=_left(evidence),
         partly=partly,
         reduced_chi2_before=before,
@@ -93,11 +95,9 @@ def p_value_of(evidence: Evidence, alpha: float) -> float:
     return float(-np.expm1(len(looks) * np.log1p(-min(*looks, 1.0 - 1e-16))))
 
 
-def _blind(evidence: Evidence, detectable: tuple[Detectable, ...]) -> bool:
+def _blind(motions: Mapping[str, float]) -> bool:
     """Whether most effects could be large and not show; one that these pushes do not feel at all never shows."""
-    unfelt = {column.kind.name for column in evidence.found.columns} - {one.name for one in detectable}
-    sizes = [one.sigmas for one in detectable] + [math.inf] * len(unfelt)
-    return not sizes or float(np.median(sizes)) > VISIBLE
+    return not motions or float(np.median(list(motions.values()))) > VISIBLE
 
 
 def _by_cell(evidence: Evidence) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from scipy import stats
 from physid_drake.diagnose.decide import CONFIRMED
 from physid_drake.diagnose.search import Found
 from physid_drake.diagnose.values import Detectable, ParameterEstimate, ThetaEstimate
-from physid_drake.effects import Coordinate, Effect
+from physid_drake.effects import Coordinate, Effect, Surroundings
 from physid_drake.identify.accuracy import rms
 from physid_drake.identify.estimates import estimates_of, t_factor
 from physid_drake.inference.fit import Fit, Fitter
@@ -149,23 +149,45 @@ def correlation_of(fitter: Fitter, fit: Fit) -> tuple[tuple[str, ...], Array]:
 
 
 def smallest(found: Found) -> tuple[Detectable, ...]:
-    """The smallest effect of each kind that would have been confirmed, in its own unit and in motion.
+    """The smallest effect of each kind that would have been confirmed, in its own unit and in motion."""
+    best: dict[str, Detectable] = {}
+    for column, size in _sizes(found):
+        one = _detectable(found, column, size)
+        if one is not None and (one.name not in best or one.sigmas < best[one.name].sigmas):
+            best[one.name] = one
+    return tuple(best.values())
+
+
+def least_motions(found: Found) -> dict[str, float]:
+    """By kind: how far the object moves at least, where it would have been confirmed [standard deviations].
+
+    Infinite of what would not have shown at its strongest.
+    """
+    motions = dict.fromkeys((column.kind.name for column in found.columns), math.inf)
+    for column, size in _sizes(found):
+        name = column.kind.name
+        motions[name] = min(motions[name], size * _motion(found, column))
+    return motions
+
+
+def _sizes(found: Found) -> list[tuple[Column, float]]:
+    """Columns that would have shown within their bounds, each with the size from which on.
 
     The gain that it takes, one push not counted, is that of its replicates' tail; half the information times the
     square of the effect, it comes at even odds.
     """
     pushes = len(found.baseline.pushes)
     counted = max(1, pushes - 1) / pushes
-    best: dict[str, Detectable] = {}
+    sizes = []
     for column, information in zip(found.columns, _informations(found), strict=True):
         if information <= 0.0 or column.family.shares:
             continue
         needed = gain_of(-math.log(CONFIRMED), found.by_chance[column.kind.name]) / counted
         size = math.sqrt(2.0 * needed / information)
-        one = _detectable(found, column, size)
-        if one is not None and (one.name not in best or one.sigmas < best[one.name].sigmas):
-            best[one.name] = one
-    return tuple(best.values())
+        # A one-sided amplitude can only grow; the others are the same either way.
+        if column.coordinate.lower <= column.null + size <= column.coordinate.upper:
+            sizes.append((column, size))
+    return sizes
 
 
 def _informations(found: Found) -> list[float]:
@@ -184,23 +206,35 @@ def _informations(found: Found) -> list[float]:
 
 
 def _detectable(found: Found, column: Column, size: float) -> Detectable | None:
-    """The effect of a column's size; None where not even the strongest would have shown."""
-    case, kind, point = found.fitter.case, column.kind, np.array(column.family.point)
-    # A one-sided amplitude can only grow; the others are the same either way.
-    point[column.index] += size
-    coordinate = column.coordinate
-    if not coordinate.lower <= point[column.index] <= coordinate.upper:
-        return None
+    """The effect of a column's size; None where its amplitude is none.
+
+    A pull that is even over the table makes a tether of any stiffness, however little, whose end is far enough away.
+    """
+    around, kind = found.fitter.case.around, column.kind
     sigmas = size * _motion(found, column)
-    chart = kind.chart(case.around)
-    within = np.array([np.clip(p, c.lower, c.upper) for p, c in zip(point, chart, strict=True)])
-    effect = kind.at(within, case.around)
-    numbers = {n: getattr(effect, n) for n in kind.amplitudes if isinstance(getattr(effect, n), float)}
+    numbers, half = (_amplitudes(kind, _point(column, part * size, around), around) for part in (1.0, 0.5))
     if not numbers:
-        value = float(within[column.index])
-        return Detectable(name=kind.name, parameter=coordinate.name, value=value, unit="-", sigmas=sigmas)
+        return Detectable(
+            name=kind.name, parameter=column.coordinate.name, value=column.null + size, unit="-", sigmas=sigmas
+        )
     name = max(numbers, key=lambda n: abs(numbers[n] - kind.nulls()[n]))
+    if numbers[name] == half[name]:
+        return None
     return Detectable(name=kind.name, parameter=name, value=numbers[name], unit=kind.units()[name], sigmas=sigmas)
+
+
+def _point(column: Column, size: float, around: Surroundings) -> Array:
+    """Where in the chart a column of some size leads."""
+    point = np.array(column.family.point)
+    point[column.index] += size
+    chart = column.kind.chart(around)
+    return np.array([np.clip(p, c.lower, c.upper) for p, c in zip(point, chart, strict=True)])
+
+
+def _amplitudes(kind: type[Effect], point: Array, around: Surroundings) -> dict[str, float]:
+    """Those that are one number."""
+    effect = kind.at(point, around)
+    return {name: getattr(effect, name) for name in kind.amplitudes if isinstance(getattr(effect, name), float)}
 
 
 def _motion(found: Found, column: Column) -> float:

@@ -246,6 +246,7 @@ class Diagnosis:
         seed: of all that is drawn.
         ranking: the catalogue, best first.
         detectable: the smallest effects that would have been seen.
+        undetectable: names of effects of which not even the strongest would have been seen.
         left: what remains, in words.
         partly: what takes a part of an unexplained mismatch away.
         reduced_chi2_before, reduced_chi2_after: cost per degree of freedom, plain and with what was found.
@@ -280,6 +281,7 @@ class Diagnosis:
     warnings: tuple[str, ...]
     rollouts: int
     pushes: int = 0
+    undetectable: tuple[str, ...] = ()
 
     @property
     def with_it(self) -> str | None:

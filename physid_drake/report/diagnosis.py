@@ -56,6 +56,7 @@ def diagnosis_json(diagnosis: Diagnosis) -> str:
         "pushes": d.pushes,
         "ranking": [_ranked(one) for one in d.ranking],
         "detectable": [_detectable(one) for one in d.detectable],
+        "undetectable": list(d.undetectable),
         "remaining_misfit": d.left,
         "partial_explanation": None if d.partly is None else _partly(d.partly),
         "reduced_chi2_before": d.reduced_chi2_before,

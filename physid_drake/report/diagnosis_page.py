@@ -168,6 +168,7 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "noise": _noise(diagnosis),
         "noise_known": noise_known(diagnosis),
         "detectable": [_detectable_row(one) for one in diagnosis.detectable],
+        "undetectable": diagnosis.undetectable,
         "warnings": diagnosis.warnings,
     }
 

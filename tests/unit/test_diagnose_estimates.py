@@ -1,5 +1,6 @@
 """How a diagnosis' estimates vary together, from a fit made by hand."""
 
+import dataclasses as dc
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,10 +10,10 @@ from scipy import stats
 from physid_drake.diagnose import estimates
 from physid_drake.diagnose.decide import CONFIRMED
 from physid_drake.diagnose.estimates import correlation_of, parameters_of, theta_of
-from physid_drake.effects import Family, Surroundings
+from physid_drake.effects import Family, Surroundings, known_effects
 from physid_drake.effects.body import Restitution, UnevenSupport
 from physid_drake.effects.drag import QuadraticDrag
-from physid_drake.effects.fields import TableTilt
+from physid_drake.effects.fields import TableTilt, Tether
 from physid_drake.effects.friction import FrictionPatch
 from physid_drake.inference.hypothesis import Hypothesis, Part
 from physid_drake.inference.push import LinearPush
@@ -103,29 +104,62 @@ def test_what_does_not_vary_or_is_no_single_number_is_left_out():
     np.testing.assert_allclose(found, 1.0)
 
 
-@pytest.mark.parametrize(("column", "shows"), [(20.0, True), (0.5, False)])
-def test_what_would_not_show_at_its_strongest_is_not_among_what_would(column, shows):
-    """A square of the restitution, up to 0.81: with so much change for each unit, it takes 0.04, or 1.5."""
+def found_with(*columns, chance=None):
+    """A search of twelve pushes of three numbers each, whose columns change all numbers alike."""
     pushes = [LinearPush(residual=np.zeros(3), shared=np.zeros((3, 2)), nuisance=np.zeros((3, 0)))] * 12
     hypothesis = Hypothesis(space=SPACE, around=AROUND, tolerances=1)
     plain = SimpleNamespace(hypothesis=hypothesis, pushes=pushes, scatter=1.0, noise_scale=1.0, tail=1e6)
-    columns = [
+    made = [
         Column(
-            kind=Restitution, family=Family(point=(0.0,), free=(0,)), index=0,
-            coordinate=Restitution.chart(AROUND)[0], pushes=(np.full(3, column),) * 12,
+            kind=kind, family=Family(point=(0.0,) * len(kind.chart(AROUND)), free=(j,)), index=j,
+            coordinate=kind.chart(AROUND)[j], pushes=(np.full(3, change),) * 12,
         )
+        for kind, j, change in columns
     ]  # fmt: skip
     fitter = SimpleNamespace(
         priors=lambda scatter: [np.zeros(0)] * 12, predictor=SimpleNamespace(whitening=[np.eye(3)] * 12),
         case=SimpleNamespace(around=AROUND, features=[SimpleNamespace(pose_numbers=3)] * 12),
     )  # fmt: skip
+    chance = np.random.default_rng(0).exponential(size=300) if chance is None else chance
+    return SimpleNamespace(
+        fitter=fitter, baseline=plain, columns=made, by_chance={one.kind.name: chance for one in made}
+    )
+
+
+@pytest.mark.parametrize(("column", "shows"), [(20.0, True), (0.5, False)])
+def test_what_would_not_show_at_its_strongest_is_not_among_what_would(column, shows):
+    """A square of the restitution, up to 0.81: with so much change for each unit, it takes 0.04, or 1.5."""
     chance = np.random.default_rng(0).exponential(size=300)
     needed = gain_of(-np.log(CONFIRMED), chance) * 12.0 / 11.0
-    found = estimates.smallest(
-        SimpleNamespace(fitter=fitter, baseline=plain, columns=columns, by_chance={"restitution": chance})
-    )
+    search = found_with((Restitution, 0, column), chance=chance)
+    found, motions = estimates.smallest(search), estimates.least_motions(search)
     assert [one.name for one in found] == (["restitution"] if shows else [])
     if shows:
         size = np.sqrt(2.0 * needed / (36.0 * column**2))
         assert found[0].value == pytest.approx(Restitution.at(np.array([size]), AROUND).coefficient, rel=1e-4)
-        assert found[0].sigmas == pytest.approx(size * column, rel=1e-4)
+        assert found[0].sigmas == motions["restitution"] == pytest.approx(size * column, rel=1e-4)
+    else:
+        assert motions == {"restitution": np.inf}
+
+
+def test_the_smallest_tether_is_one_whose_stiffness_is_felt():
+    """An even pull, which shows sooner, is that of any tether whose end is far enough away: of 1e-9 N/m as well."""
+    search = found_with((Tether, 0, 20.0), (Tether, 1, 1000.0), (Tether, 2, 1000.0))
+    (tether,) = estimates.smallest(search)
+    assert tether.parameter == "stiffness" and tether.value == pytest.approx(tether.sigmas / 20.0)
+    assert tether.value > 0.01
+    # Both move the object as little where they show.
+    assert estimates.least_motions(search)["tether"] == pytest.approx(tether.sigmas, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", known_effects())
+def test_no_smallest_size_is_a_bound(kind):
+    """What is said of an amplitude grows with what it takes to see it, or nothing is said."""
+    families = {j: family for family in kind.families(AROUND) if not family.shares for j in family.free}
+    for j, family in families.items():
+        step = kind.chart(AROUND)[j].step
+        search = found_with((kind, j, 1.0))
+        column = dc.replace(search.columns[0], family=family)
+        small, large = (estimates._detectable(search, column, part * step) for part in (0.5, 1.0))
+        assert (small is None) == (large is None)
+        assert small is None or (small.value != large.value and small.sigmas < large.sigmas)

@@ -60,3 +60,8 @@ def test_the_table_of_errors_has_newtons_where_forces_were_compared():
     table = fit_table(diagnosis_with(fit=forced))
     (newtons,) = (column for column in table.columns if column.header == "N")
     assert list(newtons.cells) == ["0.30", "0.10"]
+
+
+def test_what_would_not_show_is_named():
+    assert written()["undetectable"] == []
+    assert written(undetectable=("restitution", "sloshing"))["undetectable"] == ["restitution", "sloshing"]

@@ -218,6 +218,17 @@ def test_the_same_diagnosis_gives_the_same_bytes(page):
     assert diagnosis_page(diagnosis_with(), recording_of(), shown_pushes(), WRENCHES) == page
 
 
+def test_effects_that_would_not_show_are_named_beside_those_that_would():
+    hidden = "not detectable by these pushes at any size that is looked for"
+    for detectable in ((), diagnosis_with().detectable):
+        page = diagnosis_page(
+            diagnosis_with(detectable=detectable, undetectable=("restitution",)), recording_of(), (), ()
+        )
+        words = " ".join(" ".join(Tags(page).words).split())
+        assert "Smallest detectable effects" in words and f"restitution {hidden}" in words
+    assert hidden not in " ".join(Tags(diagnosis_page(diagnosis_with(), recording_of(), (), ())).words)
+
+
 @pytest.mark.parametrize("verdict", ["consistent", "underpowered", "unexplained", "of another day"])
 def test_a_page_of_little(verdict):
     bare = diagnosis_with(verdict=verdict, effects=(), location=None, next_push=None, ranking=(), detectable=(),
