@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Final, TypeVar, cast
 
@@ -24,16 +25,20 @@ from physid_drake.convert.mapping import (
     Offset,
     PoseMap,
     Quantity,
+    Stated,
     Turn,
     World,
 )
 from physid_drake.convert.solid_reading import model_from
 from physid_drake.convert.text_table import Dialect
 from physid_drake.convert.units import ANGLES, FORCES, LENGTHS, SPEEDS, TIMES, factor
+from physid_drake.errors import RecordingError
+from physid_drake.recording import Conversion
 from physid_drake.recording.description import (
     Section,
     hand_from,
     load_section,
+    section_of,
     sensors_from,
     table_from,
 )
@@ -85,6 +90,26 @@ def read_map(file: Path) -> Map:
         force=force,
         cut=cut,
     )
+
+
+def stated_in(conversion: Conversion | None) -> Stated | None:
+    """What the map of a converted recording says of its streams; None where there is no map that can be read."""
+    return None if conversion is None else _stated_in(conversion.map)
+
+
+@lru_cache(maxsize=8)
+def _stated_in(text: str) -> Stated | None:
+    try:
+        top = section_of(text, Path("map"), FORMAT, _TOP_KEYS)
+        return Stated(
+            world=_maybe(top, "world", _world) or World(),
+            object=_pose(cast(Section, top.section("object"))),
+            hand=_maybe(top, "hand", _pose),
+            force=_maybe(top, "force", _force),
+            lines=top.lines,
+        )
+    except RecordingError:  # of another version, or changed by hand
+        return None
 
 
 def _check_rows(top: Section, body: PoseMap, path: PoseMap | None, force: ForceMap | None, cut: Cut) -> None:

@@ -5,7 +5,7 @@ Every key and its default is listed in ``docs/bring_your_data.md``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
@@ -255,3 +255,34 @@ class Map:
     def world_of(self, stream: PoseMap | ForceMap) -> World:
         """Where W lies in the frame that a stream is measured in."""
         return stream.world or self.world
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stated:
+    """What the map of a recording that was converted says of its streams.
+
+    Attributes:
+        world, object, hand, force: as in ``Map``.
+        lines: of the map's keys.
+    """
+
+    world: World
+    object: PoseMap
+    hand: PoseMap | None
+    force: ForceMap | None
+    lines: Mapping[str, int]
+
+    def world_of(self, stream: PoseMap | ForceMap) -> World:
+        """Where W lies in the frame that a stream is measured in."""
+        return stream.world or self.world
+
+    def place(self, *keys: str) -> str:
+        """Where somebody who corrects some keys has to look: in which lines, as far as they are there."""
+        lines = [str(self.lines[key]) for key in keys if key in self.lines]
+        where = f" line{'s' if len(lines) > 1 else ''} {listed(lines)}" if lines else ""
+        return f"map{where}: {listed(keys)}"
+
+
+def listed(words: Sequence[str]) -> str:
+    """Words as people write them after one another."""
+    return " and ".join([*([", ".join(words[:-1])] if len(words) > 1 else []), *words[-1:]])

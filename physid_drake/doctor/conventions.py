@@ -18,7 +18,12 @@ from scipy.optimize import least_squares
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.cell.touch import Tip
+from physid_drake.convert.conventions import places_in_world
+from physid_drake.convert.map_reading import stated_in
+from physid_drake.convert.source_frame import SourceFrame, source_frame
+from physid_drake.convert.units import LENGTHS
 from physid_drake.errors import RecordingError
+from physid_drake.pushes.standing import Reading, likelier_reading, mirrored, place_in_map, read_as, readings_of
 from physid_drake.recording import (
     Box,
     Cylinder,
@@ -41,6 +46,10 @@ MOVING: Final = 0.02
 LEAST_LATE: Final = 0.015
 LEAST_SHIFT: Final = 2e-3
 """s, m: clocks and frames that differ by less are physics (lag, offset), or noise."""
+LEAST_ORIGIN: Final = 5e-3
+"""m from the log's zero to W's: nobody gives one that is less."""
+LARGEST_ORIGIN: Final = 5.0
+"""m: a tracker's or a robot's zero is nearer to the table that they see."""
 UNITS: Final = {
     1e-3: "1000 times too large (mm for m)", 1e-2: "100 times too large (cm for m)",
     0.1: "10 times too large (mm for cm)", 0.0254: "39.4 times too large (inch for m)",
@@ -88,8 +97,9 @@ def pairs_of(recording: Recording) -> Iterator[Convention]:
 def _kinds(recording: Recording) -> list[Callable[[Recording], Iterator[Convention]]]:
     """Of one kind, one thing is wrong at most."""
     if recording.hand is None:
-        return [_rotations, _sizes_of_object]
-    return [_units, _axes, _rotations, _sizes_of_object, _sizes_of_tip, _clocks, _shifts]
+        return [_rotations, _ups, _sizes_of_object]
+    # What is of the log's numbers goes before what is of the frame that its map gives it.
+    return [_units, _rotations, _ups, _origins, _axes, _sizes_of_object, _sizes_of_tip, _clocks, _shifts]
 
 
 def gap_of(recording: Recording) -> float:
@@ -110,18 +120,15 @@ def each_push(recording: Recording, change: Callable[[Push], Push]) -> Recording
 
 def _rotations(recording: Recording) -> Iterator[Convention]:
     kinds = {push.object.rotation for push in recording.pushes}
-    if "full" in kinds:
-        for shift, order, said in ((1, "x, y, z, w", "as: xyzw"), (-1, "w, x, y, z", "as: wxyz")):
-            yield Convention(
-                says=f"the object's quaternions are {order}",
-                remedy=f"map: object.rotation: {said}",
-                recording=each_push(recording, partial(_reordered, shift=shift)),
-            )  # fmt: skip
+    for reading in readings_of(recording, turned=False):
+        yield _by_reading(recording, reading)
     if kinds & {"full", "yaw"}:
+        stated = stated_in(recording.conversion)
+        frame = source_frame(stated, None if stated is None else stated.object)
         yield Convention(
             says="the object's rotations turn the other way (R_BW, or an axis that is mirrored)",
-            remedy="map: object.rotation: inverse: true, or world.left_handed",
-            recording=each_push(recording, _inverted),
+            remedy=f"{place_in_map(stated, 'object.rotation')}: inverse: true, or world.left_handed",
+            recording=each_push(recording, partial(_inverted, frame=frame)),
         )
     if "yaw" in kinds:
         yield Convention(
@@ -142,12 +149,20 @@ def _with_turn(push: Push, quaternions: Array) -> Push:
     return replace(push, object=replace(push.object, quaternions=quaternions))
 
 
-def _reordered(push: Push, shift: int) -> Push:
-    return _with_turn(push, np.roll(push.object.quaternions, shift, axis=1))
+def _by_reading(recording: Recording, reading: Reading) -> Convention:
+    return Convention(says=reading.says, remedy=reading.remedy, recording=read_as(recording, reading))
 
 
-def _inverted(push: Push) -> Push:
-    return _with_turn(push, push.object.quaternions * np.array([1.0, -1.0, -1.0, -1.0]))
+def _ups(recording: Recording) -> Iterator[Convention]:
+    """Another axis that is up, by which the object moves in the table's plane; of axes of either hand."""
+    reading = likelier_reading(recording)
+    if reading is not None and (other := mirrored(reading)) is not None:
+        yield _by_reading(recording, reading)
+        yield _by_reading(recording, other)
+
+
+def _inverted(push: Push, frame: SourceFrame) -> Push:
+    return replace(push, object=frame.with_rotations(push.object, frame.rotations(push.object).inv()))
 
 
 def _turned_in_itself(push: Push, turn: float) -> Push:
@@ -189,28 +204,110 @@ def _axes(recording: Recording) -> Iterator[Convention]:
 
 
 def _units(recording: Recording) -> Iterator[Convention]:
-    """Places of one stream, or of both, in another unit than was said."""
-    streams: Sequence[tuple[str, bool, bool]] = (
-        ("the hand's places", False, True), ("the object's places", True, False),
-        ("the places of object and hand", True, True),
+    """Places of one stream, or of both, in another unit than was said: about the log's zero, or W's."""
+    stated = stated_in(recording.conversion)
+    body, hand = (None, None) if stated is None else (stated.object, stated.hand)
+    frames = source_frame(stated, body), source_frame(stated, hand)
+    streams: Sequence[tuple[str, tuple[str, ...], bool, bool]] = (
+        ("the hand's places", ("hand",), False, True), ("the object's places", ("object",), True, False),
+        ("the places of object and hand", ("object", "hand"), True, True),
     )  # fmt: skip
-    for said, of_object, of_hand in streams:
+    for said, keys, of_object, of_hand in streams:
+        poses = [pose for pose, some in ((body, of_object), (hand, of_hand)) if some and pose is not None]
+        far = max(_origin(frame) for frame, some in zip(frames, (of_object, of_hand), strict=True) if some)
+        for factor, how, unit in _other_units({pose.position.unit for pose in poses}):
+            factors = factor if of_object else 1.0, factor if of_hand else 1.0
+            places = place_in_map(stated, *(f"{key}.position" for key in keys))
+            yield from _resized(
+                recording, frames, factors, f"{said} are {how}", f"{places}: unit{f': {unit}' if unit else ''}"
+            )
+            if far > 0.0 and factor * far > LEAST_ORIGIN:
+                yield from _resized(
+                    recording, (SourceFrame(), SourceFrame()), factors, f"{said} are {how}, and so is W's origin",
+                    f"{place_in_map(stated, *(f'{key}.position' for key in keys), 'world')}: unit of each",
+                )  # fmt: skip
+
+
+def _origin(frame: SourceFrame) -> float:
+    """How far W's zero is from the log's [m]."""
+    return float(np.linalg.norm(frame.world.origin))
+
+
+def _other_units(said: set[str | None]) -> Iterator[tuple[float, str, str]]:
+    """Factors that put places right, in words, and the unit by name: of the one that the map says, or of any."""
+    factors = dict(UNITS)
+    base = next(iter(said)) if len(said) == 1 else None
+    if base is not None:
+        for unit, size in LENGTHS.items():
+            factor = size / LENGTHS[base]
+            if factor != 1.0 and unit != "in":
+                factors = {one: how for one, how in factors.items() if not math.isclose(one, factor)}
+                way, times = ("small", factor) if factor > 1.0 else ("large", 1.0 / factor)
+                digits = f"{times:.3g}" if times < 1000.0 else f"{times:.0f}"
+                yield factor, f"{digits} times too {way} ({unit} for {base})", unit
+    for factor, how in factors.items():
+        yield factor, how, ""
+
+
+def _resized(
+    recording: Recording,
+    frames: tuple[SourceFrame, SourceFrame],
+    factors: tuple[float, float],
+    says: str,
+    remedy: str,
+) -> Iterator[Convention]:
+    """Places of object and hand, so many times as large in the log; none if that is further than anything is."""
+
+    def change(push: Push) -> Push:
+        assert push.hand is not None
+        body, hand = (
+            frame.with_places(stream, factor * frame.places(stream)) if factor != 1.0 else stream
+            for frame, stream, factor in zip(frames, (push.object, push.hand), factors, strict=True)
+        )
+        return replace(push, object=body, hand=hand)
+
+    try:
+        yield Convention(says=says, remedy=remedy, recording=each_push(recording, change))
+    except RecordingError:
+        return
+
+
+def _origins(recording: Recording) -> Iterator[Convention]:
+    """An origin in another unit than was said: of the object's stream, the hand's or both."""
+    stated = stated_in(recording.conversion)
+    if stated is None or stated.hand is None:
+        return
+    worlds = [stated.world_of(pose) for pose in (stated.object, stated.hand)]
+    shared = worlds[0] is worlds[1]
+    streams = (
+        [("world", "W's origin", True, True)]
+        if shared
+        else [("object.world", "the origin of the object's frame", True, False),
+              ("hand.world", "the origin of the hand's frame", False, True)]
+    )  # fmt: skip
+    for key, said, of_object, of_hand in streams:
+        frame = source_frame(stated, stated.object if of_object else stated.hand)
         for factor, how in UNITS.items():
-            change = partial(_resized, of_object=factor if of_object else 1.0, of_hand=factor if of_hand else 1.0)
-            try:
-                resized = each_push(recording, change)
-            except RecordingError:  # further away than anything is
-                continue
-            yield Convention(says=f"{said} are {how}", remedy="map: unit of its position", recording=resized)
+            if _origin(frame) > 0.0 and (not shared or _origin(frame) > LARGEST_ORIGIN > factor * _origin(frame)):
+                move = (factor - 1.0) * places_in_world(np.zeros((1, 3)), frame.world)[0]
+                yield from _moved(recording, move, of_object, of_hand, f"{said} is {how}", place_in_map(stated, key))
 
 
-def _resized(push: Push, of_object: float, of_hand: float) -> Push:
-    assert push.hand is not None
-    return replace(
-        push,
-        object=replace(push.object, positions=of_object * push.object.positions),
-        hand=replace(push.hand, positions=of_hand * push.hand.positions),
-    )
+def _moved(
+    recording: Recording, move: Array, of_object: bool, of_hand: bool, says: str, place: str
+) -> Iterator[Convention]:
+    def change(push: Push) -> Push:
+        assert push.hand is not None
+        body, hand = (
+            replace(stream, positions=stream.positions + move) if some else stream
+            for stream, some in ((push.object, of_object), (push.hand, of_hand))
+        )
+        return replace(push, object=body, hand=hand)
+
+    try:
+        yield Convention(says=says, remedy=f"{place}: unit", recording=each_push(recording, change))
+    except RecordingError:
+        return
 
 
 def _hand_axes(push: Push, matrix: Array) -> Push:

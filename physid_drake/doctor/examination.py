@@ -105,17 +105,23 @@ def examined(recording: Recording, progress: Progress | None = None) -> Finding:
     # To be fitted at all is worth much, where it is refused as it is.
     enough = MUCH * FAR if before is None else before / MUCH
     found = _fitted("other conventions", tried, progress)
-    least = min((left for left, _ in found), default=np.inf)
-    if not least < FAR and gap_of(unforced) > NEAR:
-        # No physics leaves the tip elsewhere than at what it pushes.
+    least, seen = min(((left, one.recording) for left, one in found), key=lambda pair: pair[0], default=(np.inf, few))
+    # No physics leaves the tip elsewhere than at what it pushes: by what fits, or as it is.
+    if not least < FAR and gap_of(seen if before is None and least < enough else unforced) > NEAR:
         pairs = _fitted("two at once", _likely(list(pairs_of(unforced))), progress, most=MOST_PAIRS)
         both = min((left for left, _ in pairs), default=np.inf)
-        if both < min(least, enough) / MUCH:
+        if both < min(least / MUCH, enough if before is None else enough / MUCH):
             found, least = pairs, both
     if not least < enough:
         return Finding(before=before, refused=refused)
     best = sorted((pair for pair in found if pair[0] <= ALIKE * least), key=lambda pair: pair[0])
-    return Finding(before=before, refused=refused, after=least, better=tuple(one for _, one in best))
+    return Finding(before=before, refused=refused, after=least, better=_simplest([one for _, one in best]))
+
+
+def _simplest(conventions: Sequence[Convention]) -> tuple[Convention, ...]:
+    """Without those that are another one and something more."""
+    said = [one.says for one in conventions]
+    return tuple(one for one in conventions if not any(one.says.startswith(f"{other}, and ") for other in said))
 
 
 def _fitted(

@@ -13,6 +13,7 @@ from scipy.ndimage import median_filter
 from physid_drake.cell.solid import solid_of
 from physid_drake.cell.touch import Tip
 from physid_drake.errors import RecordingError
+from physid_drake.pushes.standing import misread, standing_of
 from physid_drake.recording import Box, Cylinder, PoseStream, Push, Recording
 from physid_drake.recording.clocks import check_seconds
 from physid_drake.recording.rests import rests_of
@@ -72,6 +73,12 @@ def check_mass(recording: Recording) -> None:
             f"recording '{recording.name}': with {mass:g} kg the object would be {what} ({density:.3g} kg/m^3);"
             " is its mass in kg, and its size in m?"
         )
+
+
+def check_standing(recording: Recording) -> None:
+    """Refuses an object that tips as it is read, and stands in all pushes by other axes or another order."""
+    if standing_of(recording).tipped and (odd := misread(recording)):
+        raise RecordingError(f"recording '{recording.name}': {odd}.")
 
 
 def check_upright(recording: Recording, push: Push) -> None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import RecordingError
-from physid_drake.pushes.frame_checks import check_clocks, checks_of, push_checks_of
+from physid_drake.pushes.frame_checks import check_clocks, check_standing, checks_of, push_checks_of
 from physid_drake.pushes.hand_stream import beside_object
 from physid_drake.pushes.noise import noise_of
 from physid_drake.recording import Recording, thinned
@@ -21,17 +21,20 @@ def refuse(recording: Recording) -> None:
     """
     for check in _clocks_of(recording):
         check()
-    for check in _others_of(thinned(recording)):
+    seen = thinned(recording)
+    check_standing(seen)
+    for check in _others_of(seen):
         check()
 
 
 def refusals(recording: Recording) -> tuple[str, ...]:
     """All that would be refused, in words; whether it can be simulated is not tried."""
-    # Where times are in no seconds, nothing else can be asked.
-    return _said(_clocks_of(recording)) or _said(_others_of(thinned(recording)))
+    seen = thinned(recording)
+    # Where times are in no seconds, or what is up is not, nothing else can be asked.
+    return _said(_clocks_of(recording)) or _said([partial(check_standing, seen)]) or _said(_others_of(seen))
 
 
-def _said(checks: Iterator[Callable[[], object]]) -> tuple[str, ...]:
+def _said(checks: Iterable[Callable[[], object]]) -> tuple[str, ...]:
     found = []
     for check in checks:
         try:

@@ -11,18 +11,20 @@ from physid_drake.pushes.force_windows import WINDOW, too_seldom
 from physid_drake.pushes.frame_checks import AT_A_TIME, SELDOM, UNSEEN_WAY, depths_at_touch
 from physid_drake.pushes.hand_stream import touching_radius
 from physid_drake.pushes.plausible import implausible, some_names
+from physid_drake.pushes.standing import LEANS, RISES, misread, standing_of
 from physid_drake.pushes.stated import too_loud
 from physid_drake.recording import Cylinder, MeshShape, Push, Recording
 from physid_drake.recording.obj import read_obj
 
 FILLS = 0.95  # of its convex hull: a mesh that fills less has notches, or is hollow
-LEANS = 8.0  # degrees by which an object's lean changes: on a table it stands on its face
-RISES = 8e-3  # m by which an object's height changes: on a table it does not
 BESIDE = 3e-3  # m between tip and face as objects begin to move: 1 mm at most where description and frames agree
 
 
 def doubts(recording: Recording) -> tuple[str, ...]:
-    """What to look at again, in words."""
+    """What to look at again, in words; nothing else where what is up is not."""
+    odd = misread(recording)
+    if odd:  # refused, where the object tips
+        return () if standing_of(recording).tipped else (odd,)
     return (
         *_leaning(recording),
         *_rising(recording),
@@ -45,7 +47,7 @@ def _leaning(recording: Recording) -> tuple[str, ...]:
         return ()
     return (
         f"the object's lean changes by more than {LEANS:.0f} degrees while it is on the table; are its quaternions in"
-        f" the order w, x, y, z? {some_names(names)}",
+        f" the order that was said, and is z of W the table's normal? {some_names(names)}",
     )
 
 

@@ -179,7 +179,15 @@ def load_section(file: Path, known: str, keys: Sequence[str]) -> Section:
     Raises:
         RecordingError: if it is missing, not UTF-8, not YAML, or of another format.
     """
-    text = read_text(file, most=MOST_BYTES)
+    return section_of(read_text(file, most=MOST_BYTES), file, known, keys)
+
+
+def section_of(text: str, file: Path, known: str, keys: Sequence[str]) -> Section:
+    """The same of a text; ``file`` is what messages call it.
+
+    Raises:
+        RecordingError: if it is not YAML, or of another format.
+    """
     place = named(file)
     try:
         loader = _Loader(text)

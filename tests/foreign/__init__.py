@@ -9,6 +9,7 @@ from pathlib import Path
 
 from foreign.arrays import demonstrations, lerobot, matlab, padded_npz, transforms
 from foreign.bags import mcap, odometry, only_pushes, ros1
+from foreign.by_map import by_map, map_of
 from foreign.common import DESCRIPTION, HAND, assert_rests_agree
 from foreign.text import (
     LEFT_HANDED,
@@ -26,8 +27,8 @@ from foreign.text import (
 from physid_drake.recording import Recording
 
 __all__ = [
-    "BAGS", "DESCRIPTION", "HAND", "LEFT_HANDED", "TABLES", "Log", "assert_rests_agree", "demonstrations",
-    "german", "lerobot", "markers", "matlab", "mcap", "motive", "motive_euler", "odometry", "only_pushes",
+    "BAGS", "DESCRIPTION", "HAND", "LEFT_HANDED", "TABLES", "Log", "assert_rests_agree", "by_map", "demonstrations",
+    "german", "lerobot", "map_of", "markers", "matlab", "mcap", "motive", "motive_euler", "odometry", "only_pushes",
     "padded_npz", "qualisys", "ros1", "rtde", "rulers", "transforms", "unity", "vicon", "video",
 ]  # fmt: skip
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import foreign
 import numpy as np
 import pytest
 
+from physid_drake.convert import convert_table
 from physid_drake.doctor import examined
-from physid_drake.doctor.conventions import conventions_of, gap_of, pairs_of
+from physid_drake.doctor.conventions import Convention, conventions_of, gap_of, pairs_of
+from physid_drake.doctor.examination import _simplest
 from physid_drake.doctor.forces import conventions_of_forces
 from physid_drake.recording import Box, Cylinder, ForceStream, Push, Recording, read_recording
 
@@ -156,7 +159,7 @@ def test_what_is_right_undoes_what_is_wrong(eraser: Recording) -> None:
         right = next(one.recording for one in conventions_of(wrong) if one.says.startswith(says.partition("(")[0]))
         for push, other in zip(eraser.pushes, right.pushes, strict=True):
             assert push.hand is not None and other.hand is not None
-            assert other.object.quaternions == pytest.approx(push.object.quaternions, abs=1e-9)
+            assert np.abs((other.object.quaternions * push.object.quaternions).sum(axis=1)) == pytest.approx(1.0)
             assert other.hand.times == pytest.approx(push.hand.times, abs=0.011)
             assert other.hand.positions == pytest.approx(push.hand.positions, abs=6e-4)
             assert other.object.positions == pytest.approx(push.object.positions, abs=1e-9)
@@ -200,3 +203,123 @@ def test_a_round_objects_other_sizes() -> None:
         if isinstance(one.recording.object.shape, Cylinder)
     }
     assert radii == {0.5, 1.0, 2.0}
+
+
+ORIGIN = "origin: [0.4, -0.3, 0.75]"
+OFFSET = "{translation: [0.01, -0.02, -0.05], yaw_deg: 40}"
+POSE = "{pose: {translation: [0.1, -0.2, 0.6], rotation_wxyz: [0.1, 0.9, 0.4, 0.141421356]}}"
+UP = "{axes: [z, x, y], origin: [0.4, 0.75, -0.3], yaw_deg: 30}"
+# True map, what of it is wrong, what is said, and where.
+BY_MAP = {
+    "both in mm": (
+        {"world": f"{{{ORIGIN}}}", "unit": "mm", "hand_unit": "mm"}, {"unit": "m", "hand_unit": "m"},
+        "the places of object and hand are 1000 times too large (mm for m)",
+        "map lines 5 and 8: object.position and hand.position: unit: mm",
+    ),
+    "both in inches": (
+        {"world": POSE, "unit": "inch", "hand_unit": "inch", "offset": OFFSET}, {"unit": "cm", "hand_unit": "cm"},
+        "the places of object and hand are 2.54 times too small (inch for cm)",
+        "map lines 5 and 9: object.position and hand.position: unit: inch",
+    ),
+    "the object in cm": (
+        {"world": UP, "unit": "cm", "offset": OFFSET}, {"unit": "m"},
+        "the object's places are 100 times too large (cm for m)", "map line 5: object.position: unit: cm",
+    ),
+    "the hand in m": (
+        {"world": f"{{{ORIGIN}}}", "hand_world": "{origin: [1, 2, 3], yaw_deg: -50}"}, {"hand_unit": "mm"},
+        "the hand's places are 1000 times too small (m for mm)", "map line 8: hand.position: unit: m",
+    ),
+    "all in mm": (
+        {"world": "{origin: [400, -300, 750], unit: mm}", "unit": "mm", "hand_unit": "mm"},
+        {"world": "{origin: [400, -300, 750]}", "unit": "m", "hand_unit": "m"},
+        "the places of object and hand are 1000 times too large (mm for m), and so is W's origin",
+        "map lines 5, 8 and 10: object.position, hand.position and world: unit of each",
+    ),
+    "the origin in mm": (
+        {"world": "{origin: [400, -300, 750], unit: mm}"}, {"world": "{origin: [400, -300, 750]}"},
+        "W's origin is 1000 times too large (mm for m)", "map line 10: world: unit",
+    ),
+    "the hand's origin in cm": (
+        {"hand_world": "{origin: [40, -30, 75], unit: cm}"}, {"hand_world": "{origin: [40, -30, 75]}"},
+        "the origin of the hand's frame is 100 times too large (cm for m)", "map line 10: hand.world: unit",
+    ),
+    "w last, y up": (
+        {"world": UP, "order": "xyzw", "offset": OFFSET}, {"order": "wxyz"},
+        "the object's quaternions are x, y, z, w", "map line 6: object.rotation: as: xyzw",
+    ),
+    "inverse": (
+        {"world": UP, "offset": OFFSET, "rotation": "{columns: [q0, q1, q2, q3], as: wxyz, inverse: true}"},
+        {"rotation": "{columns: [q0, q1, q2, q3], as: wxyz}"},
+        "the object's rotations turn the other way", "map line 6: object.rotation: inverse: true",
+    ),
+    "y up": (
+        {"world": "{axes: [z, x, y], origin: [0.4, 0.75, -0.3]}", "order": "xyzw"},
+        {"world": "{origin: [0.4, 0.75, -0.3]}"},
+        "the log's y axis is up", "map line 10: world: axes: [z, x, y]",
+    ),
+    "left-handed": (
+        {"world": "{axes: [x, z, y], left_handed: true}"}, {"world": "{axes: [x, y, z]}"},
+        "the log's y axis is up, and its axes are left-handed",
+        "map line 10: world: axes: [x, z, y], left_handed: true",
+    ),
+}  # fmt: skip
+
+
+def by_wrong_map(recording: Recording, case: str, folder: Path) -> Recording:
+    true, wrong, _, _ = BY_MAP[case]
+    foreign.by_map(recording, folder / "log.csv", foreign.map_of(recording, **true))
+    (folder / "map.yaml").write_text(foreign.map_of(recording, **true | wrong))
+    return convert_table(folder / "log.csv", folder / "out", folder / "map.yaml")
+
+
+@pytest.mark.parametrize("case", BY_MAP)
+def test_what_a_map_got_wrong_is_put_right_in_the_frame_of_the_log(
+    case: str, eraser: Recording, tmp_path: Path
+) -> None:
+    some = eraser.subset([0, 5])
+    _, _, says, remedy = BY_MAP[case]
+    (found,) = [
+        one for one in conventions_of(by_wrong_map(some, case, tmp_path)) if one.says.partition(" (R_BW")[0] == says
+    ]
+    assert remedy in found.remedy
+    for push, other in zip(some.pushes, found.recording.pushes, strict=True):
+        assert other.object.positions == pytest.approx(push.object.positions, abs=1e-7)
+        assert np.abs((other.object.quaternions * push.object.quaternions).sum(axis=1)) == pytest.approx(1.0)
+        assert push.hand is not None and other.hand is not None
+        there = np.column_stack([np.interp(other.hand.times, push.hand.times, c) for c in push.hand.positions.T])
+        assert other.hand.positions == pytest.approx(there, abs=1e-7)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", BY_MAP)
+def test_what_a_map_got_wrong_is_named(case: str, eraser: Recording, tmp_path: Path) -> None:
+    finding = examined(by_wrong_map(eraser, case, tmp_path))
+    assert finding.after is not None and finding.after < 1.5
+    (line,) = finding.lines()
+    assert BY_MAP[case][2] in line and BY_MAP[case][3] in line
+
+
+@pytest.mark.slow
+def test_a_unit_and_an_axis_at_once(eraser: Recording, tmp_path: Path) -> None:
+    true = {"world": "{axes: [z, x, y], origin: [0.4, 0.75, -0.3]}", "unit": "mm", "hand_unit": "mm"}
+    wrong = {"world": "{origin: [0.4, 0.75, -0.3]}", "unit": "m", "hand_unit": "m"}
+    foreign.by_map(eraser, tmp_path / "log.csv", foreign.map_of(eraser, **true))
+    (tmp_path / "map.yaml").write_text(foreign.map_of(eraser, **true | wrong))
+    (line,) = examined(convert_table(tmp_path / "log.csv", tmp_path / "out", tmp_path / "map.yaml")).lines()
+    assert "1000 times too large (mm for m), and the log's y axis is up (map lines 5 and 8: object.position" in line
+
+
+def test_what_says_more_for_no_better_fit_is_left_out(eraser: Recording) -> None:
+    both = [
+        Convention(says=says, remedy="", recording=eraser) for says in ("a", "b is so", "a, and b", "a, and c", "ab")
+    ]
+    assert [one.says for one in _simplest(both)] == ["a", "b is so", "ab"]
+
+
+def test_a_right_map_leaves_nothing_to_say(eraser: Recording, tmp_path: Path) -> None:
+    said = {"world": UP, "order": "xyzw", "offset": OFFSET, "unit": "mm", "hand_unit": "cm"}
+    said["hand_world"] = "{origin: [1, 2, 3], yaw_deg: -50}"
+    foreign.by_map(eraser, tmp_path / "log.csv", foreign.map_of(eraser, **said))
+    (tmp_path / "map.yaml").write_text(foreign.map_of(eraser, **said))
+    finding = examined(convert_table(tmp_path / "log.csv", tmp_path / "out", tmp_path / "map.yaml"))
+    assert finding.before is not None and finding.before < 1.5 and finding.lines() == []

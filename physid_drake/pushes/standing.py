@@ -1,0 +1,319 @@
+"""Whether an object stands on the table as it is recorded; if not, by which axes or quaternions it would.
+
+An object on a table moves in the table's plane and turns about the table's normal, whatever pushes it. Where another
+axis is taken for up it moves in a vertical plane, and where quaternions are in another order headings become leans.
+Neither takes a fit to be seen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from physid_drake.cell.solid import solid_of
+from physid_drake.convert.conventions import rotation_wxyz
+from physid_drake.convert.map_reading import stated_in
+from physid_drake.convert.mapping import Stated, World, listed
+from physid_drake.convert.source_frame import SourceFrame, source_frame
+from physid_drake.errors import RecordingError
+from physid_drake.recording import Box, Cylinder, PoseStream, Push, Recording
+
+Array = NDArray[np.float64]
+
+LEANS: Final = 8.0
+"""Degrees by which an object's lean changes: on a table it stands on its face."""
+TIPPED: Final = 30.0
+"""Degrees from the vertical: an object that leans more does not stand on its face."""
+RISES: Final = 8e-3
+"""m by which an object's height changes: on a table it does not."""
+FLAT: Final = 0.2
+"""Of an object's way on a table: its height changes less than that."""
+SOME: Final = 0.25
+"""Of the pushes: fewer may lean because the object tips."""
+TURNED: Final = 2.0
+"""Degrees from a push's first poses to its last: less may be a tracker's noise."""
+MOSTLY: Final = 3.0
+"""Times as far: an object on a table turns about its normal, and hardly about anything else."""
+END: Final = 5
+"""Poses at an end of a push."""
+
+UPS: Final = {
+    "x": (1, 2, 0), "y": (2, 0, 1), "z": (0, 1, 2), "-x": (2, 1, 0), "-y": (0, 2, 1), "-z": (1, 0, 2),
+}  # fmt: skip
+"""Which axes of a right-handed log are W's x, y and z, by the one that is up."""
+ORDERS: Final = {1: ("x, y, z, w", "xyzw"), -1: ("w, x, y, z", "wxyz")}
+"""Of quaternions that were taken for the other order, by how far they have to be rolled."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """Another reading of the same log.
+
+    Attributes:
+        axes: (3, 3) of the world, as in a map; None if they are as they were read.
+        roll: of quaternions, by which they come in the order w, x, y, z.
+        says: what is so, if it is right.
+        remedy: what to write, and where.
+    """
+
+    axes: Array | None = None
+    roll: int = 0
+    says: str
+    remedy: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standing:
+    """How an object stands and moves by one reading.
+
+    Attributes:
+        rise: its way along the vertical, of all its way.
+        leaning: share of the pushes in which it leans, or its lean changes.
+        tipped: whether that is by so much that it is refused in a push.
+        turned: how far it turns in the push in which it turns most [degrees].
+        askew: share of the pushes in which it turns about other axes than the vertical.
+        upside_down: whether its z axis points down.
+        off: how far its middle is from where it is as it stands on the table [m].
+    """
+
+    rise: float
+    leaning: float
+    tipped: bool
+    turned: float
+    askew: float
+    upside_down: bool
+    off: float
+
+    @property
+    def flat(self) -> bool:
+        """Whether it moves in the table's plane."""
+        return self.rise < FLAT
+
+    @property
+    def upright(self) -> bool:
+        """Whether it stays on its face, or what looks so."""
+        return max(self.leaning, self.askew) <= SOME
+
+    @property
+    def odd(self) -> bool:
+        """Whether no object on a table does so, or hardly any: one that is on its head and is not seen to turn."""
+        return not self.flat or not self.upright or (self.upside_down and self.turned < TURNED)
+
+
+def likelier_reading(recording: Recording) -> Reading | None:
+    """By which the object stands on the table and moves in its plane, in all pushes.
+
+    None where it does as it is read, and where it does by no other reading. One by which it stands on its feet is
+    likelier than one by which it stands on its head, unless it is seen to turn.
+    """
+    here = standing_of(recording)
+    if not here.odd:
+        return None
+    found = []
+    for reading in readings_of(recording, turned=not here.flat):
+        other = _standing_by(recording, reading)
+        if other is None or not (other.flat and other.leaning == other.askew == 0.0):
+            continue
+        if here.flat and here.upright and other.upside_down:
+            continue
+        changes = (reading.axes is not None) + (reading.roll != 0)
+        found.append(((changes, other.upside_down, other.off), reading))
+    return min(found, key=lambda pair: pair[0])[1] if found else None
+
+
+def misread(recording: Recording) -> str:
+    """What is odd about how the object stands, and the reading by which nothing is; empty where there is none."""
+    reading = likelier_reading(recording)
+    if reading is None:
+        return ""
+    here, instead = standing_of(recording), f"stands on the table if {reading.says} ({reading.remedy})"
+    if not here.flat:
+        return f"the object moves in a vertical plane; it moves in the table's plane and {instead}"
+    if not here.upright:
+        return f"the object leans, or turns about other axes than the vertical; it {instead}"
+    return f"the object stands on its head and hardly turns; it {instead}"
+
+
+def readings_of(recording: Recording, *, turned: bool = True) -> Iterator[Reading]:
+    """Other orders of quaternions, and with ``turned`` other axes of the world, one or both at once."""
+    stated = stated_in(recording.conversion)
+    full = any(push.object.rotation == "full" for push in recording.pushes)
+    orders = list(_orders(stated)) if full else []
+    yield from orders
+    for axes in _axes(stated) if turned else ():
+        yield axes
+        for order in orders:
+            says, remedy = f"{axes.says}, and {order.says}", f"{axes.remedy}; {order.remedy}"
+            yield Reading(axes=axes.axes, roll=order.roll, says=says, remedy=remedy)
+
+
+def mirrored(reading: Reading) -> Reading | None:
+    """The reading by axes of the other hand, by which an object stands as well; None where no axes are changed."""
+    if reading.axes is None:
+        return None
+    axes = reading.axes[[1, 0, 2]]
+    left = bool(np.linalg.det(axes) < 0.0)
+    return Reading(
+        axes=axes,
+        roll=reading.roll,
+        says=f"{reading.says}, and its axes are {'left' if left else 'right'}-handed",
+        remedy=reading.remedy.replace(_names(reading.axes), f"{_names(axes)}, left_handed: {str(left).lower()}"),
+    )
+
+
+def read_as(recording: Recording, reading: Reading) -> Recording:
+    """The recording by another reading; without forces where its axes are others.
+
+    Raises:
+        RecordingError: if it is none by that reading.
+    """
+    stated = stated_in(recording.conversion)
+    body, hand = (None, None) if stated is None else (stated.object, stated.hand)
+    frame = source_frame(stated, body)
+    # A hand in a frame of its own has axes of its own.
+    shared = stated is None or (hand is not None and stated.world_of(hand) is stated.world_of(stated.object))
+
+    def change(push: Push) -> Push:
+        path = push.hand
+        if path is not None and reading.axes is not None and shared:
+            path = _with_axes(path, source_frame(stated, hand), reading.axes)
+        force = push.force if reading.axes is None else None
+        return replace(push, object=_read_as(push.object, frame, reading), hand=path, force=force)
+
+    with np.errstate(over="ignore", invalid="ignore"):
+        return replace(recording, pushes=tuple(map(change, recording.pushes)))
+
+
+def standing_of(recording: Recording) -> Standing:
+    """How the object stands and moves."""
+    shape = recording.object.shape
+    streams = [push.object for push in recording.pushes]
+    height = solid_of(shape).height
+    ways, rises = np.array([_ways(stream) for stream in streams]).T
+    middles = [float(np.median(stream.positions[:, 2])) for stream in streams]
+    rise = 0.0
+    if rises.max() > RISES:
+        rise = float(np.sqrt((rises**2).sum() / ((ways**2).sum() + (rises**2).sum())))
+    off = float(np.median(np.abs(np.array(middles) - 0.5 * height)))
+    turning = [stream for stream in streams if stream.rotation == "full"]
+    if not turning or (isinstance(shape, Cylinder) and shape.axis == "y"):
+        return Standing(rise=rise, leaning=0.0, tipped=False, turned=0.0, askew=0.0, upside_down=False, off=off)
+    either = isinstance(shape, Box | Cylinder)  # upside down it is the same
+    leans = [_leans(stream, either) for stream in turning]
+    tipped = [float(np.quantile(lean, 0.95)) > TIPPED for lean in leans]
+    changed = [float(np.ptp(np.quantile(lean, [0.05, 0.95]))) > LEANS for lean in leans]
+    about, across = _turns(turning)
+    return Standing(
+        rise=rise,
+        leaning=float(np.mean(np.logical_or(tipped, changed))),
+        tipped=any(tipped),
+        turned=float(np.hypot(about, across).max(initial=0.0)),
+        askew=float(np.mean(across > np.maximum(TURNED, MOSTLY * about))) if len(about) else 0.0,
+        upside_down=float(np.median([np.median(_cosines(stream)) for stream in turning])) < 0.0,
+        off=off,
+    )
+
+
+def _standing_by(recording: Recording, reading: Reading) -> Standing | None:
+    try:
+        return standing_of(read_as(recording, reading))
+    except RecordingError:
+        return None
+
+
+def _ways(stream: PoseStream) -> tuple[float, float]:
+    """How far an object goes in the plane and along the vertical [m], but for a few samples."""
+    x, y, z = np.ptp(np.quantile(stream.positions, [0.05, 0.95], axis=0), axis=0).tolist()
+    return math.hypot(x, y), z
+
+
+def _cosines(stream: PoseStream) -> Array:
+    """Of the angle (n,) between the object's z axis and the vertical."""
+    _, x, y, _ = stream.quaternions.T
+    return np.asarray(1.0 - 2.0 * (x * x + y * y))
+
+
+def _leans(stream: PoseStream, either: bool) -> Array:
+    """That angle (n,) in degrees; of the axis, whichever way it points, for ``either``."""
+    cosines = _cosines(stream)
+    return np.asarray(np.degrees(np.arccos(np.clip(np.abs(cosines) if either else cosines, -1.0, 1.0))))
+
+
+def _turns(streams: list[PoseStream]) -> tuple[Array, Array]:
+    """How far objects have turned about the vertical and about other axes (n,) [degrees], of pushes of some poses."""
+    turns = np.degrees([_turn(stream) for stream in streams if len(stream) >= 2 * END]).reshape(-1, 3)
+    return np.abs(turns[:, 2]), np.hypot(turns[:, 0], turns[:, 1])
+
+
+def _turn(stream: PoseStream) -> Array:
+    first, last = (
+        Rotation.from_quat(np.roll(stream.quaternions[part], -1, axis=1)).mean()
+        for part in (slice(END), slice(-END, None))
+    )
+    return np.asarray((last * first.inv()).as_rotvec())
+
+
+def _read_as(stream: PoseStream, frame: SourceFrame, reading: Reading) -> PoseStream:
+    if reading.roll and stream.rotation == "full":
+        written = np.roll(frame.rotations(stream).as_quat(), 1 + reading.roll, axis=1)
+        stream = frame.with_rotations(stream, Rotation.from_quat(np.roll(written, -1, axis=1)))
+    return stream if reading.axes is None else _with_axes(stream, frame, reading.axes)
+
+
+def _with_axes(stream: PoseStream, frame: SourceFrame, axes: Array) -> PoseStream:
+    """A stream of which other axes of the log are W's. A yaw is about W's vertical, whichever axis that is."""
+    other = replace(frame, world=replace(frame.world, axes=axes))
+    moved = other.with_places(stream, frame.places(stream))
+    return other.with_rotations(moved, frame.rotations(stream)) if stream.rotation == "full" else moved
+
+
+def _orders(stated: Stated | None) -> Iterator[Reading]:
+    """Other orders of the object's quaternions; none where its rotation was not written as one."""
+    turn = None if stated is None else stated.object.turn
+    if turn is None or not turn.columns:
+        rolls: tuple[int, ...] = (1, -1)
+    else:
+        rolls = {"wxyz": (1,), "xyzw": (-1,)}.get(turn.kind, ())
+    for roll in rolls:
+        order, name = ORDERS[roll]
+        yield Reading(
+            roll=roll,
+            says=f"the object's quaternions are {order}",
+            remedy=f"{place_in_map(stated, 'object.rotation')}: as: {name}",
+        )
+
+
+def _axes(stated: Stated | None) -> Iterator[Reading]:
+    """Other axes of the log that are up; none where a pose, which turns it as it likes, was given instead."""
+    world = World() if stated is None else stated.world_of(stated.object)
+    if abs(float(rotation_wxyz(world.rotation).as_matrix()[2, 2])) < 1.0 - 1e-9:
+        return
+    key = "world" if stated is None or stated.object.world is None else "object.world"
+    for up, (i, j, k) in UPS.items():
+        axes = np.zeros((3, 3))
+        axes[0, i], axes[1, j], axes[2, k] = 1.0, 1.0, -1.0 if up[0] == "-" else 1.0
+        if np.linalg.det(axes) * np.linalg.det(world.axes) < 0.0:
+            axes = axes[[1, 0, 2]]
+        if not np.array_equal(axes[2], world.axes[2]):
+            yield Reading(
+                axes=axes,
+                says=f"the {'recording' if stated is None else 'log'}'s {up} axis is up",
+                remedy=f"{place_in_map(stated, key)}: axes: {_names(axes)}",
+            )
+
+
+def _names(axes: Array) -> str:
+    """Of the axes, as a map has them."""
+    rows = [("-" if row.sum() < 0.0 else "") + "xyz"[int(np.argmax(np.abs(row)))] for row in axes]
+    return f"[{', '.join(rows)}]"
+
+
+def place_in_map(stated: Stated | None, *keys: str) -> str:
+    """Where keys of the map stand, or would stand."""
+    return f"map: {listed(keys)}" if stated is None else stated.place(*keys)
