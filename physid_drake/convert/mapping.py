@@ -277,10 +277,15 @@ class Stated:
         return stream.world or self.world
 
     def place(self, *keys: str) -> str:
-        """Where somebody who corrects some keys has to look: in which lines, as far as they are there."""
-        lines = [str(self.lines[key]) for key in keys if key in self.lines]
+        """Where somebody who corrects some keys has to look: in which lines, or in those of what they belong to."""
+        lines = [str(line) for line in map(self._line, keys) if line is not None]
         where = f" line{'s' if len(lines) > 1 else ''} {listed(lines)}" if lines else ""
         return f"map{where}: {listed(keys)}"
+
+    def _line(self, key: str) -> int | None:
+        parts = key.split(".")
+        above = (".".join(parts[:count]) for count in range(len(parts), 0, -1))
+        return next((self.lines[one] for one in above if one in self.lines), None)
 
 
 def listed(words: Sequence[str]) -> str:

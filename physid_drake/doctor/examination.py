@@ -8,12 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from physid_drake.doctor.conventions import (
-    Convention,
-    conventions_of,
-    gap_of,
-    pairs_of,
-)
+from physid_drake.doctor.convention import Convention
+from physid_drake.doctor.conventions import conventions_of, gap_of, pairs_of
 from physid_drake.doctor.forces import conventions_of_forces, without_forces
 from physid_drake.errors import PhysidError
 from physid_drake.identify.baseline import baseline_hypothesis

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Final
 
-from physid_drake.doctor.conventions import Convention, each_push
+from physid_drake.doctor.convention import Convention, each_push
 from physid_drake.recording import ForceStream, Push, Recording
 
 POUND: Final = 0.45359237

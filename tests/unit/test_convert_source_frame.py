@@ -82,6 +82,7 @@ def test_the_lines_of_a_map(eraser: Recording, tmp_path: Path) -> None:
     both = stated.place("object.position", "hand.position")
     assert both == "map lines 5 and 9: object.position and hand.position"
     assert stated.place("world") == "map: world"
+    assert stated.place("hand.height_m") == "map line 8: hand.height_m"
     assert stated.place("a", "b", "c") == "map: a, b and c"
 
 
