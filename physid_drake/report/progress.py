@@ -22,7 +22,7 @@ AGAIN = 60.0  # s: a stage that lasts so long says how far it is
 SOON: Final = 2.0
 """s: a stage that just began tells nothing of its end."""
 LATE: Final = 0.1
-"""Of a stage that lasts longer than it usually does, so much is left."""
+"""Of a stage that lasts longer than it usually does, so much is left at least; and as long again as it is late."""
 
 IDENTIFICATION_STAGES: Final[Mapping[str, float]] = {"parameter fit": 5.0, "refit in the Drake cell": 4.0}
 DIAGNOSIS_STAGES: Final[Mapping[str, float]] = {
@@ -65,11 +65,15 @@ class Forecast:
         over = [name for name in self._over if name != self._stage]
         if not over:
             return None
-        unit = sum(self._over[name] for name in over) / sum(self._lasts[name] for name in over)
+        lasted, parts = (sum(of[name] for name in over) for of in (self._over, self._lasts))
+        unit, own = lasted / parts, self._lasts[self._stage]
+        usual = unit * own
+        rest = max(usual - here, LATE * usual, here - usual)
+        if here > usual:
+            # What is slow here, such as a law that Drake has to roll out, is slow in what comes, too.
+            unit = (lasted + here + rest) / (parts + own)
         names = list(self._lasts)
-        usual = unit * self._lasts[self._stage]
-        after = names[names.index(self._stage) + 1 :]
-        return max(usual - here, LATE * usual) + unit * sum(self._lasts[name] for name in after)
+        return rest + unit * sum(self._lasts[name] for name in names[names.index(self._stage) + 1 :])
 
     def words(self) -> str:
         """What is left, for a person."""

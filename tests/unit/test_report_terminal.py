@@ -77,10 +77,27 @@ def test_what_is_left_of_all_stages_by_how_long_those_before_have_lasted(monkeyp
     assert forecast.left() == 60.0 and forecast.words() == "at most 60 s left"
     clock.now += 30.0
     assert forecast.left() == 30.0
-    clock.now += 30.0  # longer than usual
-    assert forecast.left() == 24.0 and forecast.words() == "at most 25 s left"
+    clock.now += 30.0  # longer than usual by 20 s: as long again, and what comes is slow, too
+    assert forecast.left() == 20.0 + 36.0 and forecast.words() == "at most 55 s left"
     forecast.tell("third", 0, 0)
     assert forecast.left() == 28.0  # 70 s for 5 of 7 parts
+
+
+def test_a_stage_that_is_slow_makes_what_comes_slow(monkeypatch):
+    """A law that Drake has to roll out: stages that look for effects last twenty times as long as the first tell."""
+    clock, shares = Clock(monkeypatch), {}
+    as_usual = {"parameter fit", "refit in the Drake cell"}
+    lasts = {name: seconds * (1.0 if name in as_usual else 20.0) for name, seconds in DIAGNOSIS_STAGES.items()}
+    forecast, end = Forecast(DIAGNOSIS_STAGES), clock.now + sum(lasts.values())
+    for name, seconds in lasts.items():
+        forecast.tell(name, 0, 0)
+        clock.now += 0.8 * seconds
+        left = forecast.left()
+        shares[name] = 0.0 if left is None else left / (end - clock.now)
+        clock.now += 0.2 * seconds
+    # It was .05 and .24 of what was left.
+    assert shares["test for missing physics"] > 0.3 and 0.7 < shares["single effects"] < 1.2
+    assert all(0.4 < share < 1.2 for share in list(shares.values())[3:])
 
 
 def test_a_stage_may_be_left_out_or_unknown(monkeypatch):
