@@ -295,6 +295,7 @@ def _axes(stated: Stated | None) -> Iterator[Reading]:
     if abs(float(rotation_wxyz(world.rotation).as_matrix()[2, 2])) < 1.0 - 1e-9:
         return
     key = "world" if stated is None or stated.object.world is None else "object.world"
+    posed = stated is not None and f"{key}.pose" in stated.lines
     for up, (i, j, k) in UPS.items():
         axes = np.zeros((3, 3))
         axes[0, i], axes[1, j], axes[2, k] = 1.0, 1.0, -1.0 if up[0] == "-" else 1.0
@@ -304,7 +305,7 @@ def _axes(stated: Stated | None) -> Iterator[Reading]:
             yield Reading(
                 axes=axes,
                 says=f"the {'recording' if stated is None else 'log'}'s {up} axis is up",
-                remedy=f"{place_in_map(stated, key)}: axes: {_names(axes)}",
+                remedy=f"{place_in_map(stated, key)}: {'instead of pose, ' * posed}axes: {_names(axes)}",
             )
 
 

@@ -30,8 +30,3 @@ def shipped_recording(name: Path) -> Path | None:
         return None
     folder = shipped("recordings") / name
     return folder if os.path.isdir(folder) else None  # noqa: PTH112  # Path.is_dir raises for a name that is too long
-
-
-def shipped_names() -> tuple[str, ...]:
-    """The names of the recordings that ship with the project."""
-    return tuple(sorted(folder.name for folder in shipped("recordings").iterdir() if folder.is_dir()))

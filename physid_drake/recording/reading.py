@@ -19,7 +19,7 @@ from physid_drake.errors import RecordingError
 from physid_drake.recording import description
 from physid_drake.recording.clocks import check_seconds
 from physid_drake.recording.limits import FURTHEST, STRONGEST, first_beyond
-from physid_drake.recording.naming import shipped_names, shipped_recording
+from physid_drake.recording.naming import shipped_recording
 from physid_drake.recording.screening import gap_warnings, screen_poses
 from physid_drake.recording.values import (
     QUATERNION_TOLERANCE,
@@ -123,8 +123,8 @@ def _folder_of(given: Path) -> Path:
     folder = shipped_recording(given) or given
     if not os.path.isdir(folder):  # noqa: PTH112  # Path.is_dir raises for a name that is too long
         raise RecordingError(
-            f"{named(folder)}: is not a folder; give the folder that holds {description.DESCRIPTION_FILE}, or one of"
-            f" the names {', '.join(shipped_names())}."
+            f"{named(folder)}: is not a folder; give the folder that holds {description.DESCRIPTION_FILE}, or the"
+            " name of a recording that ships, such as eraser_reference."
         )
     return folder
 

@@ -41,6 +41,10 @@ MISREAD = {
         {"order": "wxyz"}, {"order": "xyzw"},
         "the object's quaternions are w, x, y, z", "map line 6: object.rotation: as: wxyz",
     ),
+    "a pose": (
+        {"world": "{axes: [z, x, y], yaw_deg: 90}"}, {"world": "{pose: {translation: [0, 0, 0], yaw_deg: 90}}"},
+        "the log's y axis is up", "map line 10: world: instead of pose, axes: [z, x, y]",
+    ),
     "no rotation": (
         {"world": "{axes: [z, x, y]}", "rotation": "none"}, {"world": "", "rotation": "none"},
         "the log's y axis is up", "map: world: axes: [z, x, y]",
