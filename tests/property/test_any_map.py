@@ -20,7 +20,9 @@ from physid_drake.convert.conventions import (
     wxyz_of,
 )
 from physid_drake.convert.mapping import ForceMap, Offset, Turn, World
+from physid_drake.convert.source_frame import SourceFrame
 from physid_drake.convert.units import ANGLES, FORCES, LENGTHS, TIMES
+from physid_drake.recording import PoseStream
 
 # ----------------------------------------------------------------------------------------------------- a table there
 
@@ -124,6 +126,24 @@ def test_a_table_by_other_axes_is_that_table_with_its_columns_exchanged(rng, axe
     assert np.array_equal(push.hand.positions, same.hand.positions)
     assert np.array_equal(push.force.forces, same.force.forces)
     assert np.abs(push.object.quaternions - same.object.quaternions).max() < 1e-14  # measured 1e-15
+
+
+@given(generators(), st.sampled_from(AXES), st.booleans())
+def test_what_came_into_w_goes_back_by_any_frame(rng, axes, inverse):
+    quaternions = rng.normal(size=(2, 4))
+    origin_turn, offset_turn = (tuple(q / np.linalg.norm(q)) for q in quaternions)
+    world = World(axes=matrix_of(axes), origin=tuple(rng.normal(size=3)), rotation=origin_turn)
+    offset = Offset(translation=tuple(0.1 * rng.normal(size=3)), rotation=offset_turn)
+    places, turns = rng.normal(size=(5, 3)), Rotation.from_rotvec(rng.normal(size=(5, 3)))
+    read = turns.inv() if inverse else turns
+    positions, turned = with_offset(places_in_world(places, world), rotations_in_world(read, world), offset)
+    stream = PoseStream(times=np.arange(5.0), positions=positions, quaternions=wxyz_of(turned))
+    frame = SourceFrame(world=world, offset=offset, inverse=inverse)
+    assert frame.places(stream) == pytest.approx(places, abs=1e-13)
+    assert (frame.rotations(stream) * turns.inv()).magnitude().max() < 1e-12
+    for again in (frame.with_places(stream, places), frame.with_rotations(stream, turns)):
+        assert again.positions == pytest.approx(positions, abs=1e-13)
+        assert np.abs((again.quaternions * stream.quaternions).sum(axis=1)) == pytest.approx(1.0, abs=1e-13)
 
 
 # ---------------------------------------------------------------------------------------------------------- rotations
