@@ -25,6 +25,7 @@ from physid_drake.errors import RecordingError
 from physid_drake.recording import Box, Cylinder, PoseStream, Push, Recording
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 LEANS: Final = 8.0
 """Degrees by which an object's lean changes: on a table it stands on its face."""
@@ -33,9 +34,11 @@ TIPPED: Final = 30.0
 RISES: Final = 8e-3
 """m by which an object's height changes: on a table it does not."""
 FLAT: Final = 0.2
-"""Of an object's way on a table: its height changes less than that."""
+"""Of an object's way on a table: its height changes by less, or by less than ``RISES``."""
 SOME: Final = 0.25
-"""Of the pushes: fewer may lean because the object tips."""
+"""Of the pushes: in fewer the object may tip, or be lifted."""
+LITTLE, HALF = 0.1, 0.5
+"""Of the pushes: by so little two readings may differ and be as good; so many are hardly all odd."""
 TURNED: Final = 2.0
 """Degrees from a push's first poses to its last: less may be a tracker's noise."""
 MOSTLY: Final = 3.0
@@ -68,63 +71,72 @@ class Reading:
     remedy: str
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Standing:
     """How an object stands and moves by one reading.
 
     Attributes:
-        rise: its way along the vertical, of all its way.
-        leaning: share of the pushes in which it leans, or its lean changes.
-        tipped: whether that is by so much that it is refused in a push.
+        flat: (n,) the pushes in which it moves in the table's plane.
+        upright: (n,) those in which it stays on its face, and turns about the vertical.
+        tipped: whether it leans by so much that it is refused, in any push.
         turned: how far it turns in the push in which it turns most [degrees].
-        askew: share of the pushes in which it turns about other axes than the vertical.
         upside_down: whether its z axis points down.
-        off: how far its middle is from where it is as it stands on the table [m].
+        off: how far its middle is from where it is as it stands on the table, as pushes begin [m].
     """
 
-    rise: float
-    leaning: float
+    flat: Flags
+    upright: Flags
     tipped: bool
     turned: float
-    askew: float
     upside_down: bool
     off: float
 
     @property
-    def flat(self) -> bool:
-        """Whether it moves in the table's plane."""
-        return self.rise < FLAT
+    def stands(self) -> Flags:
+        """(n,) the pushes in which it does what an object on a table does."""
+        return self.flat & self.upright
 
     @property
-    def upright(self) -> bool:
-        """Whether it stays on its face, or what looks so."""
-        return max(self.leaning, self.askew) <= SOME
+    def seldom(self) -> bool:
+        """Whether that is not so in more than some of the pushes: objects tip, and are lifted."""
+        return bool(np.mean(~self.stands) > SOME)
 
     @property
-    def odd(self) -> bool:
-        """Whether no object on a table does so, or hardly any: one that is on its head and is not seen to turn."""
-        return not self.flat or not self.upright or (self.upside_down and self.turned < TURNED)
+    def on_its_head(self) -> bool:
+        """Whether it is upside down and is not seen to turn, which would show that it is."""
+        return self.upside_down and self.turned < TURNED
 
 
 def likelier_reading(recording: Recording) -> Reading | None:
-    """By which the object stands on the table and moves in its plane, in all pushes.
+    """By which the object stands on the table in many pushes in which it does not as it is read.
 
-    None where it does as it is read, and where it does by no other reading. One by which it stands on its feet is
-    likelier than one by which it stands on its head, unless it is seen to turn.
+    None where there is none, or nothing is odd. One by which it stands on its feet is likelier than one by which it
+    stands on its head, unless it is seen to turn.
     """
     here = standing_of(recording)
-    if not here.odd:
+    if not (here.seldom or here.on_its_head):
         return None
     found = []
-    for reading in readings_of(recording, turned=not here.flat):
+    for reading in readings_of(recording, turned=bool(np.mean(~here.flat) > SOME)):
         other = _standing_by(recording, reading)
-        if other is None or not (other.flat and other.leaning == other.askew == 0.0):
-            continue
-        if here.flat and here.upright and other.upside_down:
-            continue
-        changes = (reading.axes is not None) + (reading.roll != 0)
-        found.append(((changes, other.upside_down, other.off), reading))
-    return min(found, key=lambda pair: pair[0])[1] if found else None
+        if other is not None and _is_likelier(other, here):
+            changes = (reading.axes is not None) + (reading.roll != 0)
+            found.append((float(other.stands.mean()), (changes, other.upside_down, other.off), reading))
+    most = max((share for share, _, _ in found), default=0.0)
+    alike = [(rank, reading) for share, rank, reading in found if share > most - LITTLE]
+    return min(alike, key=lambda pair: pair[0])[1] if alike else None
+
+
+def _is_likelier(other: Standing, here: Standing) -> bool:
+    """Whether a reading explains pushes that another does not, and hardly the other way round."""
+    gained = int((other.stands & ~here.stands).sum())
+    lost = int((here.stands & ~other.stands).sum())
+    if not here.seldom:
+        return lost == 0 and not other.upside_down
+    if gained > HALF * len(here.stands) and lost <= LITTLE * gained:
+        return True
+    # Where objects are carried as well, the table's height tells.
+    return gained > SOME * len(here.stands) and lost <= HALF * gained and other.off <= here.off
 
 
 def misread(recording: Recording) -> str:
@@ -132,10 +144,10 @@ def misread(recording: Recording) -> str:
     reading = likelier_reading(recording)
     if reading is None:
         return ""
-    here, instead = standing_of(recording), f"stands on the table if {reading.says} ({reading.remedy})"
-    if not here.flat:
+    instead = f"stands on the table if {reading.says} ({reading.remedy})"
+    if reading.axes is not None:
         return f"the object moves in a vertical plane; it moves in the table's plane and {instead}"
-    if not here.upright:
+    if standing_of(recording).seldom:
         return f"the object leans, or turns about other axes than the vertical; it {instead}"
     return f"the object stands on its head and hardly turns; it {instead}"
 
@@ -194,29 +206,19 @@ def standing_of(recording: Recording) -> Standing:
     """How the object stands and moves."""
     shape = recording.object.shape
     streams = [push.object for push in recording.pushes]
-    height = solid_of(shape).height
-    ways, rises = np.array([_ways(stream) for stream in streams]).T
-    middles = [float(np.median(stream.positions[:, 2])) for stream in streams]
-    rise = 0.0
-    if rises.max() > RISES:
-        rise = float(np.sqrt((rises**2).sum() / ((ways**2).sum() + (rises**2).sum())))
-    off = float(np.median(np.abs(np.array(middles) - 0.5 * height)))
-    turning = [stream for stream in streams if stream.rotation == "full"]
-    if not turning or (isinstance(shape, Cylinder) and shape.axis == "y"):
-        return Standing(rise=rise, leaning=0.0, tipped=False, turned=0.0, askew=0.0, upside_down=False, off=off)
-    either = isinstance(shape, Box | Cylinder)  # upside down it is the same
-    leans = [_leans(stream, either) for stream in turning]
-    tipped = [float(np.quantile(lean, 0.95)) > TIPPED for lean in leans]
-    changed = [float(np.ptp(np.quantile(lean, [0.05, 0.95]))) > LEANS for lean in leans]
-    about, across = _turns(turning)
+    begins = np.array([float(np.median(stream.positions[:END, 2])) for stream in streams])
+    rolls = isinstance(shape, Cylinder) and shape.axis == "y"
+    seen = [stream.rotation == "full" and not rolls for stream in streams]
+    leans = [_leans(stream, isinstance(shape, Box | Cylinder)) for stream in streams]  # upside down they are the same
+    turns = [_turns(stream) for stream in streams]
+    upright = [not s or _stays(lean, turn) for s, lean, turn in zip(seen, leans, turns, strict=True)]
     return Standing(
-        rise=rise,
-        leaning=float(np.mean(np.logical_or(tipped, changed))),
-        tipped=any(tipped),
-        turned=float(np.hypot(about, across).max(initial=0.0)),
-        askew=float(np.mean(across > np.maximum(TURNED, MOSTLY * about))) if len(about) else 0.0,
-        upside_down=float(np.median([np.median(_cosines(stream)) for stream in turning])) < 0.0,
-        off=off,
+        flat=np.array([_is_flat(stream) for stream in streams]),
+        upright=np.array(upright),
+        tipped=any(s and float(np.quantile(lean, 0.95)) > TIPPED for s, lean in zip(seen, leans, strict=True)),
+        turned=max(math.hypot(*turn) for turn in turns),
+        upside_down=any(seen) and float(np.median([np.median(_cosines(stream)) for stream in streams])) < 0.0,
+        off=float(np.median(np.abs(begins - 0.5 * solid_of(shape).height))),
     )
 
 
@@ -227,10 +229,17 @@ def _standing_by(recording: Recording, reading: Reading) -> Standing | None:
         return None
 
 
-def _ways(stream: PoseStream) -> tuple[float, float]:
-    """How far an object goes in the plane and along the vertical [m], but for a few samples."""
+def _is_flat(stream: PoseStream) -> bool:
+    """Whether an object moves in the plane, but for a few samples."""
     x, y, z = np.ptp(np.quantile(stream.positions, [0.05, 0.95], axis=0), axis=0).tolist()
-    return math.hypot(x, y), z
+    return bool(z <= max(RISES, FLAT * math.hypot(x, y)))
+
+
+def _stays(leans: Array, turns: tuple[float, float]) -> bool:
+    """Whether an object with leans (n,) stays on its face, and turns about the vertical."""
+    low, high = np.quantile(leans, [0.05, 0.95]).tolist()
+    about, across = turns
+    return high <= TIPPED and high - low <= LEANS and across <= max(TURNED, MOSTLY * about)
 
 
 def _cosines(stream: PoseStream) -> Array:
@@ -245,18 +254,16 @@ def _leans(stream: PoseStream, either: bool) -> Array:
     return np.asarray(np.degrees(np.arccos(np.clip(np.abs(cosines) if either else cosines, -1.0, 1.0))))
 
 
-def _turns(streams: list[PoseStream]) -> tuple[Array, Array]:
-    """How far objects have turned about the vertical and about other axes (n,) [degrees], of pushes of some poses."""
-    turns = np.degrees([_turn(stream) for stream in streams if len(stream) >= 2 * END]).reshape(-1, 3)
-    return np.abs(turns[:, 2]), np.hypot(turns[:, 0], turns[:, 1])
-
-
-def _turn(stream: PoseStream) -> Array:
+def _turns(stream: PoseStream) -> tuple[float, float]:
+    """How far an object has turned about the vertical, and about other axes [degrees]; not at all of few poses."""
+    if len(stream) < 2 * END:
+        return 0.0, 0.0
     first, last = (
         Rotation.from_quat(np.roll(stream.quaternions[part], -1, axis=1)).mean()
         for part in (slice(END), slice(-END, None))
     )
-    return np.asarray((last * first.inv()).as_rotvec())
+    x, y, z = np.degrees((last * first.inv()).as_rotvec()).tolist()
+    return abs(z), math.hypot(x, y)
 
 
 def _read_as(stream: PoseStream, frame: SourceFrame, reading: Reading) -> PoseStream:
