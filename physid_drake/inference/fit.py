@@ -20,6 +20,7 @@ from physid_drake.inference.push import (
     cost_of,
     held_out,
     noise_scale_of,
+    normal_equations,
     weighed,
     without,
 )
@@ -399,12 +400,4 @@ class Fitter:
         """Of z (n, n), the per-push parameters integrated out."""
         h = fit.hypothesis
         precision, _ = normal_equations(fit.weighed, h.mean - fit.point.z, h.precision)
-        return np.asarray(np.linalg.pinv(precision))
-
-
-def normal_equations(found: Sequence[Weighed], mean: Array, precision: Array) -> tuple[Array, Array]:
-    """Precision (n, n) of dz, and precision times estimate (n,), with a prior of such a mean and precision."""
-    whole = sum((one.precision for one in found), precision)
-    right = sum((one.right for one in found), precision @ mean)
-    ridge = 1e-12 * float(np.trace(whole)) * np.eye(len(right))
-    return np.asarray(whole + ridge), np.asarray(right)
+        return np.asarray(np.linalg.inv(precision))

@@ -177,3 +177,19 @@ def without(fold: Sequence[int], mean: Array, precision: Array, found: Sequence[
     values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
     root = scale[:, None] * vectors / np.sqrt(np.maximum(values, TOO_ALIKE))
     return root @ (root.T @ right), root
+
+
+def normal_equations(found: Sequence[Weighed], mean: Array, precision: Array) -> tuple[Array, Array]:
+    """Precision (n, n) of dz, and precision times estimate (n,), with a prior of such a mean and precision."""
+    whole = sum((one.precision for one in found), precision)
+    right = sum((one.right for one in found), precision @ mean)
+    return ridged(np.asarray(whole)), np.asarray(right)
+
+
+def ridged(precision: Array) -> Array:
+    """A precision (n, n) that can be inverted: 1e-12 more of each variance's inverse, whatever the units.
+
+    What nothing says anything about gets that part of the trace instead.
+    """
+    size = np.diag(precision)
+    return precision + np.diag(1e-12 * np.where(size > 0.0, size, float(size.sum())))

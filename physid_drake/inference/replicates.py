@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from physid_drake.inference.fit import Fit, Fitter
+from physid_drake.inference.push import ridged
 from physid_drake.inference.scatter import log_prior_of_scatter, scatters_beside
 from physid_drake.inference.scores import Column, by_family
 
@@ -152,8 +153,7 @@ class _Table:
         """
         index = np.array([*range(self.n), *(self.n + j for j in members)], dtype=np.intp)
         blocks, rights = self.precisions[:, index[:, None], index], self.rights[:, index]
-        whole, right = self.prior[np.ix_(index, index)] + blocks.sum(axis=0), rights.sum(axis=0)
-        whole = whole + 1e-12 * float(np.trace(whole)) * np.eye(len(index))
+        whole, right = ridged(self.prior[np.ix_(index, index)] + blocks.sum(axis=0)), rights.sum(axis=0)
         # Of replicates the fitted model is true, and what is known beforehand is about it.
         right[: self.n, 0] -= self.h.precision @ self.off
         inverse, log_det = np.linalg.inv(whole), np.linalg.slogdet(whole)[1]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from physid_drake.effects import Coordinate, Effect, Family
 from physid_drake.inference.bounded import bounded
 from physid_drake.inference.fit import Fit, Fitter
-from physid_drake.inference.push import weighed
+from physid_drake.inference.push import ridged, weighed
 from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.inference.scatter import log_prior_of_scatter, scatters_beside
 from physid_drake.inference.slopes import slope
@@ -170,8 +170,7 @@ def _equations(fitter: Fitter, fit: Fit, found: Sequence[Column], scatter: float
 
 def _solved(precision: Array, right: Array, index: list[int], some: Sequence[Column]) -> tuple[float, Array]:
     """Gain in log likelihood of some coordinates, the last of which are those of columns, and where they end."""
-    block, r = precision[np.ix_(index, index)], right[index]
-    block = block + 1e-12 * float(np.trace(block)) * np.eye(len(index))
+    block, r = ridged(precision[np.ix_(index, index)]), right[index]
     free = [np.inf] * (len(index) - len(some))
     least = [-one for one in free] + [c.coordinate.lower - c.null for c in some]
     most = free + [c.coordinate.upper - c.null for c in some]
