@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from physid_drake.door import Parser, enter, path, say_error
+from physid_drake.command import Parser, path, run_command, say_error
 from physid_drake.errors import ConfigError
 from physid_drake.recording import Recording
 from physid_drake.run_folder import made_with, write_whole
@@ -26,7 +26,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit status: 0 done, 1 an error of the input or output, 130 interrupted.
     """
-    return enter(lambda: _run(argv))
+    return run_command(lambda: _run(argv))
 
 
 def _run(argv: Sequence[str] | None) -> int:

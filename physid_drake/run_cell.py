@@ -12,8 +12,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from rich.console import Console
 
+from physid_drake.command import DONE, Parser, path, run_command
 from physid_drake.diagnose import Diagnosis, DiagnosisSystem, Examined, diagnose_from, model_of
-from physid_drake.door import DONE, Parser, enter, path
 from physid_drake.errors import ConfigError
 from physid_drake.identify import Identification, Identifier, OnlineIdentifier, in_the_cell, with_prior
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
@@ -70,7 +70,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         run(_parser().parse_args(argv), terminal())
         return DONE
 
-    return enter(begin, interrupted="interrupted; the same command resumes from what has been saved, if anything has")
+    return run_command(
+        begin, interrupted="interrupted; the same command resumes from what has been saved, if anything has"
+    )
 
 
 def _parser() -> argparse.ArgumentParser:

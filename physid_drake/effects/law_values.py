@@ -22,8 +22,8 @@ ROLLING = 1.5  # of a solid cylinder that rolls: what a force across its axis se
 
 
 def object_at(
-    *, place: complex = 0j, velocity: complex = 0j, yaw_rate: float = 0.0, points: Sequence[complex] | Complex = (0j,),
-    mass: float = 1.0, time: float = 0.0, span: float = 1e-4,
+    *, place: complex = 0j, velocity: complex = 0j, yaw_rate: float = 0.0,
+    points: Sequence[complex] | Complex = (0j,), mass: float = 1.0, time: float = 0.0, span: float = 1e-4,
 ) -> ObjectState:  # fmt: skip
     """An object on a level table as a law sees it, with its axes along those of W and its mass in the middle.
 

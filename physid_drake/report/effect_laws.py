@@ -71,7 +71,7 @@ def _stribeck(effect: Any, view: TableView) -> tuple[Figure, str]:
     mu = view.friction or 1.0
     up = "friction with the table" if view.friction else "friction relative to the baseline model"
     figure, axes, speeds = _curve(view, 3.0 * effect.speed, "slip speed [m/s]", up)
-    friction = mu * _factors(effect, speeds + 0j).real
+    friction = mu * _factors(effect, speeds.astype(np.complex128)).real
     axes.plot(speeds, friction, color=AFTER, linewidth=1.8)
     axes.axhline(mu, color=BEFORE, linewidth=1.0, linestyle="--")
     axes.set_ylim(0.0, 1.15 * max(mu, float(friction.max())))

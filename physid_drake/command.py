@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final, NoReturn, TextIO
 
 from physid_drake.errors import ConfigError, PhysidError
-from physid_drake.starting import is_interruption
+from physid_drake.process_start import is_interruption
 from physid_drake.wording import in_one_line, shown
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130  # exit status
@@ -51,7 +51,7 @@ def path(text: str) -> Path:
     return Path(text)
 
 
-def enter(run: Callable[[], int], *, interrupted: str = "interrupted") -> int:
+def run_command(run: Callable[[], int], *, interrupted: str = "interrupted") -> int:
     """Run a command to its end.
 
     Args:
