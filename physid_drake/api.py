@@ -38,7 +38,8 @@ from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
 from physid_drake.report.progress import DIAGNOSIS_STAGES, progress_bar
 from physid_drake.report.terminal import terminal
 from physid_drake.run_diagnose import COMMAND, write
-from physid_drake.run_folder import RunFolder, write_whole
+from physid_drake.run_folder import RunFolder
+from physid_drake.whole_files import write_whole
 
 __all__ = [
     "Answer",

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from physid_drake.command import Parser, path, run_command, say_error
 from physid_drake.errors import ConfigError
 from physid_drake.recording import Recording
-from physid_drake.run_folder import made_with, write_whole
+from physid_drake.versions import made_with
+from physid_drake.whole_files import write_whole
 
 if TYPE_CHECKING:
     Subparsers = argparse._SubParsersAction[Parser]

@@ -15,7 +15,7 @@ from typing import Any, Final, NoReturn, TextIO
 
 from physid_drake.errors import ConfigError, PhysidError
 from physid_drake.process_start import is_interruption
-from physid_drake.wording import in_one_line, shown
+from physid_drake.wording import cause_of, in_one_line, shown
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130  # exit status
 NUMBER: Final = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
@@ -46,8 +46,7 @@ def path(text: str) -> Path:
     except (FileNotFoundError, NotADirectoryError, PermissionError):
         pass
     except (OSError, ValueError) as error:
-        cause = getattr(error, "strerror", None) or str(error)
-        raise argparse.ArgumentTypeError(f"{shown(text)} is no path: {cause}.") from error
+        raise argparse.ArgumentTypeError(f"{shown(text)} is no path: {cause_of(error)}.") from error
     return Path(text)
 
 
@@ -75,7 +74,7 @@ def run_command(run: Callable[[], int], *, interrupted: str = "interrupted") -> 
         return _failed("there is not enough memory for this.")
     except OSError as error:
         if error.filename is not None:  # a folder that may not be looked into, say
-            return _failed(f"'{error.filename}': {error.strerror or error}.")
+            return _failed(f"'{error.filename}': {cause_of(error)}.")
         if not _is_of_output(error):
             raise
         return _without_output(error)

@@ -14,6 +14,8 @@ import sys
 from pathlib import Path
 from typing import Any, Final
 
+from physid_drake.wording import cause_of
+
 MOST_BYTES: Final = 64_000_000
 GROWN: Final = 1_000_000
 """Bytes that a file may have grown by since it was opened."""
@@ -71,8 +73,7 @@ def read_bytes(path: Path | str, *, most: int = MOST_BYTES) -> bytes:
     except FileNotFoundError as error:
         raise MissingFileError("there is no such file") from error
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL
-        cause = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise FileError(f"cannot be read: {cause[:80]}") from error
+        raise FileError(f"cannot be read: {cause_of(error)[:80]}") from error
     if len(content) > most:
         raise FileError(_too_large(most))
     return content
@@ -92,8 +93,7 @@ def check_plain(path: Path | str) -> None:
     except FileNotFoundError as error:
         raise MissingFileError("there is no such file") from error
     except (OSError, ValueError) as error:
-        cause = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise FileError(f"cannot be read: {cause[:80]}") from error
+        raise FileError(f"cannot be read: {cause_of(error)[:80]}") from error
 
 
 def sha256_of(path: Path | str) -> str:

@@ -49,12 +49,13 @@ from physid_drake.report.scene_page import scene_page
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
 from physid_drake.report.terminal import terminal
 from physid_drake.run_diagnose import ALPHA, STATE, show, write
-from physid_drake.run_folder import RunFolder, made_with, named_after, versions
+from physid_drake.run_folder import RunFolder, named_after
 from physid_drake.run_plan import FILES as PLAN
 from physid_drake.run_plan import forget as forget_plan
 from physid_drake.run_plan import write as write_plan
 from physid_drake.scenario import config_folders, dump_scenario, load_scenario
 from physid_drake.scenario_schema import Scenario
+from physid_drake.versions import made_with, versions
 
 COMMAND = "run_cell"
 BELIEF = "belief.npz"  # of an interrupted identification

@@ -15,8 +15,8 @@ from physid_drake.inference.fit import Fitter
 from physid_drake.inference.predictions import Predictor
 from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.progress import Progress
-from physid_drake.run_folder import part_of
 from physid_drake.search import SearchResult, search_minimum, search_named
+from physid_drake.whole_files import part_of
 
 Array = NDArray[np.float64]
 

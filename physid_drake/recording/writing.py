@@ -28,7 +28,7 @@ from physid_drake.recording.reading import (
 )
 from physid_drake.recording.values import Hand, PoseStream, Push, Recording, Sensors
 from physid_drake.recording.yaml_lines import Dumper
-from physid_drake.wording import shown
+from physid_drake.wording import cause_of, shown
 
 
 def write_recording(recording: Recording, folder: Path) -> None:
@@ -62,7 +62,7 @@ def write_recording(recording: Recording, folder: Path) -> None:
     except OutputError:
         raise
     except OSError as error:
-        raise OutputError(f"{folder}: cannot be written: {error.strerror or error}.") from error
+        raise OutputError(f"{folder}: cannot be written: {cause_of(error)}.") from error
 
 
 def _write_into(recording: Recording, files: list[str], staging: Path) -> None:

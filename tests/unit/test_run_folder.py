@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from physid_drake.errors import ConfigError, OutputError
-from physid_drake.run_folder import LOCK, MANIFEST, RunFolder, named_after, write_whole
+from physid_drake.run_folder import LOCK, MANIFEST, RunFolder, named_after
+from physid_drake.whole_files import write_whole
 
 RUN = "run_cell"
 FILES = {"state": ("state.npz",), "results": ("result.json",)}

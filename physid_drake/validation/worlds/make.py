@@ -28,7 +28,7 @@ from physid_drake.recording import (
     Recording,
     write_recording,
 )
-from physid_drake.run_folder import RunFolder, write_whole
+from physid_drake.run_folder import RunFolder
 from physid_drake.validation.sealing.seal import LINES, RECORDING, SEALED, TOTAL, files_digest, write_seal
 from physid_drake.validation.sealing.secret import Secret, keep_secret, name_by_seed
 from physid_drake.validation.worlds.contact import RESIDUAL_RESTITUTION
@@ -42,6 +42,7 @@ from physid_drake.validation.worlds.scene import Rng, Scene, draw_scene
 from physid_drake.validation.worlds.sensing import record, recording_of
 from physid_drake.validation.worlds.shapes import Array
 from physid_drake.validation.worlds.world_plan import Motion
+from physid_drake.whole_files import write_whole
 
 COMMAND: Final = "prove"
 """Whose the folder is, also one that is made by hand."""
