@@ -19,8 +19,9 @@ from rich.table import Table
 
 from physid_drake.errors import PhysidError
 from physid_drake.validation.report.proof import MAIN, POWER, outcomes_in, said_of, truth_of
-from physid_drake.validation.scoring.figures import figures_of, power_table, table
+from physid_drake.validation.scoring.figures import figures_of
 from physid_drake.validation.scoring.score import read_outcomes
+from physid_drake.validation.scoring.tables import power_table, table
 from physid_drake.validation.sealing.seal import SEALED, check_seal, read_seal
 
 FAULTS = ("world", "truth", "sigma", "said")
