@@ -17,7 +17,7 @@ from physid_drake.errors import ConfigError, PhysidError
 from physid_drake.process_start import is_interruption
 from physid_drake.wording import cause_of, in_one_line, shown
 
-DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130  # exit status
+DONE, FAILED, INTERRUPTED = 0, 1, 130  # exit status; 2 is argparse's, of a wrong command line
 NUMBER: Final = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 """What begins with a dash and is no flag; argparse alone takes -1e-1 for one."""
 _GONE: Final = (errno.EBADF, errno.EPIPE)  # whoever read standard output

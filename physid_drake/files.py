@@ -79,6 +79,14 @@ def read_bytes(path: Path | str, *, most: int = MOST_BYTES) -> bytes:
     return content
 
 
+def is_there(path: Path) -> bool:
+    """Whether something has that name; nothing has one that is too long for any file."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
+
+
 def check_plain(path: Path | str) -> None:
     """Refuse what is no plain file, before a library opens it.
 
@@ -134,18 +142,14 @@ def read_text(path: Path | str, *, most: int = MOST_BYTES) -> str:
         raise NotTextError(content[: error.start].count(b"\n") + 1) from error
 
 
-def read_json(path: Path | str, *, most: int = MOST_BYTES) -> Any:
-    """What a file of JSON says.
-
-    Args:
-        path: of the file; links are followed.
-        most: bytes that it may have.
+def read_json(path: Path | str) -> Any:
+    """What a file of JSON says, of 64 MB at most; links are followed.
 
     Raises:
         MissingFileError: if it is not there.
         FileError: if it cannot be read as text, or is no JSON.
     """
-    text = read_text(path, most=most)
+    text = read_text(path)
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:

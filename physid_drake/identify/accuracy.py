@@ -24,7 +24,6 @@ class Accuracy:
         position, rotation: of place and yaw [m, rad]; NaN of a yaw that was not measured.
         end_position, end_rotation: in the last window of each [m, rad].
         force: of the hand's force [N]; NaN where none was compared.
-        force_per_push: of the force of each, in standard deviations; NaN of those without.
         diverged: pushes that could not be simulated, which are left out.
     """
 
@@ -35,7 +34,6 @@ class Accuracy:
     end_position: float
     end_rotation: float
     force: float
-    force_per_push: tuple[float, ...]
     diverged: int = 0
 
 
@@ -45,7 +43,6 @@ def accuracy_of(case: Case, errors: Sequence[Array | None]) -> Accuracy:
     poses = [f.poses(e) for f, e in made]
     forces = [f.forces(e) for f, e in made]
     scaled = [(p / f.sigmas)[:, : f.dofs] for (f, _), p in zip(made, poses, strict=True)]
-    scaled_forces = [p / f.force_sigmas for (f, _), p in zip(made, forces, strict=True)]
     turned = _joined([p for (f, _), p in zip(made, poses, strict=True) if f.dofs == 3])[:, 2]
     turned_last = np.array([p[-1, 2] for (f, _), p in zip(made, poses, strict=True) if f.dofs == 3])
     every, last = _joined(poses), np.array([p[-1] for p in poses]).reshape(-1, 3)
@@ -53,7 +50,7 @@ def accuracy_of(case: Case, errors: Sequence[Array | None]) -> Accuracy:
         rms=rms(np.concatenate([np.zeros(0), *map(np.ravel, scaled)])), per_push=tuple(rms(s) for s in scaled),
         position=math.sqrt(2.0) * rms(every[:, :2]), rotation=rms(turned),
         end_position=math.sqrt(2.0) * rms(last[:, :2]), end_rotation=rms(turned_last),
-        force=math.sqrt(2.0) * rms(_joined(forces, 2)), force_per_push=tuple(rms(s) for s in scaled_forces),
+        force=math.sqrt(2.0) * rms(_joined(forces, 2)),
         diverged=len(errors) - len(made),
     )  # fmt: skip
 

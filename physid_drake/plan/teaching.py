@@ -30,6 +30,8 @@ Pose = tuple[float, float, float]
 
 RATE = 100.0  # Hz of the recording that is expected
 AFTER = 1.0  # s recorded after the hand has stopped
+SCATTER = 1.0  # of friction from push to push, in units of UNIT_SCATTER
+NOISE_SCALE = 1.0  # times the noise: as where the cell explains the pushes
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,10 +59,6 @@ def most_informative_push(
     start: Pose,
     thetas: Array,
     information: Array | None = None,
-    scatter: float = 1.0,
-    noise_scale: float = 1.0,
-    order: int = 0,
-    hand_height: float | None = None,
 ) -> Lesson:
     """Of planned pushes, the one that is expected to teach most about theta.
 
@@ -76,10 +74,6 @@ def most_informative_push(
         thetas: (d,) the estimate, or (k, d) draws from the belief, each entry in its unit; each costs
             2 + nuisance parameters + d rollouts a push.
         information: (d, d) what is known, in the unit cube, such as ``OnlineBelief.information``; None is the prior.
-        scatter: of friction from push to push, in units of ``UNIT_SCATTER``.
-        noise_scale: times the noise, where the cell does not explain the pushes.
-        order: number of the push in the recording.
-        hand_height: of the tip's contact above the table [m]; None for half the object's height.
 
     Raises:
         ConfigError: if there is no push, the cell has no hand, or a push cannot be made.
@@ -92,12 +86,10 @@ def most_informative_push(
         raise ConfigError("next push: the cell has no hand.")
     known = baseline_hypothesis(case).precision if information is None else information
     points = np.atleast_2d(np.asarray(thetas, dtype=np.float64))
-    problems = [
-        dc.replace(_problem(push, case, start, order, hand_height), name=f"next {k}") for k, push in enumerate(pushes)
-    ]
+    problems = [_problem(f"next {k}", push, case, start) for k, push in enumerate(pushes)]
     gains, expected = np.zeros(len(pushes)), np.zeros((len(pushes), *known.shape))
     for theta in points:
-        told = _informations(case, problems, theta, scatter, noise_scale)
+        told = _informations(case, problems, theta)
         expected += told / len(points)
         gains += 0.5 * (np.linalg.slogdet(known + told)[1] - np.linalg.slogdet(known)[1]) / len(points)
     covariances = np.linalg.inv(known + expected)
@@ -107,9 +99,7 @@ def most_informative_push(
     )  # fmt: skip
 
 
-def _informations(
-    case: Case, problems: Sequence[PushProblem], theta: Array, scatter: float, noise_scale: float
-) -> Array:
+def _informations(case: Case, problems: Sequence[PushProblem], theta: Array) -> Array:
     """Information (n, d, d) of each push at theta (d,); zero where the rollout diverged or fell."""
     d = case.thetas.space.dimension
     told = np.zeros((len(problems), d, d))
@@ -137,8 +127,8 @@ def _informations(
         point = fitter.points([h], [z], [fitter.at_rest()])[0]
     assert point is not None
     pushed = fitter.started([h], [point], [None])[0].pushes
-    for k, push, prior in zip(kept, pushed, fitter.priors(scatter), strict=True):
-        told[k] = weighed(push.residual, push.shared, push.nuisance, prior, noise_scale, NO_TAIL).precision
+    for k, push, prior in zip(kept, pushed, fitter.priors(SCATTER), strict=True):
+        told[k] = weighed(push.residual, push.shared, push.nuisance, prior, NOISE_SCALE, NO_TAIL).precision
     return told
 
 
@@ -153,7 +143,7 @@ def _push(problem: PushProblem, case: Case) -> Push:
     return Push(name=problem.name, object=planar_poses(problem.times, problem.poses, height), hand=None, force=None)
 
 
-def _problem(push: PlannedPush, case: Case, start: Pose, order: int, hand_height: float | None) -> PushProblem:
+def _problem(name: str, push: PlannedPush, case: Case, start: Pose) -> PushProblem:
     """The push as its recording would be fitted; its poses are still to be foreseen."""
     spec = case.pool.spec
     assert spec.hand_radius is not None
@@ -161,8 +151,8 @@ def _problem(push: PlannedPush, case: Case, start: Pose, order: int, hand_height
     path = push.path(start, solid.outline, spec.hand_radius)
     times = np.arange(math.ceil((float(path.times[-1]) + AFTER) * RATE)) / RATE
     return PushProblem(
-        name="next", order=order, begin=0.0, end=float(times[-1]), start=Start(pose=start),
+        name=name, order=0, begin=0.0, end=float(times[-1]), start=Start(pose=start),
         start_std=case.sensors.mean_std(LEAD * RATE), path=path,
-        hand_height=0.5 * solid.height if hand_height is None else hand_height, times=times,
+        hand_height=0.5 * solid.height, times=times,
         poses=np.zeros((len(times), 3)), force_times=np.zeros(0), forces=np.zeros((0, 2)), force_std=np.zeros(0),
     )  # fmt: skip

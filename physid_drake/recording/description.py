@@ -263,7 +263,7 @@ def push_entries(top: Section, folder: Path) -> list[tuple[str, Path, str]]:
         path = inside(folder, name)
         if path is None:
             raise section.refuse("file", f"must lie inside the recording's folder, but got {shown(name)}; move it.")
-        if not _is_there(path):
+        if not files.is_there(path):
             raise section.refuse("file", f"missing file {shown(name)}; add it or remove this push.")
         if path in taken:
             raise section.refuse("file", f"{shown(name)} is listed twice; remove one.")
@@ -275,14 +275,6 @@ def push_entries(top: Section, folder: Path) -> list[tuple[str, Path, str]]:
 def _plain_name(name: str, path: Path, folder: Path) -> str:
     """A push's name as it is when the recording is written: within the folder, without ``./`` and ``//``."""
     return os.path.relpath(path, folder.resolve()) if os.path.isabs(name) else os.path.normpath(name)  # noqa: PTH117
-
-
-def _is_there(path: Path) -> bool:
-    """Whether it is there; a name that is too long for any file is not."""
-    try:
-        return path.exists()
-    except OSError:
-        return False
 
 
 def _shape_from(section: Section, kind: str, folder: Path) -> Shape:
@@ -297,7 +289,7 @@ def _shape_from(section: Section, kind: str, folder: Path) -> Shape:
         return Prism(polygon=polygon, height=section.number("height_m"))
     name = section.text("file")
     path = inside(folder, name)
-    if path is None or not _is_there(path):
+    if path is None or not files.is_there(path):
         problem = "must lie inside the recording's folder" if path is None else "is missing"
         raise RecordingError(f"the mesh {shown(name)} {problem}; put it into the folder.")
     shape = MeshShape(file=path, scale=section.number("scale") if section.has("scale") else 1.0)

@@ -21,6 +21,8 @@ SIZES: Final = (2.0, 30.0)
 """Drawn sizes of effects, in standard deviations of the tracker."""
 STILL: Final = 1e-4
 """What moves by more without a hand does not stand [m]: such a world is drawn anew, too."""
+LOOK: Final = 0.2
+"""For how long it is looked at [s]."""
 _CALIBRATION_PUSHES: Final = 4
 _CALIBRATION_ROUNDS: Final = 3
 
@@ -49,11 +51,11 @@ def loaded(scene: Scene, effects: Sequence[Effect]) -> bool:
     return stays_loaded(functools.reduce(lambda plan, effect: effect.build(plan), effects, scene.plan))
 
 
-def stands(scene: Scene, effects: Sequence[Effect], seconds: float = 0.2) -> bool:
+def stands(scene: Scene, effects: Sequence[Effect]) -> bool:
     """Whether the object rests where each push begins: effects may drag it away."""
     world = PushWorld(scene.plan, effects, pushes=len(scene.pushes))
     for k, push in enumerate(scene.pushes):
-        motion = world.run(push.pose, None, push=k, friction_factor=push.friction_factor, duration=seconds)
+        motion = world.run(push.pose, None, push=k, friction_factor=push.friction_factor, duration=LOOK)
         if float(np.linalg.norm(motion.true_poses[-1, :2] - np.array(push.pose[:2]))) > STILL:
             return False
     return True
