@@ -1,4 +1,4 @@
-"""How well pushes are predicted: errors in units that a person can check."""
+"""How well pushes are predicted: root mean square errors in physical units and in units of tracker noise."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ class Accuracy:
     """Root mean square errors of pushes, over the windows that are compared.
 
     Attributes:
-        rms: of their poses, in standard deviations.
-        per_push: the same of each.
-        position, rotation: of place and yaw [m, rad]; NaN of a yaw that was not measured.
-        end_position, end_rotation: in the last window of each [m, rad].
-        force: of the hand's force [N]; NaN where none was compared.
-        diverged: pushes that could not be simulated, which are left out.
+        rms: of x, y and yaw, in units of tracker noise.
+        per_push: the same for each push.
+        position: of the distance in the plane [m].
+        rotation: of the yaw [rad]; NaN where no yaw was measured.
+        end_position: of the distance in each push's last window [m].
+        end_rotation: of the yaw in each push's last window [rad].
+        force: of the size of the hand's force [N]; NaN where none was compared.
+        diverged: number of pushes that could not be simulated, which are not in the errors.
     """
 
     rms: float
@@ -38,7 +40,13 @@ class Accuracy:
 
 
 def accuracy_of(case: Case, errors: Sequence[Array | None]) -> Accuracy:
-    """Of what was recorded less what was predicted of each push (m_i,), in the features' units; None: no rollout."""
+    """The accuracy of predictions.
+
+    Args:
+        case: the recording, made ready.
+        errors: per push (m,), recorded less predicted features, in the features' units; None where there is no
+            rollout.
+    """
     made = [(f, e) for f, e in zip(case.features, errors, strict=True) if e is not None]
     poses = [f.poses(e) for f, e in made]
     forces = [f.forces(e) for f, e in made]
@@ -60,5 +68,5 @@ def _joined(parts: Sequence[Array], width: int = 3) -> Array:
 
 
 def rms(values: Array) -> float:
-    """Root mean square; NaN of nothing."""
+    """Root mean square; NaN of an empty array."""
     return float(np.sqrt(np.mean(np.square(values)))) if values.size else math.nan
