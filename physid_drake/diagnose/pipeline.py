@@ -1,4 +1,4 @@
-"""A diagnosis from the first fit to the answer."""
+"""The whole diagnosis, from the first fit to the answer."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from physid_drake.progress import Progress
 from physid_drake.pushes.case import Case
 from physid_drake.pushes.kept_rollouts import KeptRollouts
 
-RIVALS = 3  # at most, that a push is looked for which tells them apart
+RIVALS = 3  # most rivals that the next push is to distinguish
 
 
 def diagnose(
@@ -38,12 +38,16 @@ def diagnose(
     """Diagnose a recording.
 
     Args:
-        case: the recording, ready.
-        seed: of everything random.
+        case: the recording, made ready.
+        seed: random seed.
         alpha: false-alarm rate of the detection.
-        effects: names of the catalogue to look at; None for all.
-        progress: called with the stage, steps done, steps in all.
-        kept: rollouts of a run that was interrupted, which goes on from there to the same answer.
+        effects: names of the catalogue to look for; None for all.
+        progress: called with the stage, steps done and steps in all.
+        kept: rollouts that an interrupted run has kept; with them the answer is the same, to the last digit.
+
+    Raises:
+        ConfigError: if an effect's name is unknown, or none of them can be in such a recording.
+        RecordingError: if no push can be rolled out.
     """
     case.pool.kept = KeptRollouts() if kept is None else kept
     applicable(case.around, effects)  # an unknown name is refused before anything is simulated
@@ -60,7 +64,18 @@ def diagnose_from(
     effects: Sequence[str] | None = None,
     progress: Progress | None = None,
 ) -> tuple[Diagnosis, Evidence]:
-    """Diagnose what an identification leaves; arguments as of ``diagnose``."""
+    """Diagnose what an identification leaves unexplained.
+
+    Args:
+        known: the identification.
+        seed: random seed.
+        alpha: false-alarm rate of the detection.
+        effects: names of the catalogue to look for; None for all.
+        progress: called with the stage, steps done and steps in all.
+
+    Raises:
+        ConfigError: if an effect's name is unknown, or none of them can be in such a recording.
+    """
     say: Progress = progress or (lambda stage, done, total: None)
     evidence = gathered(known, seed=seed, alpha=alpha, effects=effects, progress=say)
     return conclude(evidence, seed=seed, alpha=alpha), evidence
@@ -69,10 +84,10 @@ def diagnose_from(
 def gathered(
     known: Identification, *, seed: int, alpha: float, effects: Sequence[str] | None, progress: Progress
 ) -> Evidence:
-    """All that needs rollouts. Arguments as of ``diagnose``."""
+    """All parts of a diagnosis that need rollouts; arguments as of ``diagnose_from``."""
     kinds = applicable(known.case.around, effects)
     found = searched(known.finder, known.found, kinds, seed=seed, alpha=alpha, progress=progress)
-    if found.odd and not known.case.noise.known:  # of noise that nobody states, the kind is unknown, too
+    if found.odd and not known.case.noise.known:  # an unknown noise may be process noise
         progress("process noise", 0, 0)
         rough, added = learned(found.fitter, found.richest)
         if not rough.is_none:
@@ -87,7 +102,7 @@ def gathered(
     best = None if decision.best is None else judge.judged(freed(found.fitter, decision.best.fit))
     after = before if best is None else judge.left_out(best)
     if decision.verdict == "unexplained" and accuracy_of(case, after).rms > accuracy_of(case, before).rms:
-        best, after = None, before  # likelier, and yet no nearer
+        best, after = None, before  # a higher likelihood, but larger held-out errors
     evidence = Evidence(
         known=known, found=found, decision=decision, fitter=judge.fitter, best=best, errors_after=after,
         errors_partly=None if decision.partly is None else judge.left_out(decision.partly.fit),

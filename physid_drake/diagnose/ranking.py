@@ -1,4 +1,4 @@
-"""What became of each effect of the catalogue, and why."""
+"""The ranking: what each effect of the catalogue gains, and why it was found or not."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from physid_drake.inference.scores import scores
 
 
 def ranking_of(evidence: Evidence, classes: Sequence[Sequence[str]]) -> tuple[Ranked, ...]:
-    """All effects, best first, alone: what each gains, fitted or by its columns, and why it was found or not.
+    """All effects, each alone beside the baseline, best first.
 
     Args:
-        evidence: what was fitted.
-        classes: of each effect that is named, those that may stand in its place.
+        evidence: all that was fitted.
+        classes: of each effect that is named, names of the effects that cannot be distinguished from it.
     """
     found = evidence.found
     alone = {kinds_of(one)[0].name: one for one in found.named if len(kinds_of(one)) == 1}
