@@ -1,4 +1,4 @@
-"""The next push that teaches most: the expected information about theta of pushes that were not made yet."""
+"""The most informative push: the expected information about theta of pushes that were not made yet."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ NOISE_SCALE = 1.0  # times the noise: as where the cell explains the pushes
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Lesson:
-    """What pushes are expected to teach.
+    """The expected information of pushes.
 
     Attributes:
-        best: index of the push that teaches most.
-        gains: (n,) expected information of each push about theta [log likelihood]; 0 where its rollout diverged or
-            fell off the table.
-        informations: (n, d, d) expected information of each push, in the unit cube of theta.
+        best: index of the push with the largest gain.
+        gains: (n,) expected decrease of the entropy of theta [nats]; 0 where the rollout diverges or the object
+            falls.
+        informations: (n, d, d) expected information matrix of each push, for theta in the unit cube.
         stds: (n, d) posterior standard deviations after each push, in the unit cube.
     """
 
@@ -60,25 +60,26 @@ def most_informative_push(
     thetas: Array,
     information: Array | None = None,
 ) -> Lesson:
-    """Of planned pushes, the one that is expected to teach most about theta.
+    """The planned push that is expected to be most informative about theta.
 
-    A push's information is that of a recording at 100 Hz with the recording's noise, its nuisance parameters
-    marginalised as in the fit: simulated Jacobians, no approximation of the mechanics. But the hand's path is taken
-    for exact: a noisy hand teaches less than is expected. The gain is half the rise of the log-determinant of the
-    Gaussian information, averaged over ``thetas``: what a Gaussian belief is expected to lose in entropy.
+    A push's information matrix is that of a recording at 100 Hz with the recording's noise, its nuisance parameters
+    marginalised as in the fit, with derivatives by differences of rollouts. The hand's path is taken as exact; with a
+    noisy hand the information is smaller. The gain is half the increase of the log-determinant of the information,
+    averaged over ``thetas``: the expected decrease of a Gaussian's entropy.
 
     Args:
-        pushes: to choose from, for instance ``policy.pushes(settings)[0]`` of drawn settings.
-        case: a recording with the same object, hand and sensors.
+        pushes: to choose from, for instance ``policy.pushes(settings)[0]`` of sampled settings.
+        case: a recording with the same object, hand and sensors, made ready.
         start: of the object, x, y [m], yaw [rad].
-        thetas: (d,) the estimate, or (k, d) draws from the belief, each entry in its unit; each costs
-            2 + nuisance parameters + d rollouts a push.
-        information: (d, d) what is known, in the unit cube, such as ``OnlineBelief.information``; None is the prior.
+        thetas: (d,) the estimate, or (k, d) posterior samples, each entry in its unit. Each takes 2 + d + number of
+            nuisance parameters rollouts a push.
+        information: (d, d) current information in the unit cube, such as ``OnlineBelief.information``; None is the
+            prior's.
 
     Raises:
-        ConfigError: if there is no push, the cell has no hand, or a push cannot be made.
+        ConfigError: if there is no push, the cell has no hand, or the hand would miss the object.
 
-    Source: V. Fedorov, Theory of Optimal Experiments, 1972 (D-optimality); D. Lindley, Ann. Math. Stat. 27, 1956.
+    Source: V. Fedorov, Theory of Optimal Experiments, 1972, for D-optimality; D. Lindley, Ann. Math. Stat. 27, 1956.
     """
     if not pushes:
         raise ConfigError("next push: at least one push is needed to choose from.")
