@@ -157,3 +157,9 @@ def subdivided(times: Array, pieces: int) -> Array:
     """Times (k,) with each interval cut into equal pieces: ((k - 1) pieces + 1,)."""
     inner = np.arange((len(times) - 1) * pieces + 1) / pieces
     return times.copy() if pieces == 1 else np.interp(inner, np.arange(len(times)), times)
+
+
+def straight_path(start: Array, end: Array, begin: float, duration: float) -> HandPath:
+    """A straight path at constant speed from ``start`` to ``end`` (2,) [m]."""
+    velocity = (end - start) / duration
+    return HandPath(times=np.array([begin, begin + duration]), velocities=np.array([velocity, velocity]), start=start)

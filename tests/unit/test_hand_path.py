@@ -8,7 +8,7 @@ from scipy.integrate import quad
 
 from physid_drake.cell import HandPath
 from physid_drake.cell.hand_fit import stream_std
-from physid_drake.cell.hand_path import subdivided
+from physid_drake.cell.hand_path import straight_path, subdivided
 
 
 def some_path(seed=0, knots=6):
@@ -51,6 +51,11 @@ def test_the_hand_rests_before_and_after():
     early, late = path.positions(np.array([path.times[0] - 5.0, path.times[-1] + 5.0]))
     assert np.array_equal(early, path.start)
     np.testing.assert_allclose(late, path.knot_positions()[-1], atol=1e-16)
+
+
+def test_a_straight_path_ends_where_it_should():
+    path = straight_path(np.array([0.1, 0.2]), np.array([0.4, -0.1]), 1.0, 0.5)
+    np.testing.assert_allclose(path.positions(np.array([1.0, 1.25, 1.5])), [[0.1, 0.2], [0.25, 0.05], [0.4, -0.1]])
 
 
 def test_a_faster_path_keeps_its_middle_and_its_times():

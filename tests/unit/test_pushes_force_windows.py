@@ -5,11 +5,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hand_paths import straight_path
 from problems import QUIET
 from runs import shipped_pushes
 
 from physid_drake.cell import HandPath
+from physid_drake.cell.hand_path import straight_path
 from physid_drake.pushes import force_windows
 from physid_drake.pushes.force_windows import SHARE, _resting, _standing, _touching
 from physid_drake.pushes.problem import problems_of

@@ -9,10 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import yaml
-from hand_paths import straight_path
 
 from physid_drake import load_model, run_diagnose
 from physid_drake.cell import Body, CellConfig, Start
+from physid_drake.cell.hand_path import straight_path
 from physid_drake.cli import main
 from physid_drake.diagnose.exported import hand_frame
 from physid_drake.effects.body import UnevenSupport
