@@ -40,12 +40,14 @@ class Decision:
             predicts them better than the baseline. None where nothing is missing, or nothing helps.
         rivals: hypotheses that these pushes cannot tell from it, best first; each differs in one effect.
         partly: effects that take a part of what nothing explains away.
+        refuted: a hypothesis that makes held-out pushes likelier and yet predicts them no nearer.
     """
 
     verdict: str
     best: Weighed | None = None
     rivals: tuple[Weighed, ...] = ()
     partly: Weighed | None = None
+    refuted: Weighed | None = None
 
     @property
     def effects(self) -> tuple[type[Effect], ...]:
@@ -80,10 +82,8 @@ def decided(found: Found, *, most: float) -> Decision:
         return Decision(verdict="underpowered")
     every = [*found.named, *found.unnamed]
     missing = found.odd and any(confirmed(found, one) for one in every)
-    quiet = found.baseline.noise_scale <= most and found.alike >= ADEQUATE
-    if not missing and quiet:
-        # So much is left by chance more seldom than was asked for, and yet held-out pushes confirm nothing.
-        return Decision(verdict="underpowered" if found.rare else "consistent")
+    if not missing and _is_noise(found, most):
+        return _nothing_claimed(found, most)
     nameless = next((one for one in found.unnamed if confirmed(found, one)), None)
     best = simplest(found)
     if best is None:
@@ -95,6 +95,38 @@ def decided(found: Found, *, most: float) -> Decision:
         return Decision(verdict="unexplained", best=nameless, partly=best)
     alike = tuple(one for one in found.named if _in_class(one, best))
     return Decision(verdict="ambiguous" if alike else "explained", best=best, rivals=alike)
+
+
+def refuted(found: Found, decision: Decision, *, most: float, partly: bool) -> Decision:
+    """The decision where held-out pushes are likelier with its best hypothesis, and yet predicted no nearer.
+
+    Args:
+        found: all hypotheses.
+        decision: as ``decided`` has it.
+        most: as there.
+        partly: whether they are predicted nearer with the effects that take a part away.
+    """
+    if partly:
+        return dc.replace(decision, best=None, refuted=decision.best)
+    return dc.replace(_nothing_claimed(found, most), refuted=decision.best)
+
+
+def _is_noise(found: Found, most: float) -> bool:
+    """Whether what the baseline leaves is noise, and frictions differ by no more than those of surfaces do."""
+    return found.baseline.noise_scale <= most and found.alike >= ADEQUATE
+
+
+def _nothing_claimed(found: Found, most: float) -> Decision:
+    """What is said where no hypothesis is confirmed."""
+    if not _is_noise(found, most):
+        return Decision(verdict="unexplained")
+    # So much is left by chance more seldom than was asked for, and yet held-out pushes confirm nothing.
+    return Decision(verdict="underpowered" if found.rare else "consistent")
+
+
+def is_nearer(after: Accuracy, before: Accuracy) -> bool:
+    """Whether held-out pushes are predicted nearer: their poses, or the forces of the hand."""
+    return after.rms <= before.rms or after.force < before.force
 
 
 def is_own_error(left_out: Accuracy) -> bool:
