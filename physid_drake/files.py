@@ -32,7 +32,7 @@ _KINDS: Final = (
 class FileError(OSError):
     """A file cannot be read; the message is the end of a sentence that begins with its name.
 
-    Those who read turn it into their room's error, which names the file.
+    Those who read turn it into their package's error, which names the file.
     """
 
 

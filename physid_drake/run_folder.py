@@ -30,6 +30,18 @@ def named_after(name: str) -> str:
     return re.sub(r"[^\w.-]+", "_", name)[:100].strip("._") or "recording"
 
 
+def named_after_model(path: Path) -> str:
+    """The name of a folder for what is made of a model: that of the model's folder, or of a file of another name.
+
+    Args:
+        path: the folder of a run or a diagnosis, its ``model.yaml``, or a file such as ``mug.yaml``.
+    """
+    place = path.resolve()
+    if not place.is_dir():
+        place = place.parent if place.name == "model.yaml" else place.with_suffix("")
+    return named_after(place.name)
+
+
 def settings_text(command: str, settings: Mapping[str, Any]) -> str:
     """The text of ``settings.json``: which command wrote the folder, and with what."""
     return json.dumps({"command": command, **settings}, indent=2) + "\n"

@@ -41,12 +41,15 @@ class Decision:
             missing.
         rivals: hypotheses that these pushes cannot distinguish from it, best first; each differs in one effect.
         partly: where the verdict is ``unexplained``, effects that explain a part of the mismatch.
+        refuted: a hypothesis with a higher likelihood of held-out pushes, whose predictions are no nearer; None where
+            there is none.
     """
 
     verdict: str
     best: Weighed | None = None
     rivals: tuple[Weighed, ...] = ()
     partly: Weighed | None = None
+    refuted: Weighed | None = None
 
     @property
     def effects(self) -> tuple[type[Effect], ...]:
@@ -84,10 +87,8 @@ def decided(found: Found, *, most: float) -> Decision:
         return Decision(verdict="underpowered")
     every = [*found.named, *found.unnamed]
     missing = found.odd and any(confirmed(found, one) for one in every)
-    quiet = found.baseline.noise_scale <= most and found.alike >= ADEQUATE
-    if not missing and quiet:
-        # The p-value is below what was asked for, but held-out pushes confirm no effect.
-        return Decision(verdict="underpowered" if found.rare else "consistent")
+    if not missing and _is_noise(found, most):
+        return _nothing_claimed(found, most)
     nameless = next((one for one in found.unnamed if confirmed(found, one)), None)
     best = simplest(found)
     if best is None:
@@ -99,6 +100,38 @@ def decided(found: Found, *, most: float) -> Decision:
         return Decision(verdict="unexplained", best=nameless, partly=best)
     alike = tuple(one for one in found.named if _in_class(one, best))
     return Decision(verdict="ambiguous" if alike else "explained", best=best, rivals=alike)
+
+
+def refuted(found: Found, decision: Decision, *, most: float, partly: bool) -> Decision:
+    """The decision where the best hypothesis raises the likelihood of held-out pushes, but predicts them no nearer.
+
+    Args:
+        found: all hypotheses.
+        decision: of ``decided``.
+        most: largest noise scale [-] at which errors count as noise.
+        partly: whether the effects that explain a part of the mismatch predict held-out pushes nearer.
+    """
+    if partly:
+        return dc.replace(decision, best=None, refuted=decision.best)
+    return dc.replace(_nothing_claimed(found, most), refuted=decision.best)
+
+
+def _is_noise(found: Found, most: float) -> bool:
+    """Whether what the baseline leaves is noise, and frictions differ by no more than those of surfaces do."""
+    return found.baseline.noise_scale <= most and found.alike >= ADEQUATE
+
+
+def _nothing_claimed(found: Found, most: float) -> Decision:
+    """What is said where no hypothesis is confirmed."""
+    if not _is_noise(found, most):
+        return Decision(verdict="unexplained")
+    # The p-value is below what was asked for, but held-out pushes confirm no effect.
+    return Decision(verdict="underpowered" if found.rare else "consistent")
+
+
+def is_nearer(after: Accuracy, before: Accuracy) -> bool:
+    """Whether held-out pushes are predicted nearer: their poses, or the hand's force."""
+    return after.rms <= before.rms or after.force < before.force
 
 
 def is_own_error(left_out: Accuracy) -> bool:

@@ -5,13 +5,25 @@ from __future__ import annotations
 import dataclasses as dc
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from physid_drake.diagnose.conclude import conclude
-from physid_drake.diagnose.decide import FEWEST_PUSHES, Decision, decided, is_own_error, kinds_of, most_noise_scale
+from physid_drake.diagnose.decide import (
+    FEWEST_PUSHES,
+    Decision,
+    decided,
+    is_nearer,
+    is_own_error,
+    kinds_of,
+    most_noise_scale,
+    refuted,
+)
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.hypotheses import freed
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
 from physid_drake.diagnose.next_push import next_push
-from physid_drake.diagnose.search import Weighed, searched
+from physid_drake.diagnose.search import Found, Weighed, searched
 from physid_drake.diagnose.values import Diagnosis
 from physid_drake.effects import applicable
 from physid_drake.identify import Identification, identified, identified_with
@@ -22,6 +34,8 @@ from physid_drake.inference.rollouts import Physics
 from physid_drake.progress import Progress
 from physid_drake.pushes.case import Case
 from physid_drake.pushes.kept_rollouts import KeptRollouts
+
+Array = NDArray[np.float64]
 
 RIVALS = 3  # most rivals that the next push is to distinguish
 
@@ -93,26 +107,44 @@ def gathered(
         if not rough.is_none:
             known = identified_with(known, rough, added, seed=seed, progress=progress)
             found = searched(known.finder, known.found, kinds, seed=seed, alpha=alpha, progress=progress)
-    case, plain, before = known.case, known.fit, known.errors
-    decision = decided(found, most=most_noise_scale(case.noise))
     progress("effects in the Drake cell", 0, 0)
-    judge = Judge(known.finder)
-    if len(case.problems) >= FEWEST_PUSHES and is_own_error(accuracy_of(case, before)):
-        decision = Decision(verdict="consistent")
-    best = None if decision.best is None else judge.judged(freed(found.fitter, decision.best.fit))
-    after = before if best is None else judge.left_out(best)
-    if decision.verdict == "unexplained" and accuracy_of(case, after).rms > accuracy_of(case, before).rms:
-        best, after = None, before  # a higher likelihood, but larger held-out errors
-    evidence = Evidence(
-        known=known, found=found, decision=decision, fitter=judge.fitter, best=best, errors_after=after,
-        errors_partly=None if decision.partly is None else judge.left_out(decision.partly.fit),
-    )  # fmt: skip
+    evidence = judged(known, found)
+    case, plain, decision = known.case, known.fit, evidence.decision
     if decision.verdict in ("consistent", "underpowered"):
         return evidence
     progress("missing wrench", 0, 0)
     wrenches = with_phases(case, missing_wrenches(found.fitter, plain))
     progress("next push", 0, 0)
     return dc.replace(evidence, wrenches=wrenches, next_push=next_push(case, _rivals(found.named, decision)))
+
+
+def judged(known: Identification, found: Found) -> Evidence:
+    """The decision, with its hypotheses refined in the Drake cell.
+
+    Effects and unnamed forces are claimed only if they predict held-out pushes nearer than the baseline.
+
+    Args:
+        known: the identification.
+        found: all hypotheses, fitted on the twin.
+    """
+    case, before, judge, most = known.case, known.errors, Judge(known.finder), most_noise_scale(known.case.noise)
+    decision = decided(found, most=most)
+    if len(case.problems) >= FEWEST_PUSHES and is_own_error(accuracy_of(case, before)):
+        decision = Decision(verdict="consistent")
+    partly = None if decision.partly is None else judge.left_out(decision.partly.fit)
+    best = None if decision.best is None else judge.judged(freed(found.fitter, decision.best.fit))
+    after = before if best is None else judge.left_out(best)
+    if best is not None and not _nearer(case, after, before):
+        best, after = None, before
+        decision = refuted(found, decision, most=most, partly=partly is not None and _nearer(case, partly, before))
+    return Evidence(
+        known=known, found=found, decision=decision, fitter=judge.fitter, best=best, errors_after=after,
+        errors_partly=None if decision.partly is None else partly,
+    )  # fmt: skip
+
+
+def _nearer(case: Case, after: Sequence[Array], before: Sequence[Array]) -> bool:
+    return is_nearer(accuracy_of(case, after), accuracy_of(case, before))
 
 
 def _rivals(named: Sequence[Weighed], decision: Decision) -> list[Physics]:

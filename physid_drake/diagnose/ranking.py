@@ -51,6 +51,12 @@ def _why(name: str, one: Weighed | None, named: set[str], alike: set[str], evide
         return "cannot be simulated" if evidence.found.odd else "no larger gain than by chance"
     if not confirmed(evidence.found, one):
         return "not confirmed by held-out pushes"
-    if named:
+    return _why_confirmed(name, named, evidence.decision.refuted)
+
+
+def _why_confirmed(name: str, named: set[str], refuted: Weighed | None) -> str:
+    if refuted is not None and name in {kind.name for kind in kinds_of(refuted)}:
+        return "held-out pushes are likelier with it, but not predicted better"
+    if named or refuted is not None:
         return "smaller gain on held-out pushes"
     return "confirmed by held-out pushes, but more than noise remains"
