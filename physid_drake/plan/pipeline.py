@@ -197,23 +197,23 @@ def plan(
         raise ConfigError(
             "plan: --risk needs posterior samples (--draws above 0), and a model with intervals to sample from."
         )
-    story = _Story(model, drawn, policy, cost, situation, progress or (lambda stage, done, total: None))
-    objective = story.mean_costs if risk else story.likely_costs
+    rollouts = _Rollouts(model, drawn, policy, cost, situation, progress or (lambda stage, done, total: None))
+    objective = rollouts.mean_costs if risk else rollouts.likely_costs
     found = search_minimum(
         objective, policy.space, policy.space.sample(streams[1], CANDIDATES, from_prior=False),
         search_named(search), budget=budget, rng=streams[2], refine_every=REFINE_EVERY, entropy_tolerance=0.0,
-        on_trial=lambda belief: story.tell_search(belief, budget),
+        on_trial=lambda belief: rollouts.tell_search(belief, budget),
     )  # fmt: skip
-    tried = story.best if math.isfinite(story.best[1]) else (np.array(found.theta_best), math.inf)
-    rows = story.sweep(tried[0], sweep)
+    tried = rollouts.best if math.isfinite(rollouts.best[1]) else (np.array(found.theta_best), math.inf)
+    rows = rollouts.sweep(tried[0], sweep)
     best = _better(policy, tried, rows, risk=risk)
-    predicted = story.trajectory(model, best)
+    predicted = rollouts.trajectory(model, best)
     pushes = policy.pushes(best)
     # With risk, fresh samples: on those that were minimised over, the cost is too low.
     told = spread_of(fresh if risk else drawn, pushes, cost, model=model, situation=situation) if drawn else None
     return Plan(
         model=model, policy=policy, cost_function=cost, situation=situation, tolerance=tolerance, settings=best,
-        predicted=predicted, cost=cost_of(cost, predicted, model.table), loss=story.loss,
+        predicted=predicted, cost=cost_of(cost, predicted, model.table), loss=rollouts.loss,
         spread=told, sweep=rows, search=found, risk=risk,
     )  # fmt: skip
 
@@ -318,7 +318,7 @@ def _check(budget: int, draws: int, sweep: int, tolerance: float, search: str) -
     search_named(search)
 
 
-class _Story:
+class _Rollouts:
     """The rollouts of one plan."""
 
     def __init__(
