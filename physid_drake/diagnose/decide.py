@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.search import Found, Weighed
+from physid_drake.diagnose.search import Found, Scored
 from physid_drake.effects import Effect
 from physid_drake.identify import Accuracy
 from physid_drake.inference.replicates import surprise, without_best
@@ -46,10 +46,10 @@ class Decision:
     """
 
     verdict: str
-    best: Weighed | None = None
-    rivals: tuple[Weighed, ...] = ()
-    partly: Weighed | None = None
-    refuted: Weighed | None = None
+    best: Scored | None = None
+    rivals: tuple[Scored, ...] = ()
+    partly: Scored | None = None
+    refuted: Scored | None = None
 
     @property
     def effects(self) -> tuple[type[Effect], ...]:
@@ -140,7 +140,7 @@ def is_own_error(left_out: Accuracy) -> bool:
     return left_out.position < OWN_ERROR[0] and not left_out.rotation >= OWN_ERROR[1]
 
 
-def confirmed(found: Found, one: Weighed, beside: Weighed | None = None) -> bool:
+def confirmed(found: Found, one: Scored, beside: Scored | None = None) -> bool:
     """Whether held-out pushes confirm a hypothesis.
 
     Its gain must be one that the same effect has by chance with a probability below ``CONFIRMED``. The gain of a
@@ -170,12 +170,12 @@ def surely_better(gains: Array) -> bool:
     return bool(without_best(gains) > MARGIN)
 
 
-def kinds_of(one: Weighed) -> tuple[type[Effect], ...]:
+def kinds_of(one: Scored) -> tuple[type[Effect], ...]:
     """Classes of a hypothesis's effects."""
     return tuple(part.kind for part in one.fit.hypothesis.parts)
 
 
-def simplest(found: Found) -> Weighed | None:
+def simplest(found: Found) -> Scored | None:
     """The hypothesis to report: of those that the best one is not clearly better than, one with the fewest effects.
 
     All must be confirmed. A hypothesis with more effects is clearly better only if they are confirmed and their gain
@@ -193,20 +193,20 @@ def simplest(found: Found) -> Weighed | None:
     return (limits or few)[0]
 
 
-def _worth(found: Found, best: Weighed, other: Weighed) -> bool:
+def _worth(found: Found, best: Scored, other: Scored) -> bool:
     """Whether a hypothesis is surely better than another; an effect more has to be confirmed, and no little one."""
     if len(kinds_of(best)) > len(kinds_of(other)):
         return confirmed(found, best, other) and best.gain - other.gain > LITTLE * other.gain
     return surely_better(best.gains - other.gains)
 
 
-def _is_limit(one: Weighed, other: Weighed) -> bool:
+def _is_limit(one: Scored, other: Scored) -> bool:
     """Whether a hypothesis is another one's in a limit: a tether far away is a tilt."""
     mine, its = set(kinds_of(one)), set(kinds_of(other))
     return any(k.name in o.limits for k in mine - its for o in its - mine) and len(mine - its) == 1
 
 
-def _in_class(one: Weighed, best: Weighed) -> bool:
+def _in_class(one: Scored, best: Scored) -> bool:
     """Whether pushes do not tell a hypothesis from the best, and it is not merely what that is a limit of."""
     mine, its = kinds_of(best), kinds_of(one)
     if one is best or len(its) != len(mine) or len(set(mine) - set(its)) != 1:

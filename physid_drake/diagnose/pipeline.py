@@ -23,7 +23,7 @@ from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.hypotheses import freed
 from physid_drake.diagnose.localise import missing_wrenches, with_phases
 from physid_drake.diagnose.next_push import next_push
-from physid_drake.diagnose.search import Found, Weighed, searched
+from physid_drake.diagnose.search import Found, Scored, searched
 from physid_drake.diagnose.values import Diagnosis
 from physid_drake.effects import applicable
 from physid_drake.identify import Identification, identified, identified_with
@@ -147,7 +147,7 @@ def _nearer(case: Case, after: Sequence[Array], before: Sequence[Array]) -> bool
     return is_nearer(accuracy_of(case, after), accuracy_of(case, before))
 
 
-def _rivals(named: Sequence[Weighed], decision: Decision) -> list[Physics]:
+def _rivals(named: Sequence[Scored], decision: Decision) -> list[Physics]:
     """The models in question: what was decided on and those it cannot be told from, or the next best instead."""
     best = decision.best
     if best is None or decision.verdict == "unexplained":

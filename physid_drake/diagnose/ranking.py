@@ -9,7 +9,7 @@ import numpy as np
 from physid_drake.diagnose.decide import confirmed, kinds_of
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.regimes import standard_error
-from physid_drake.diagnose.search import Weighed
+from physid_drake.diagnose.search import Scored
 from physid_drake.diagnose.values import Ranked
 from physid_drake.inference.replicates import surprise, without_best
 from physid_drake.inference.scores import scores
@@ -42,7 +42,7 @@ def ranking_of(evidence: Evidence, classes: Sequence[Sequence[str]]) -> tuple[Ra
     )
 
 
-def _why(name: str, one: Weighed | None, named: set[str], alike: set[str], evidence: Evidence) -> str:
+def _why(name: str, one: Scored | None, named: set[str], alike: set[str], evidence: Evidence) -> str:
     if name in named:
         return "found"
     if name in alike:
@@ -54,7 +54,7 @@ def _why(name: str, one: Weighed | None, named: set[str], alike: set[str], evide
     return _why_confirmed(name, named, evidence.decision.refuted)
 
 
-def _why_confirmed(name: str, named: set[str], refuted: Weighed | None) -> str:
+def _why_confirmed(name: str, named: set[str], refuted: Scored | None) -> str:
     if refuted is not None and name in {kind.name for kind in kinds_of(refuted)}:
         return "held-out pushes are likelier with it, but not predicted better"
     if named or refuted is not None:

@@ -28,7 +28,7 @@ SINGLES = 4  # effects, beside each of which a second one is looked for
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
-class Weighed:
+class Scored:
     """A fitted hypothesis, with its gains on held-out pushes.
 
     Attributes:
@@ -59,7 +59,7 @@ class Found:
     Attributes:
         fitter: of all fits.
         baseline: the fit without effects, with the errors that all pushes may share.
-        alike: of the baseline, as in ``Weighed``.
+        alike: of the baseline, as in ``Scored``.
         columns: of the catalogue's effects at the baseline.
         linearly: by an effect's name, its linearised gain on held-out pushes without the largest [log likelihood].
         p_value: of the best of these gains.
@@ -81,10 +81,10 @@ class Found:
     by_chance: dict[str, Array]
     rare: bool
     odd: bool
-    named: tuple[Weighed, ...] = ()
+    named: tuple[Scored, ...] = ()
     left: float = 1.0
     left_gain: float = 0.0
-    unnamed: tuple[Weighed, ...] = ()
+    unnamed: tuple[Scored, ...] = ()
 
     @property
     def richest(self) -> Fit:
@@ -168,15 +168,15 @@ class _Search:
         seen, by_chance = gains_by_chance(self._fitter, fit, beside, self._rng, of_all)
         return dc.replace(found, left=p_value(seen, by_chance), left_gain=max(seen.values()))
 
-    def ranked(self, fits: Sequence[Fit]) -> tuple[Weighed, ...]:
+    def ranked(self, fits: Sequence[Fit]) -> tuple[Scored, ...]:
         """The fits with what each gains over the baseline, best first."""
         made = [
-            Weighed(fit=fit, gains=self._fitter.held_out(fit) - self._before, alike=_alike(self._fitter, fit))
+            Scored(fit=fit, gains=self._fitter.held_out(fit) - self._before, alike=_alike(self._fitter, fit))
             for fit in fits
         ]
         return tuple(sorted(made, key=lambda one: -one.gain))
 
-    def _with_best_polished(self, fits: Sequence[Fit]) -> tuple[Weighed, ...]:
+    def _with_best_polished(self, fits: Sequence[Fit]) -> tuple[Scored, ...]:
         """Ranked, when the best one is polished: it may not have been the best before."""
         ranked = self.ranked(fits)
         for _ in range(POLISHINGS):

@@ -16,7 +16,7 @@ from physid_drake.diagnose.decide import (
     refuted,
     surely_better,
 )
-from physid_drake.diagnose.search import Found, Weighed
+from physid_drake.diagnose.search import Found, Scored
 from physid_drake.effects.drag import QuadraticDrag, ViscousDrag
 from physid_drake.effects.fields import Magnet, TableTilt, Tether
 from physid_drake.effects.friction import FrictionDrift
@@ -34,7 +34,7 @@ def hypothesis(*kinds, gain, noise_scale=1.0, alike=0.5):
     parts = tuple(SimpleNamespace(kind=kind) for kind in kinds)
     name = " + ".join(sorted(kind.name for kind in kinds))
     fit = SimpleNamespace(hypothesis=SimpleNamespace(parts=parts, name=name), noise_scale=noise_scale)
-    return Weighed(fit=fit, gains=np.broadcast_to(gain, (PUSHES,)).astype(float), alike=alike)
+    return Scored(fit=fit, gains=np.broadcast_to(gain, (PUSHES,)).astype(float), alike=alike)
 
 
 def found(*named, unnamed=(), odd=True, left=0.5, left_gain=20.0, plain=1.0, alike=0.5, pushes=PUSHES,
