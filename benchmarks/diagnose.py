@@ -19,8 +19,9 @@ from rich.table import Table
 
 from physid_drake.errors import PhysidError
 from physid_drake.validation.report.proof import MAIN, POWER, outcomes_in, said_of, truth_of
-from physid_drake.validation.scoring.figures import figures_of, power_table, table
+from physid_drake.validation.scoring.figures import figures_of
 from physid_drake.validation.scoring.score import read_outcomes
+from physid_drake.validation.scoring.tables import power_table, table
 from physid_drake.validation.sealing.seal import SEALED, check_seal, read_seal
 
 FAULTS = ("world", "truth", "sigma", "said")
@@ -50,6 +51,7 @@ def main():
     console.print(shown(f"{len(outcomes)} worlds of {len(folders)} proofs", MAIN, table(figures)))
     console.print(shown("single effects by size", POWER, power_table(figures)))
     console.print(shown("answers that are not right", FAULTS, rows))
+    console.print(no_nearer(outcomes))
     told = {name: answer for folder in folders for name, answer in answers(folder).items()}
     chances = [told[o.id][0] for o in outcomes if o.kind == "none" and o.id in told]
     below = ", ".join(f"below {a:g}: {sum(p < a for p in chances)}" for a in LEVELS)
@@ -59,6 +61,18 @@ def main():
         console.print(
             f"{verdict}: {statistics.median(seconds):.0f} s (median of {len(seconds)}), at most {seconds[-1]:.0f} s"
         )
+
+
+def no_nearer(outcomes):
+    """Of answers with a name, right or not: with how many held-out pushes are predicted no nearer than without it."""
+    named = [o for o in outcomes if o.classes and o.verdict in ("explained", "ambiguous")]
+    right = [o for o in named if o.fault is None]
+    away = [o for o in named if not o.held_out.rms[1] <= o.held_out.rms[0]]
+    wrong, wrongly = len(named) - len(right), sum(o.fault is not None for o in away)
+    return (
+        f"held-out pushes are predicted no nearer with what was named: {len(away) - wrongly} of {len(right)} right"
+        f" answers, {wrongly} of {wrong} others"
+    )
 
 
 def made(worlds, seed):

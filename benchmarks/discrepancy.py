@@ -17,10 +17,9 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import gammaln
 
-from physid_drake.diagnose.hypotheses import baseline, with_tolerances
+from physid_drake.identify.baseline import baseline, with_tolerances
 from physid_drake.inference.discrepancy import ALIKE, WANDERS, WHITE, discrepancy, way_of
 from physid_drake.inference.fit import Fitter
-from physid_drake.inference.hypothesis import Hypothesis
 from physid_drake.inference.predictions import Predictor
 from physid_drake.inference.push import TAIL
 from physid_drake.inference.rollouts import Physics
@@ -69,10 +68,10 @@ def left_of(folder):
     case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=1)
     predictor = Predictor(case)
     fitter = Fitter(case, predictor)
-    fit = baseline(fitter, Hypothesis(space=case.thetas.space, around=case.around), np.random.default_rng(0))
+    fit = baseline(fitter, np.random.default_rng(0))
     physics = Physics(fit.hypothesis.theta(fit.point.z))
     of_path = predictor.path_errors(fit.point.nuisance, physics)
-    fit, _ = with_tolerances(fitter, fit)
+    fit = with_tolerances(fitter, fit)
     wanders = predictor.wanders(fit.point.nuisance, physics)
     pushes = []
     for i, (push, prior) in enumerate(zip(fit.pushes, fitter.priors(fit.scatter), strict=True)):

@@ -24,8 +24,8 @@ from physid_drake.pushes.task import Task
 from physid_drake.recording import read_recording
 from physid_drake.validation.worlds.effects.catalogue import CATALOGUED, OTHERS
 from physid_drake.validation.worlds.floor import floor_of
-from physid_drake.validation.worlds.make import simulate
 from physid_drake.validation.worlds.scene import draw_scene
+from physid_drake.validation.worlds.strengths import simulate
 
 STILL = 1e-5  # m, rad
 ATTEMPTS = 4  # in which a world may have been drawn

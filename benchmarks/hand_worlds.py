@@ -23,9 +23,9 @@ from physid_drake.pushes.case import case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
 from physid_drake.recording import PoseStream, Push, Recording
 from physid_drake.validation.worlds.knobs import draw_knob
-from physid_drake.validation.worlds.make import simulate
 from physid_drake.validation.worlds.scene import DrawnPush, Rng, Scene, draw_scene
 from physid_drake.validation.worlds.sensing import record, recording_of
+from physid_drake.validation.worlds.strengths import simulate
 from physid_drake.validation.worlds.world_plan import HandPath
 
 SPEEDS = (0.01, 0.06)  # m/s, of slow hands

@@ -61,7 +61,7 @@ def main():
     parser.add_argument("recording")
     arguments = parser.parse_args()
     model, recording = load_model(arguments.model), read_recording(recording_folder(arguments.recording))
-    config = cell_config(recording, contact=None, time_step=None)
+    config = cell_config(recording)
     problems = [p for p in case_of(recording, config, ThetaConfig()).problems if p.path is not None]
     print(f"{len(problems)} pushes\ntime step  median             largest            of real time")
     for step in TIME_STEPS:

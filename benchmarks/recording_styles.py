@@ -26,9 +26,8 @@ from reference.planar import Hand, simulate_planar
 from reference.scenes import OBJECTS, TIME_STEP, draw_push
 from twin import shape_of
 
-from physid_drake.diagnose.hypotheses import baseline, with_tolerances
+from physid_drake.identify.baseline import baseline, with_tolerances
 from physid_drake.inference.fit import Fitter
-from physid_drake.inference.hypothesis import Hypothesis
 from physid_drake.inference.predictions import Predictor
 from physid_drake.pushes.case import case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
@@ -177,8 +176,8 @@ def row(name, style, jobs):
     case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=jobs)
     space = case.thetas.space
     fitter = Fitter(case, Predictor(case))
-    fits = [baseline(fitter, Hypothesis(space=space, around=case.around), np.random.default_rng(0))]
-    fits.append(with_tolerances(fitter, fits[0], ())[0])
+    fits = [baseline(fitter, np.random.default_rng(0))]
+    fits.append(with_tolerances(fitter, fits[0]))
     friction = dict(zip(space.names, fits[0].hypothesis.theta(fits[0].point.z), strict=True))["support_friction"]
     costs = [f"{left(fit):.2f}" for fit in fits]
     return name, *costs, f"{friction:.4f}", "; ".join(w[:60] for w in case.warnings)

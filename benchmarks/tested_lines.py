@@ -1,6 +1,6 @@
 """Which lines the tests run: tested_lines.py [coverage.json], after ``pytest -m "slow or not slow" --cov``.
 
-(with ``--cov-report=json``). Prints Markdown: the share of lines by room, and the lines that no test runs, by file.
+(with ``--cov-report=json``). Prints the share of lines by package, and by file the lines that no test runs.
 Compiled code (``twin/``) is run by numba, which coverage does not see; its files are not counted.
 """
 
@@ -16,23 +16,23 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("report", type=Path, nargs="?", default=Path("coverage.json"))
     files = json.loads(parser.parse_args().report.read_text())["files"]
-    rooms = defaultdict(lambda: [0, 0])
+    packages = defaultdict(lambda: [0, 0])
     missing = {}
     for name, found in sorted(files.items()):
         path = Path(name).relative_to("physid_drake")
         if path.parts[0] == "twin" and path.stem in COMPILED:
             continue
-        room = path.parts[0] if len(path.parts) > 1 else "(top level)"
-        rooms[room][0] += found["summary"]["covered_lines"]
-        rooms[room][1] += found["summary"]["num_statements"]
+        package = path.parts[0] if len(path.parts) > 1 else "(top level)"
+        packages[package][0] += found["summary"]["covered_lines"]
+        packages[package][1] += found["summary"]["num_statements"]
         if found["missing_lines"]:
             missing[path] = found["missing_lines"]
-    print("| room | statements | run by tests |\n| --- | --- | --- |")
-    for room, (covered, count) in [
-        *sorted(rooms.items()),
-        ("all", [sum(c) for c in zip(*rooms.values(), strict=True)]),
+    print("| package | statements | run by tests |\n| --- | --- | --- |")
+    for package, (covered, count) in [
+        *sorted(packages.items()),
+        ("all", [sum(c) for c in zip(*packages.values(), strict=True)]),
     ]:
-        print(f"| {room} | {count} | {100.0 * covered / max(count, 1):.1f} % |")
+        print(f"| {package} | {count} | {100.0 * covered / max(count, 1):.1f} % |")
     print("\n| file | lines that no test runs |\n| --- | --- |")
     for path, lines in missing.items():
         print(f"| `{path}` | {', '.join(spans(lines))} |")

@@ -3,7 +3,7 @@
 import sys
 
 if sys.argv[:1] == ["-m"]:  # so it is while Python looks for the module that it was told to run
-    from physid_drake.starting import begin
+    from physid_drake.process_start import begin
 
     begin()
 

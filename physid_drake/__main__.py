@@ -2,7 +2,7 @@
 
 import sys
 
-from physid_drake.starting import is_interruption
+from physid_drake.process_start import is_interruption
 
 
 def main() -> int:

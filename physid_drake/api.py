@@ -1,6 +1,6 @@
-"""What a script or a notebook needs: recordings from arrays, and a diagnosis with its page, in a few lines.
+"""For scripts and notebooks: recordings from arrays, and a diagnosis with its page, in a few lines.
 
-``docs/from_python.md`` shows it at work.
+``docs/from_python.md`` has examples.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ from physid_drake.report.diagnosis_page import diagnosis_page, shown_pushes
 from physid_drake.report.progress import DIAGNOSIS_STAGES, progress_bar
 from physid_drake.report.terminal import terminal
 from physid_drake.run_diagnose import COMMAND, write
-from physid_drake.run_folder import RunFolder, write_whole
+from physid_drake.run_folder import RunFolder
+from physid_drake.whole_files import write_whole
 
 __all__ = [
     "Answer",
@@ -67,18 +68,18 @@ __all__ = [
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answer:
-    """What a diagnosis says of a recording.
+    """The result of a diagnosis.
 
     Attributes:
-        diagnosis: verdict, effects with intervals, errors before and after, and the rest of ``diagnosis.json``.
-        evidence: the fits and hypotheses that it rests on.
+        diagnosis: verdict, effects with intervals, errors before and after, and all else in ``diagnosis.json``.
+        evidence: the fits and hypotheses on which it rests.
     """
 
     diagnosis: Diagnosis
     evidence: Evidence
 
     def __str__(self) -> str:
-        """The verdict in a sentence."""
+        """The verdict, and a sentence about it."""
         return f"{self.diagnosis.verdict}: {self.diagnosis.sentence}"
 
     def json(self) -> str:
@@ -86,10 +87,10 @@ class Answer:
         return diagnosis_json(self.diagnosis)
 
     def save_page(self, file: str | Path) -> None:
-        """Writes the page that shows it; it opens in any browser, without a network.
+        """Write the page that shows the diagnosis; any browser opens it, without a network.
 
         Args:
-            file: its name; what has that name is replaced.
+            file: name of the page; an existing file is replaced.
 
         Raises:
             OutputError: if it cannot be written.
@@ -99,13 +100,13 @@ class Answer:
         write_whole(Path(file), page.encode())
 
     def save(self, folder: str | Path) -> None:
-        """Writes what the ``diagnose`` command writes: ``diagnosis.json``, the page, the scene and ``model.yaml``.
+        """Write what the ``diagnose`` command writes: ``diagnosis.json``, the pages, the scene and ``model.yaml``.
 
         Args:
             folder: new, empty, or of an earlier diagnosis.
 
         Raises:
-            ConfigError: if it holds what somebody else wrote.
+            ConfigError: if it holds anything else.
             OutputError: if it cannot be written.
         """
         RunFolder.check(Path(folder), COMMAND)
@@ -121,20 +122,20 @@ def diagnose(
     jobs: int = 0,
     progress: Progress | None = None,
 ) -> Answer:
-    """Says what physics a recording has that the simulation leaves out.
+    """Find the physics in a recording that the simulation leaves out.
 
     Args:
         recording: the pushes.
-        seed: of everything random.
+        seed: random seed.
         alpha: false-alarm rate of the detection.
-        effects: names of the catalogue to look at; None for all.
+        effects: names of effects of the catalogue to look for; None for all.
         jobs: processes; 0 takes the machine's cores.
         progress: called with the stage, steps done and steps in all; None shows a bar, or lines where there is no
             terminal.
 
     Raises:
         RecordingError: if the recording cannot be compared with a simulation; one line that says why.
-        ConfigError: if there is no effect of such a name.
+        ConfigError: if an effect's name is unknown, or none of them can be in such a recording.
     """
     case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=jobs)
     shown = progress_bar(terminal(), DIAGNOSIS_STAGES) if progress is None else nullcontext(progress)

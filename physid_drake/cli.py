@@ -8,10 +8,11 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from physid_drake.door import Parser, enter, path, say_error
+from physid_drake.command import Parser, path, run_command, say_error
 from physid_drake.errors import ConfigError
 from physid_drake.recording import Recording
-from physid_drake.run_folder import made_with, write_whole
+from physid_drake.versions import made_with
+from physid_drake.whole_files import write_whole
 
 if TYPE_CHECKING:
     Subparsers = argparse._SubParsersAction[Parser]
@@ -26,7 +27,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit status: 0 done, 1 an error of the input or output, 130 interrupted.
     """
-    return enter(lambda: _run(argv))
+    return run_command(lambda: _run(argv))
 
 
 def _run(argv: Sequence[str] | None) -> int:
@@ -55,8 +56,8 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
-EFFECTS = "the effects"
-"""Stands for their names, for which the catalogue is imported only when help is asked for."""
+EFFECTS, SEARCHES = "the effects", "the searches"
+"""Stand for their names, for which the catalogues are imported only when help is asked for."""
 
 
 class _WithEffects(argparse.HelpFormatter):
@@ -67,6 +68,15 @@ class _WithEffects(argparse.HelpFormatter):
             names = ", ".join(sorted(kind.name for kind in known_effects()))
             text = f"effects: {names}. What each one is: docs/effects.md"
         super().add_text(text)
+
+
+class _WithSearches(argparse.HelpFormatter):
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        if action.help != SEARCHES:
+            return super()._get_help_string(action)
+        from physid_drake.search import SEARCHES as KNOWN  # noqa: PLC0415
+
+        return ", ".join(f"{name} (default)" if name == action.default else name for name in KNOWN)
 
 
 class _Version(argparse.Action):
@@ -271,7 +281,9 @@ def _run_prove(arguments: argparse.Namespace) -> int:
 
 
 def _register_plan(subparsers: Subparsers) -> None:
-    parser = subparsers.add_parser("plan", help="find the push that brings the object to a goal, with a model")
+    parser = subparsers.add_parser(
+        "plan", help="find the push that brings the object to a goal, with a model", formatter_class=_WithSearches
+    )
     parser.add_argument(
         "run_folder", nargs="?", type=path, metavar="RUN", help="folder of a run_cell run or a diagnosis"
     )
@@ -304,7 +316,7 @@ def _register_plan(subparsers: Subparsers) -> None:
         "--search",
         default="greedy_entropy",
         metavar="NAME",
-        help="greedy_entropy (default), entropy_search or random",
+        help=SEARCHES,
     )
     parser.add_argument(
         "--budget", type=int, metavar="N", help="candidates evaluated (default: 24, 48 or 64, by policy)"
@@ -312,7 +324,9 @@ def _register_plan(subparsers: Subparsers) -> None:
     parser.add_argument("--draws", type=int, default=20, metavar="N", help="posterior samples (default 20)")
     parser.add_argument("--risk", action="store_true", help="minimise the expected cost")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="random seed (default 0)")
-    parser.add_argument("--out", type=path, metavar="FOLDER", help="output folder (default: plans/RECORDING)")
+    parser.add_argument(
+        "--out", type=path, metavar="FOLDER", help="output folder (default: plans/ and the name of RUN)"
+    )
     parser.set_defaults(run=_run_plan)
 
 
@@ -370,7 +384,8 @@ def _register_model(subparsers: Subparsers) -> None:
         " object, table and hand, and as MJCF; README.txt lists the effects that these formats cannot express.",
     )  # fmt: skip
     export.add_argument("model", type=path, metavar="MODEL", help="model.yaml, or the folder of a run that holds it")
-    export.add_argument("--out", type=path, metavar="FOLDER", help="output folder (default: exports/RECORDING)")
+    export.add_argument("--out", type=path, metavar="FOLDER",
+                        help="output folder (default: exports/ and the name of MODEL's folder)")  # fmt: skip
     export.set_defaults(run=_run_model_export)
 
 

@@ -1,4 +1,4 @@
-"""The errors that a caller of physid_drake may catch: one per room, each also the builtin it resembles."""
+"""The errors that a caller of physid_drake may catch: one per package, each also the builtin it resembles."""
 
 
 class PhysidError(Exception):

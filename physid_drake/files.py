@@ -14,6 +14,8 @@ import sys
 from pathlib import Path
 from typing import Any, Final
 
+from physid_drake.wording import cause_of
+
 MOST_BYTES: Final = 64_000_000
 GROWN: Final = 1_000_000
 """Bytes that a file may have grown by since it was opened."""
@@ -30,7 +32,7 @@ _KINDS: Final = (
 class FileError(OSError):
     """A file cannot be read; the message is the end of a sentence that begins with its name.
 
-    Those who read turn it into their room's error, which names the file.
+    Those who read turn it into their package's error, which names the file.
     """
 
 
@@ -71,11 +73,18 @@ def read_bytes(path: Path | str, *, most: int = MOST_BYTES) -> bytes:
     except FileNotFoundError as error:
         raise MissingFileError("there is no such file") from error
     except (OSError, ValueError) as error:  # ValueError: a path with a NUL
-        cause = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise FileError(f"cannot be read: {cause[:80]}") from error
+        raise FileError(f"cannot be read: {cause_of(error)[:80]}") from error
     if len(content) > most:
         raise FileError(_too_large(most))
     return content
+
+
+def is_there(path: Path) -> bool:
+    """Whether something has that name; nothing has one that is too long for any file."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
 
 
 def check_plain(path: Path | str) -> None:
@@ -92,8 +101,7 @@ def check_plain(path: Path | str) -> None:
     except FileNotFoundError as error:
         raise MissingFileError("there is no such file") from error
     except (OSError, ValueError) as error:
-        cause = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise FileError(f"cannot be read: {cause[:80]}") from error
+        raise FileError(f"cannot be read: {cause_of(error)[:80]}") from error
 
 
 def sha256_of(path: Path | str) -> str:
@@ -134,18 +142,14 @@ def read_text(path: Path | str, *, most: int = MOST_BYTES) -> str:
         raise NotTextError(content[: error.start].count(b"\n") + 1) from error
 
 
-def read_json(path: Path | str, *, most: int = MOST_BYTES) -> Any:
-    """What a file of JSON says.
-
-    Args:
-        path: of the file; links are followed.
-        most: bytes that it may have.
+def read_json(path: Path | str) -> Any:
+    """What a file of JSON says, of 64 MB at most; links are followed.
 
     Raises:
         MissingFileError: if it is not there.
         FileError: if it cannot be read as text, or is no JSON.
     """
-    text = read_text(path, most=most)
+    text = read_text(path)
     try:
         return json.loads(text)
     except json.JSONDecodeError as error:

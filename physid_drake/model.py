@@ -1,4 +1,4 @@
-"""A model that leaves: ``model.yaml`` holds cell, theta and effects, and builds the augmented diagram again."""
+"""The model that is exported: ``model.yaml`` holds cell, parameters and effects, and builds the Drake diagram."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ AS_W: Axes = ((1.0, 0.0), (0.0, 1.0))
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Correlation:
-    """How estimates vary together: that of their normal scores, the parameter of a Gaussian copula.
+    """How estimates vary together: the correlation of their normal scores, the parameter of a Gaussian copula.
 
-    It says nothing of how widely each varies, which is what its interval is for, and is the same for a value and for
-    its logarithm.
+    The width of each estimate's distribution is given by its interval. The correlation is the same for a value and
+    for its logarithm.
 
     Attributes:
         names: of the estimates, as in the intervals.
@@ -67,7 +67,7 @@ class Correlation:
 
     @classmethod
     def of(cls, names: Sequence[str], matrix: Array) -> Correlation:
-        """From a matrix (n, n), which round-off may have left a little off symmetric."""
+        """From a matrix (n, n) that may be asymmetric by round-off."""
         even = np.clip(0.5 * (matrix + matrix.T), -1.0, 1.0)
         np.fill_diagonal(even, 1.0)
         return cls(names=tuple(names), matrix=tuple(tuple(row) for row in even.tolist()))
@@ -85,7 +85,7 @@ class Correlation:
             raise ConfigError("correlation: the matrix must be symmetric, 1 on its diagonal, without negative roots.")
 
     def among(self, names: Sequence[str]) -> Array:
-        """The correlation (k, k) of the named estimates; 0 with what it does not hold."""
+        """The correlation (k, k) of the named estimates; 0 for pairs that it does not hold."""
         matrix = np.eye(len(names))
         held = [(i, self.names.index(name)) for i, name in enumerate(names) if name in self.names]
         for i, a in held:
@@ -99,20 +99,21 @@ class Model:
     """An object, a hand and a table with their physics.
 
     Attributes:
-        recording: the name of what it was learnt from.
-        shape: the object's.
+        recording: name of the recording from which it was learned.
+        shape: of the object.
         hand_radius: of the tip where it touches the object [m]; None without a hand.
-        table: (2, 2) lower and upper corner of the table top [m].
+        table: (2, 2) lower and upper corner of the table top in W [m].
         config: of the cell.
-        body: theta.
+        body: the parameters theta.
         effects: physics beyond the baseline model.
-        intervals: 90 % intervals as they were found, by ``theta.<name>`` and ``<effect>.<parameter>``.
-        correlation: of what has an interval of two numbers; None where it is not known.
-        hand_axes: (2, 2) the axes of P, as columns, along x and y of W, if all pushes had about the same.
-        hand_turns: whether the hand turns with its pushes: then ``hand_axes`` are along and across a push's heading.
-        tip_height: of P above the table in what it was learnt from [m]; None where nobody knows.
-        contact_height: of where the tip touched the object [m]; None where nobody knows.
-        top_speed: of the hand in the fastest push that it was learnt from [m/s]; None where nobody knows.
+        intervals: 90 % intervals, by ``theta.<name>`` and ``<effect>.<parameter>``.
+        correlation: of the estimates whose interval is two numbers; None where it is not known.
+        hand_axes: (2, 2) the axes of P, as columns, along x and y of W; the identity where the pushes had no common
+            axes.
+        hand_turns: whether the hand turns with its pushes: then ``hand_axes`` are relative to a push's heading.
+        tip_height: of P above the table in the recording [m]; None where it is not known.
+        contact_height: of where the tip touched the object [m]; None where it is not known.
+        top_speed: of the hand in the fastest recorded push [m/s]; None where it is not known.
     """
 
     recording: str
@@ -131,25 +132,28 @@ class Model:
     top_speed: float | None = None
 
     def axes_on(self, path: HandPath | None) -> Array:
-        """The axes (2, 2) of P, as columns, along x and y of W, in a push along a path."""
+        """The axes (2, 2) of P, as columns, along x and y of W, in a push along a path; None for no push."""
         axes = np.array(self.hand_axes)
         return axes if path is None or not self.hand_turns else turned(path.heading) @ axes
 
     def build(self, *, time_step: float | None = None) -> ModelCell:
-        """The Drake cell with theta in its Context and the effects at their seams.
+        """The Drake cell with theta in its Context and the effects in its diagram.
 
         Args:
-            time_step: of the diagram's plant [s]; None for the cell's time step, of a millisecond as a rule. Rollouts
-                keep the cell's.
+            time_step: of the diagram's plant [s]; None for the cell's, usually a millisecond. Rollouts keep the
+                cell's.
+
+        Raises:
+            CellError: if Drake cannot represent the shape.
         """
         return ModelCell(self, time_step=time_step)
 
     def baseline(self) -> Model:
-        """The same without its effects: what is lost without them is what they are worth."""
+        """The same model without its effects."""
         return dc.replace(self, effects=())
 
     def dump(self) -> str:
-        """The text of ``model.yaml``; a mesh is named by its absolute path."""
+        """The text of ``model.yaml``; a mesh is given by its absolute path."""
         content: dict[str, Any] = {
             "format": FORMAT,
             "recording": self.recording,
@@ -182,16 +186,17 @@ class Model:
 class ModelCell:
     """A model, built: its diagram, and rollouts with all its physics.
 
-    The diagram is for a simulation, or a larger diagram, of one's own: a ``Simulator`` of it begins with the
-    identified theta, the object at rest on the table and the hand clear of it. Its table has no end, and its physics
-    are those of the first push; rollouts lose the object at the edge and take the push's number.
+    The diagram is for simulations and larger diagrams of your own. A ``Simulator`` of it begins with the identified
+    theta, the object at rest on the table and the hand away from it. Its table has no edges, and effects that depend
+    on the push's number are those of the first push. Rollouts, instead, lose the object at an edge and take the
+    push's number.
 
     Attributes:
-        model: what it was built from.
-        cell: the cell, in the effects' geometry, which rollouts take.
-        diagram: the Drake diagram, with the effects' forces as a system; ``effects.diagram.PORTS`` has its ports.
-        scene: the diagram's plant and bodies.
-        body: theta, with what effects change of it.
+        model: from which it was built.
+        cell: with which rollouts are made, with the effects' geometry.
+        diagram: the Drake diagram, with the effects' forces as a system; ``effects.diagram.PORTS`` lists its ports.
+        scene: plant and bodies of the diagram.
+        body: theta, as the effects change it.
         simulator: of the diagram.
     """
 
@@ -228,16 +233,19 @@ class ModelCell:
         order: int = 0,
         hand_axes: Array | None = None,
     ) -> Motion:
-        """Simulate a push with the model's theta and effects; arguments as in ``Cell.rollout``.
+        """Simulate a push with the model's theta and effects.
 
         Args:
-            start: the object's state as the tracker would report it.
+            start: the object's state, as the tracker would report it.
             path: the hand's path; None without a hand.
             begin: start time [s].
             end: end time [s].
-            hand_height: of the tip's contact above the table [m].
-            order: number of the push, for physics that changes from push to push.
+            hand_height: of the tip's contact above the table [m]; None for half the object's height.
+            order: number of the push, for effects that depend on it.
             hand_axes: (2, 2) the axes of P, as columns, along x and y of W; None takes the model's.
+
+        Returns:
+            The motion of the object.
         """
         axes = self.model.axes_on(path) if hand_axes is None else hand_axes
         push = Rollout(
@@ -246,12 +254,12 @@ class ModelCell:
         return roll(lambda _: self.cell, Geometry(shape=self.model.shape), self.model.body, push, self.model.effects)
 
     def tracked(self, motion: Motion, times: Array) -> Array:
-        """What the recording's tracker would report (n, 3), x, y, yaw, at times (n,) [s]."""
+        """What the recording's tracker would report (n, 3), x, y [m], yaw [rad], at times (n,) [s]."""
         return tracked(motion, times, self.model.effects)
 
 
 def turned(angle: float) -> Array:
-    """The rotation (2, 2) by an angle [rad]."""
+    """The rotation matrix (2, 2) of an angle [rad]."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s], [s, c]])
 

@@ -33,6 +33,11 @@ class Range:
         return " and ".join(f"{word} {end:g}" for word, end in words if math.isfinite(end))
 
 
+def is_whole(value: object) -> bool:
+    """Whether a value of a file is a whole number; Python takes a truth value for one."""
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
 ANY = Range()
 POSITIVE = Range(above=0.0)
 NOT_NEGATIVE = Range(least=0.0)

@@ -12,8 +12,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from rich.console import Console
 
+from physid_drake.command import DONE, Parser, path, run_command
 from physid_drake.diagnose import Diagnosis, DiagnosisSystem, Examined, diagnose_from, model_of
-from physid_drake.door import DONE, Parser, enter, path
 from physid_drake.errors import ConfigError
 from physid_drake.identify import Identification, Identifier, OnlineIdentifier, in_the_cell, with_prior
 from physid_drake.identify.system import PUSH_PERIOD, BatchLearner, IdentificationSystem, Learner, RecordingPlayer
@@ -49,12 +49,13 @@ from physid_drake.report.scene_page import scene_page
 from physid_drake.report.tables import accuracy_table, estimates_table, verdict
 from physid_drake.report.terminal import terminal
 from physid_drake.run_diagnose import ALPHA, STATE, show, write
-from physid_drake.run_folder import RunFolder, made_with, named_after, versions
+from physid_drake.run_folder import RunFolder, named_after
 from physid_drake.run_plan import FILES as PLAN
 from physid_drake.run_plan import forget as forget_plan
 from physid_drake.run_plan import write as write_plan
 from physid_drake.scenario import config_folders, dump_scenario, load_scenario
 from physid_drake.scenario_schema import Scenario
+from physid_drake.versions import made_with, versions
 
 COMMAND = "run_cell"
 BELIEF = "belief.npz"  # of an interrupted identification
@@ -70,7 +71,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         run(_parser().parse_args(argv), terminal())
         return DONE
 
-    return enter(begin, interrupted="interrupted; the same command resumes from what has been saved, if anything has")
+    return run_command(
+        begin, interrupted="interrupted; the same command resumes from what has been saved, if anything has"
+    )
 
 
 def _parser() -> argparse.ArgumentParser:

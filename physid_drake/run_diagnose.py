@@ -33,7 +33,8 @@ from physid_drake.report.progress import DIAGNOSIS_STAGES, progress_bar
 from physid_drake.report.scene_page import scene_page
 from physid_drake.report.stage import Act
 from physid_drake.report.terminal import terminal
-from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text, versions
+from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text
+from physid_drake.versions import versions
 
 COMMAND = "diagnose"
 STATE = "rollouts.bin"

@@ -1,4 +1,4 @@
-"""A run's folder: what a command wrote there and may replace, one run at a time, each file whole or not at all."""
+"""A run's folder: what a command wrote there and may replace, one run at a time."""
 
 from __future__ import annotations
 
@@ -6,47 +6,40 @@ import errno
 import fcntl
 import json
 import os
-import platform
 import re
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
 
 from physid_drake.errors import ConfigError, OutputError
 from physid_drake.files import NotTextError, read_json, read_text
+from physid_drake.whole_files import PART, write_whole
+from physid_drake.wording import cause_of
 
 MANIFEST: Final = "manifest.json"
 FORMAT: Final = "physid-folder/1"
 LOCK: Final = ".lock"
-PART: Final = ".part"
 _NO_LOCKS: Final = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS)
 CONFIG, SETTINGS = "config.yaml", "settings.json"  # what a folder was made with: by run_cell, by other commands
-PACKAGES = ("physid_drake", "drake", "mujoco", "numpy", "scipy", "scikit-learn")
-
-
-def versions() -> dict[str, str]:
-    """Of Python and of what the numbers of a run depend on, as far as it is installed."""
-    found = {"python": platform.python_version()}
-    for name in PACKAGES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return found
-
-
-def made_with() -> str:
-    """The versions in one line."""
-    return ", ".join(f"{name} {version}" for name, version in versions().items())
 
 
 def named_after(name: str) -> str:
     """A recording's name as the name of one folder: letters, digits, dots within, dashes and underscores."""
     return re.sub(r"[^\w.-]+", "_", name)[:100].strip("._") or "recording"
+
+
+def named_after_model(path: Path) -> str:
+    """The name of a folder for what is made of a model: that of the model's folder, or of a file of another name.
+
+    Args:
+        path: the folder of a run or a diagnosis, its ``model.yaml``, or a file such as ``mug.yaml``.
+    """
+    place = path.resolve()
+    if not place.is_dir():
+        place = place.parent if place.name == "model.yaml" else place.with_suffix("")
+    return named_after(place.name)
 
 
 def settings_text(command: str, settings: Mapping[str, Any]) -> str:
@@ -97,7 +90,7 @@ class RunFolder:
         except (OSError, ValueError, RuntimeError) as error:  # too long a name, a NUL, a loop of links, no folder
             if isinstance(error, ConfigError | OutputError):
                 raise
-            raise OutputError(f"output folder '{path}': cannot be written: {_cause(error)}.") from error
+            raise OutputError(f"output folder '{path}': cannot be written: {cause_of(error)}.") from error
 
     @classmethod
     def begin(cls, path: Path, command: str) -> RunFolder:
@@ -112,7 +105,7 @@ class RunFolder:
         try:
             path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise OutputError(f"output folder '{path}': cannot be written: {_cause(error)}.") from error
+            raise OutputError(f"output folder '{path}': cannot be written: {cause_of(error)}.") from error
         if not (path / MANIFEST).exists():
             folder._list(())
         return folder
@@ -199,7 +192,7 @@ class RunFolder:
         except NotTextError:
             return ""  # somebody changed it: it is no text of ours
         except OSError as error:
-            raise OutputError(f"'{self.path / name}': cannot be read: {_cause(error)}.") from error
+            raise OutputError(f"'{self.path / name}': cannot be read: {cause_of(error)}.") from error
 
     def holds(self, name: str) -> bool:
         """Whether this command wrote a file of that name, and it is still there."""
@@ -239,7 +232,7 @@ class RunFolder:
             try:
                 path.mkdir(exist_ok=True)
             except OSError as error:
-                raise OutputError(f"'{path}': cannot be written: {_cause(error)}.") from error
+                raise OutputError(f"'{path}': cannot be written: {cause_of(error)}.") from error
         return path
 
     def forget(self, name: str) -> None:
@@ -253,7 +246,7 @@ class RunFolder:
         try:
             (self.path / name).unlink(missing_ok=True)
         except OSError as error:
-            raise OutputError(f"'{self.path / name}': cannot be removed: {_cause(error)}.") from error
+            raise OutputError(f"'{self.path / name}': cannot be removed: {cause_of(error)}.") from error
 
     def _lists(self, name: str) -> bool:
         within = [f"{parent}/" for parent in Path(name).parents if parent != Path()]
@@ -284,33 +277,6 @@ class RunFolder:
             )
         if command not in (None, self.command):
             raise ConfigError(f"output folder '{self.path}': holds what {command} wrote; choose another --out.")
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all.
-
-    Raises:
-        OutputError: if it cannot be written.
-    """
-    try:
-        with part_of(path) as part:
-            part.write_bytes(content)
-            os.replace(part, path)  # noqa: PTH105
-    except OSError as error:
-        raise OutputError(f"'{path}': cannot be written: {_cause(error)}.") from error
-
-
-@contextmanager
-def part_of(path: Path) -> Iterator[Path]:
-    """A new, empty file beside a path, to be filled and renamed to it; removed where that does not come about."""
-    descriptor, name = tempfile.mkstemp(prefix=f".{path.name[:100]}.", suffix=PART, dir=path.parent)
-    os.close(descriptor)
-    part = Path(name)
-    try:
-        part.chmod(0o644)
-        yield part
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _manifest(path: Path) -> tuple[str | None, tuple[str, ...]]:
@@ -355,7 +321,7 @@ def _locked(path: Path, command: str) -> Iterator[None]:
     except OSError as error:
         if isinstance(error, OutputError):
             raise
-        raise OutputError(f"output folder '{path}': cannot be written: {_cause(error)}.") from error
+        raise OutputError(f"output folder '{path}': cannot be written: {cause_of(error)}.") from error
     try:
         yield
     finally:
@@ -393,8 +359,3 @@ def _is_there(path: Path) -> bool:
     except (FileNotFoundError, NotADirectoryError):
         return False
     return True
-
-
-def _cause(error: BaseException) -> str:
-    """Why, in the system's words, without the path, which the message has already."""
-    return str(getattr(error, "strerror", None) or error)

@@ -6,8 +6,8 @@ import argparse
 import warnings
 from pathlib import Path
 
+from physid_drake.command import say_error
 from physid_drake.doctor import examined
-from physid_drake.door import say_error
 from physid_drake.errors import RecordingError
 from physid_drake.pushes.push_checks import refusals
 from physid_drake.pushes.push_warnings import doubts

@@ -8,7 +8,7 @@ from pathlib import Path
 from physid_drake.export import exported
 from physid_drake.model_reading import load_model
 from physid_drake.report.terminal import terminal
-from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text
+from physid_drake.run_folder import SETTINGS, RunFolder, named_after_model, settings_text
 
 COMMAND = "model export"
 
@@ -20,7 +20,7 @@ def run_export(arguments: argparse.Namespace) -> int:
         PhysidError: one line that says what is wrong.
     """
     model = load_model(arguments.model)
-    out = arguments.out or Path("exports") / named_after(model.recording)
+    out = arguments.out or Path("exports") / named_after_model(arguments.model)
     inputs = [arguments.model if arguments.model.is_dir() else arguments.model.parent]
     RunFolder.check(out, COMMAND, inputs=inputs)
     files = exported(model)

@@ -31,7 +31,7 @@ from physid_drake.report.plan_page import plan_page, plan_png
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.scene_page import scene_page
 from physid_drake.report.terminal import terminal
-from physid_drake.run_folder import SETTINGS, RunFolder, named_after, settings_text
+from physid_drake.run_folder import SETTINGS, RunFolder, named_after_model, settings_text
 from physid_drake.wording import shown
 
 WIDER = {"push_speed": ("push", "two_pushes"), "push_direction": ("push", "two_pushes"), "push": ("two_pushes",)}
@@ -77,7 +77,8 @@ def run(arguments: argparse.Namespace) -> int:
         direction=None if arguments.direction is None else _radians("--direction", arguments.direction),
     )  # fmt: skip
     policy = policy_for(arguments.policy, model, start, goal, choices)
-    out = arguments.out or Path("plans") / named_after(model.recording)
+    # Like a diagnosis, not after the name in recording.yaml, which recordings of one data set may share.
+    out = arguments.out or Path("plans") / named_after_model(arguments.run_folder or arguments.model)
     RunFolder.check(out, COMMAND, inputs=[one for one in (arguments.run_folder,) if one is not None])
     console = terminal()
     with progress_bar(console) as progress:

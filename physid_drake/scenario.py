@@ -15,9 +15,10 @@ from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 
 from physid_drake.cell.checks import check_config
 from physid_drake.errors import ConfigError
+from physid_drake.files import is_there
 from physid_drake.identify.config import INTEGRATORS
 from physid_drake.policies import POLICIES
-from physid_drake.ranges import Range
+from physid_drake.ranges import Range, is_whole
 from physid_drake.resources import shipped
 from physid_drake.run_folder import named_after
 from physid_drake.scenario_schema import Scenario
@@ -118,23 +119,15 @@ def dump_scenario(name: str, scenario: Scenario) -> str:
 
 
 def _locate(config: str) -> tuple[Path, str | None]:
-    file, _, name = (config, "", "") if _is_there(Path(config)) else config.rpartition(":")
+    file, _, name = (config, "", "") if is_there(Path(config)) else config.rpartition(":")
     file, name = (file, name) if file else (name, "")
     path = Path(file)
-    if not _is_there(path) and path.parent == Path():
+    if not is_there(path) and path.parent == Path():
         for candidate in (shipped("configs") / file, shipped("configs") / f"{file}.yaml"):
-            if _is_there(candidate):
+            if is_there(candidate):
                 path = candidate
                 break
     return path, name or None
-
-
-def _is_there(path: Path) -> bool:
-    """Whether it is there; a name that is too long for any file is not."""
-    try:
-        return path.exists()
-    except OSError:
-        return False
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:
@@ -201,10 +194,6 @@ def _is_text(value: Any) -> bool:
     return isinstance(value, str)
 
 
-def _is_whole(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
-
-
 def _is_number(value: Any) -> bool:
     """YAML reads 1e-3 as text and 1 as a whole number; both are fine where a number is wanted."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
@@ -217,7 +206,7 @@ def _is_number(value: Any) -> bool:
 
 _KINDS: dict[Any, tuple[str, Callable[[Any], bool]]] = {
     str: ("text", _is_text),
-    int: ("a whole number", _is_whole),
+    int: ("a whole number", is_whole),
     float: ("a number", _is_number),
     bool: ("true or false", lambda value: isinstance(value, bool)),
 }

@@ -27,6 +27,11 @@ def one_line(error: BaseException) -> str:
     return _cut(_printable(text), MOST_CAUSE) or type(error).__name__
 
 
+def cause_of(error: BaseException) -> str:
+    """Why something failed, in the system's words, without the file's name, which the message has already."""
+    return str(getattr(error, "strerror", None) or error)
+
+
 def in_one_line(message: str) -> str:
     """A whole message for a terminal: one line, not longer than can be read, without control characters."""
     if len(message) > 20 * MOST_LINE:

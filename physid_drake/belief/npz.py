@@ -13,6 +13,8 @@ from physid_drake.npz import read_arrays
 from physid_drake.space import Array
 from physid_drake.wording import named, one_line, shown
 
+MOST_COUNT = 1_000_000
+
 
 def read_npz(path: str | Path, form: str) -> tuple[dict[str, Array], dict[str, Any]]:
     """All arrays of a file, and its header.
@@ -76,11 +78,11 @@ def check_trials(arrays: Mapping[str, Array], dimension: int) -> None:
         raise ParameterError("there must be candidates, and lengths and variances above 0")
 
 
-def check_whole(what: str, value: object, most: int = 1_000_000) -> None:
+def check_whole(what: str, value: object) -> None:
     """Refuse a count that is none, or absurd.
 
     Raises:
         ParameterError: When it is.
     """
-    if not (isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= most):
-        raise ParameterError(f"{what} must be a whole number from 0 to {most}, but is {shown(value)}")
+    if not (isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MOST_COUNT):
+        raise ParameterError(f"{what} must be a whole number from 0 to {MOST_COUNT}, but is {shown(value)}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from physid_drake.cell.config import CellConfig
 from physid_drake.errors import ConfigError
-from physid_drake.ranges import Range
+from physid_drake.ranges import Range, is_whole
 from physid_drake.wording import shown
 
 MODELS = ("hydroelastic", "point")
@@ -16,10 +16,6 @@ MOST_CELLS = 10  # along a side
 LIGHTEST, HEAVIEST = 20.0, 8000.0  # kg/m^3 of the box around the object: foam, steel
 
 Rule = tuple[str, object, bool, str]  # key, value, whether it is fine, and what it must be
-
-
-def _is_whole(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def _in(value: object, allowed: Range) -> bool:
@@ -41,7 +37,7 @@ def check_config(config: CellConfig) -> None:
 def _contact_rules(config: CellConfig) -> list[Rule]:
     contact = config.contact
     points = contact.support_points
-    enough = _is_whole(points) and 4 <= points <= 1000
+    enough = is_whole(points) and 4 <= points <= 1000
     numbers: list[tuple[str, Range, str]] = [
         ("rest_depth_m", Range(least=1e-8, most=1e-2), "from 1e-8 to 1e-2 m"),
         ("dissipation_s_per_m", Range(least=0.0, most=MOST_DISSIPATION), f"from 0 to {MOST_DISSIPATION:g} s/m"),
@@ -75,7 +71,7 @@ def _object_rules(config: CellConfig) -> list[Rule]:
     even = (
         isinstance(cells, list | tuple)
         and len(cells) == 2
-        and all(_is_whole(n) and 1 <= n <= MOST_CELLS for n in cells)
+        and all(is_whole(n) and 1 <= n <= MOST_CELLS for n in cells)
     )
     return [
         ("friction_cells", cells, even, f"whole [nx, ny] from 1 to {MOST_CELLS}"),

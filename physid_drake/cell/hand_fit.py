@@ -40,14 +40,6 @@ LONG = 12  # samples, of which fifth differences are enough to tell
 SMOOTH_RAMPS: Final = (Polynomial([0, 0, 3, -2]), Polynomial([0, 0, 0, 10, -15, 6]))
 
 
-def fit_hand_paths(
-    streams: Sequence[tuple[Array, Array]], std: float | None, *, memory: float = 0.0
-) -> tuple[HandPath, ...]:
-    """The paths of ``fit_uncertain_paths``, taken for exact."""
-    fits = _fits_of(streams, std, memory)
-    return tuple(_path_of(fits.get(k), stream) for k, stream in enumerate(streams))
-
-
 def fit_uncertain_paths(
     streams: Sequence[tuple[Array, Array]], std: float | None, *, least: float, memory: float = 0.0
 ) -> tuple[tuple[HandPath, tuple[PathError, ...]], ...]:
@@ -129,12 +121,7 @@ def _smoother(straight: StraightFit, ramp: Polynomial) -> StraightFit:
     return smooth if len(smooth.knots) > 1 and _vote(straight, smooth) > -MOST else straight
 
 
-def fit_hand_path(times: Array, positions: Array, std: float | None) -> HandPath:
-    """The path of one stream alone, as in ``fit_hand_paths``."""
-    return fit_hand_paths([(times, positions)], std)[0]
-
-
-def _fit_of(times: Array, positions: Array, std: float | None, memory: float = 0.0) -> StraightFit:
+def _fit_of(times: Array, positions: Array, std: float | None, memory: float) -> StraightFit:
     sigma = max(std if std is not None else stream_std(times, positions), SMALLEST_STD)
     return StraightFit(times - times[0], positions, np.full(len(times), sigma), memory)
 

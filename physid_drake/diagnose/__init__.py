@@ -1,4 +1,4 @@
-"""Diagnosis: where simulation and recording part, and what physics is missing."""
+"""Diagnosis: where simulation and recording differ, and which physics is missing in the simulation."""
 
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.exported import model_of

@@ -1,4 +1,4 @@
-"""From evidence to the answer: the verdict and all figures, without a rollout."""
+"""From the evidence to the answer: the verdict and all figures, without further rollouts."""
 
 from __future__ import annotations
 
@@ -25,13 +25,19 @@ from physid_drake.inference.replicates import p_value, without_best
 from physid_drake.pushes.case import UNIT_SCATTER
 from physid_drake.pushes.stated import quieter_by
 
-GOOD_PART = 0.25  # of the squared error: less is not worth a word
-VISIBLE = 10.0  # standard deviations of motion: pushes that would not show such an effect show nothing
+GOOD_PART = 0.25  # of the squared error: a smaller part is not reported
+VISIBLE = 10.0  # units of tracker noise: where most effects would have to be larger, the pushes are underpowered
 ODD = 0.001  # chance that any push of a recording is as far off as those that are named for it
 
 
 def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
-    """The verdict and all figures, from evidence; no rollouts."""
+    """The diagnosis that the evidence supports; no rollouts are made.
+
+    Args:
+        evidence: all that was fitted and decided.
+        seed: random seed, of the sign flips that locate the mismatch; it is reported.
+        alpha: false-alarm rate that was asked for.
+    """
     case, found, plain, after = evidence.case, evidence.found, evidence.baseline, evidence.corrected
     motions = least_motions(found)
     verdict = evidence.decision.verdict
@@ -77,10 +83,18 @@ def conclude(evidence: Evidence, *, seed: int, alpha: float) -> Diagnosis:
 
 
 def p_value_of(evidence: Evidence, alpha: float) -> float:
-    """Of "nothing is missing": of the best gain by chance; where that claims no mismatch, of what else claims it.
+    """p-value of the hypothesis that no physics is missing.
 
-    That is a gain which only a whole fit shows, errors that are no noise, and frictions that differ by too much; the
-    smallest of so many looks (Sidak 1967).
+    It is that of the catalogue's best held-out gain, linearised. Where the verdict claims a mismatch although that
+    p-value is not below ``alpha``, the smallest p-value of all criteria that can claim one is taken: also of the
+    gains of whole fits, of the scatter of frictions, and of errors larger than noise. It is corrected for their
+    number.
+
+    Args:
+        evidence: all that was fitted and decided.
+        alpha: false-alarm rate that was asked for.
+
+    Source: Z. Sidak, J. Am. Stat. Assoc. 62, 1967, for the correction.
     """
     found, noise = evidence.found, evidence.case.noise
     if is_own_error(accuracy_of(evidence.case, evidence.errors_before)):
@@ -163,9 +177,10 @@ def _quality(evidence: Evidence) -> FitQuality:
 
 
 def odd_pushes(fit: Fit) -> tuple[int, ...]:
-    """Pushes that are further off than the noise's heavy tail makes any push by chance (Bonferroni).
+    """Indices of pushes with errors too large even for the heavy-tailed distribution of errors.
 
-    Of a push whose m errors are t distributed as one, their mean square is distributed as F of m and ``TAIL``.
+    Bonferroni's bound takes all pushes into account. If the m errors of a push have a multivariate t distribution,
+    their mean square has an F distribution with m and ``TAIL`` degrees of freedom.
     """
     counts = np.array([len(push.residual) for push in fit.pushes])
     squares = np.array([one.square for one in fit.weighed]) / fit.noise_scale**2

@@ -1,7 +1,7 @@
-"""The decision: from hypotheses that were fitted to what is said, by a few constants.
+"""The decision: from fitted hypotheses to a verdict, by a few constants.
 
-All comparisons are of pushes that were held out, and no push decides alone: the one that speaks most for a
-hypothesis does not count for it. docs/method.md lists the constants; `benchmarks/decisions.py` leaves out each.
+All comparisons use the gains of held-out pushes, without the largest of them, so that no push decides alone.
+docs/method.md lists the constants; `benchmarks/decisions.py` shows what each of them changes.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from physid_drake.diagnose.search import Found, Weighed
+from physid_drake.diagnose.search import Found, Scored
 from physid_drake.effects import Effect
 from physid_drake.identify import Accuracy
 from physid_drake.inference.replicates import surprise, without_best
@@ -20,40 +20,44 @@ from physid_drake.pushes.tracker_noise import TrackerNoise
 
 Array = NDArray[np.float64]
 
-CONFIRMED = 1e-4  # chance that the gain of an effect, its best push not counted, is none
-MARGIN = 8.0  # nats: by which one is surely better than another, likewise
-FEWEST_PUSHES = 3  # less cannot confirm anything on pushes that are held out
+CONFIRMED = 1e-4  # probability of such a gain by chance, the largest push's not counted
+MARGIN = 8.0  # nats: gain by which one is clearly better, the largest push's not counted
+FEWEST_PUSHES = 3  # with fewer, held-out pushes confirm nothing
 ADEQUATE = 0.01  # p-value of what a hypothesis leaves: of the catalogue beside it, of the scatter of frictions
 LITTLE = 0.03  # of the gain of a hypothesis: two honest implementations of one effect differ by a tenth of it or more
 MOST_NOISE_SCALE = 1.25  # times the noise: more is not noise
-OWN_ERROR = (2e-4, 2e-3)  # m, rad: of held-out pushes, by which two honest simulators differ
-DOUBTS = 1.5  # times the doubt about the noise's variance: three deviations of its root
+OWN_ERROR = (2e-4, 2e-3)  # m, rad: of held-out pushes, as large as the difference between two simulators
+DOUBTS = 1.5  # times the std of the variance's logarithm: three standard deviations of the noise's
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Decision:
-    """What is said.
+    """The verdict, with the hypotheses that it rests on.
 
     Attributes:
-        verdict: ``consistent``, ``explained``, ``ambiguous`` or ``unexplained``; ``underpowered`` of few pushes.
-        best: the hypothesis that explains the pushes; where none of the catalogue does, one without a name that
-            predicts them better than the baseline. None where nothing is missing, or nothing helps.
-        rivals: hypotheses that these pushes cannot tell from it, best first; each differs in one effect.
-        partly: effects that take a part of what nothing explains away.
+        verdict: ``consistent``, ``explained``, ``ambiguous``, ``unexplained`` or ``underpowered``.
+        best: the hypothesis that explains the pushes. Where no effect of the catalogue does, a model with an unnamed
+            force that predicts held-out pushes better than the baseline; None where there is none, or nothing is
+            missing.
+        rivals: hypotheses that these pushes cannot distinguish from it, best first; each differs in one effect.
+        partly: where the verdict is ``unexplained``, effects that explain a part of the mismatch.
+        refuted: a hypothesis with a higher likelihood of held-out pushes, whose predictions are no nearer; None where
+            there is none.
     """
 
     verdict: str
-    best: Weighed | None = None
-    rivals: tuple[Weighed, ...] = ()
-    partly: Weighed | None = None
+    best: Scored | None = None
+    rivals: tuple[Scored, ...] = ()
+    partly: Scored | None = None
+    refuted: Scored | None = None
 
     @property
     def effects(self) -> tuple[type[Effect], ...]:
-        """The best hypothesis's."""
+        """Classes of the best hypothesis's effects."""
         return () if self.best is None else kinds_of(self.best)
 
     def classes(self) -> tuple[tuple[str, ...], ...]:
-        """Per effect, the names that may stand in its place."""
+        """For each of these effects, names of the effects that rivals have in its place."""
         mine = self.effects
         found: list[list[str]] = [[] for _ in mine]
         for rival in self.rivals:
@@ -65,25 +69,26 @@ class Decision:
 
 
 def most_noise_scale(noise: TrackerNoise) -> float:
-    """Times the noise that errors may be and still be noise; of one that short rests told, a little more."""
+    """The largest noise scale [-] at which errors still count as noise.
+
+    It is infinite where the noise is not known, and larger where short rests leave it uncertain.
+    """
     return MOST_NOISE_SCALE * math.exp(DOUBTS * noise.doubt) if noise.known else math.inf
 
 
 def decided(found: Found, *, most: float) -> Decision:
-    """The verdict.
+    """The verdict on fitted hypotheses.
 
     Args:
         found: all hypotheses.
-        most: times the noise that errors may be and still be noise.
+        most: largest noise scale [-] at which errors count as noise (``most_noise_scale``).
     """
     if len(found.baseline.pushes) < FEWEST_PUSHES:
         return Decision(verdict="underpowered")
     every = [*found.named, *found.unnamed]
     missing = found.odd and any(confirmed(found, one) for one in every)
-    quiet = found.baseline.noise_scale <= most and found.alike >= ADEQUATE
-    if not missing and quiet:
-        # So much is left by chance more seldom than was asked for, and yet held-out pushes confirm nothing.
-        return Decision(verdict="underpowered" if found.rare else "consistent")
+    if not missing and _is_noise(found, most):
+        return _nothing_claimed(found, most)
     nameless = next((one for one in found.unnamed if confirmed(found, one)), None)
     best = simplest(found)
     if best is None:
@@ -97,17 +102,55 @@ def decided(found: Found, *, most: float) -> Decision:
     return Decision(verdict="ambiguous" if alike else "explained", best=best, rivals=alike)
 
 
+def refuted(found: Found, decision: Decision, *, most: float, partly: bool) -> Decision:
+    """The decision where the best hypothesis raises the likelihood of held-out pushes, but predicts them no nearer.
+
+    Args:
+        found: all hypotheses.
+        decision: of ``decided``.
+        most: largest noise scale [-] at which errors count as noise.
+        partly: whether the effects that explain a part of the mismatch predict held-out pushes nearer.
+    """
+    if partly:
+        return dc.replace(decision, best=None, refuted=decision.best)
+    return dc.replace(_nothing_claimed(found, most), refuted=decision.best)
+
+
+def _is_noise(found: Found, most: float) -> bool:
+    """Whether what the baseline leaves is noise, and frictions differ by no more than those of surfaces do."""
+    return found.baseline.noise_scale <= most and found.alike >= ADEQUATE
+
+
+def _nothing_claimed(found: Found, most: float) -> Decision:
+    """What is said where no hypothesis is confirmed."""
+    if not _is_noise(found, most):
+        return Decision(verdict="unexplained")
+    # The p-value is below what was asked for, but held-out pushes confirm no effect.
+    return Decision(verdict="underpowered" if found.rare else "consistent")
+
+
+def is_nearer(after: Accuracy, before: Accuracy) -> bool:
+    """Whether held-out pushes are predicted nearer: their poses, or the hand's force."""
+    return after.rms <= before.rms or after.force < before.force
+
+
 def is_own_error(left_out: Accuracy) -> bool:
-    """Whether pushes are predicted as well as simulators agree: what is left has structure, and is no physics."""
+    """Whether held-out errors are no larger than the difference between two simulators: no missing physics."""
     # A yaw that was not measured is left out of it.
     return left_out.position < OWN_ERROR[0] and not left_out.rotation >= OWN_ERROR[1]
 
 
-def confirmed(found: Found, one: Weighed, beside: Weighed | None = None) -> bool:
-    """Whether pushes that were held out confirm what a hypothesis has beside another, or beside the baseline.
+def confirmed(found: Found, one: Scored, beside: Scored | None = None) -> bool:
+    """Whether held-out pushes confirm a hypothesis.
 
-    Its gain is compared with what such an effect gains by chance; that of what has no name with the effect that
-    gains most. Two effects gain more by chance than one, so that of two one alone has to be confirmed, too.
+    Its gain must be one that the same effect has by chance with a probability below ``CONFIRMED``. The gain of a
+    model with an unnamed force is compared with the effect that gains most by chance. Two effects gain more by chance
+    than one: of a pair, one effect alone has to be confirmed as well.
+
+    Args:
+        found: all hypotheses, with the distribution of gains by chance.
+        one: the hypothesis in question.
+        beside: what it is compared with; None for the baseline.
     """
     if beside is None and len(kinds_of(one)) > 1:
         alone = [
@@ -123,19 +166,21 @@ def confirmed(found: Found, one: Weighed, beside: Weighed | None = None) -> bool
 
 
 def surely_better(gains: Array) -> bool:
-    """Whether gains (n,) over another hypothesis do not rest on one push."""
+    """Whether gains (n,) of pushes sum to more than ``MARGIN``, the largest not counted."""
     return bool(without_best(gains) > MARGIN)
 
 
-def kinds_of(one: Weighed) -> tuple[type[Effect], ...]:
-    """A hypothesis's effects."""
+def kinds_of(one: Scored) -> tuple[type[Effect], ...]:
+    """Classes of a hypothesis's effects."""
     return tuple(part.kind for part in one.fit.hypothesis.parts)
 
 
-def simplest(found: Found) -> Weighed | None:
-    """The confirmed hypothesis with the fewest effects beside which the best one has nothing that is confirmed.
+def simplest(found: Found) -> Scored | None:
+    """The hypothesis to report: of those that the best one is not clearly better than, one with the fewest effects.
 
-    Of those that the best one is not surely better than, the one that is a limit of another.
+    All must be confirmed. A hypothesis with more effects is clearly better only if they are confirmed and their gain
+    is not small. Among those left, one whose effect is a limit of another's is preferred: a tilt to a tether with a
+    far anchor. None where no hypothesis is confirmed.
     """
     named = [one for one in found.named if confirmed(found, one)]
     if not named:
@@ -148,20 +193,20 @@ def simplest(found: Found) -> Weighed | None:
     return (limits or few)[0]
 
 
-def _worth(found: Found, best: Weighed, other: Weighed) -> bool:
+def _worth(found: Found, best: Scored, other: Scored) -> bool:
     """Whether a hypothesis is surely better than another; an effect more has to be confirmed, and no little one."""
     if len(kinds_of(best)) > len(kinds_of(other)):
         return confirmed(found, best, other) and best.gain - other.gain > LITTLE * other.gain
     return surely_better(best.gains - other.gains)
 
 
-def _is_limit(one: Weighed, other: Weighed) -> bool:
+def _is_limit(one: Scored, other: Scored) -> bool:
     """Whether a hypothesis is another one's in a limit: a tether far away is a tilt."""
     mine, its = set(kinds_of(one)), set(kinds_of(other))
     return any(k.name in o.limits for k in mine - its for o in its - mine) and len(mine - its) == 1
 
 
-def _in_class(one: Weighed, best: Weighed) -> bool:
+def _in_class(one: Scored, best: Scored) -> bool:
     """Whether pushes do not tell a hypothesis from the best, and it is not merely what that is a limit of."""
     mine, its = kinds_of(best), kinds_of(one)
     if one is best or len(its) != len(mine) or len(set(mine) - set(its)) != 1:
@@ -170,7 +215,10 @@ def _in_class(one: Weighed, best: Weighed) -> bool:
 
 
 def probability(decision: Decision, k: int) -> float:
-    """That the name of effect k is right, among those of the catalogue: odds of the rivals from their deficits."""
+    """Probability that the name of effect ``k`` is right, if the effect is in the catalogue.
+
+    Each rival without that effect has odds of exp(its gain - the best gain), at most 1.
+    """
     best = decision.best
     assert best is not None
     mine = kinds_of(best)[k]

@@ -1,4 +1,4 @@
-"""Values with intervals: of effects, of theta, and of the smallest effect that would have shown."""
+"""Values with intervals: of effects, of theta, and of the smallest effect that would have been detected."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ DOUBTFUL = 0.5
 
 
 def coordinates_of(h: Hypothesis, k: int) -> slice:
-    """Where in z the free coordinates of effect k are."""
+    """Slice of z that holds the free coordinates of effect ``k``."""
     begin = h.space.dimension + sum(len(part.free) for part in h.parts[:k])
     return slice(begin, begin + len(h.parts[k].free))
 
 
 def parameters_of(fitter: Fitter, fit: Fit, k: int) -> dict[str, ParameterEstimate]:
-    """Values and intervals of the k-th effect, by drawing its chart point."""
+    """Values and 90 % intervals of effect ``k``'s parameters, by samples of its coordinates."""
     h, part = fit.hypothesis, fit.hypothesis.parts[k]
     here, some = h.points(fit.point.z)[k], coordinates_of(h, k)
     seen = t_factor(fit) ** 2 * fitter.covariance(fit)[some, some]
@@ -116,7 +116,13 @@ def _interval(effect: Effect, name: str, values: Sequence[Any]) -> Any:
 
 
 def theta_of(fitter: Fitter, fit: Fit, plain: Fit) -> dict[str, ThetaEstimate]:
-    """Theta under a model, which of it is identifiable, and what the baseline had."""
+    """Estimates of theta.
+
+    Args:
+        fitter: of the fits.
+        fit: the model whose theta is reported.
+        plain: the baseline model, for the values before.
+    """
     before = plain.hypothesis.theta(plain.point.z)
     return {
         e.name: ThetaEstimate(value=e.value, unit=e.unit, ci90=e.ci90, identifiable=e.identifiable, before=float(was))
@@ -125,11 +131,11 @@ def theta_of(fitter: Fitter, fit: Fit, plain: Fit) -> dict[str, ThetaEstimate]:
 
 
 def correlation_of(fitter: Fitter, fit: Fit) -> tuple[tuple[str, ...], Array]:
-    """How the estimates of a model vary together, by drawing theta and the effects' chart points.
+    """How a model's estimates vary together, by samples of theta and of the effects' coordinates.
 
     Returns:
-        Names, ``theta.<name>`` and ``<effect>.<parameter>``, of what is one number and varies; and the correlation
-        (n, n) of their normal scores, which does not depend on the coordinates.
+        Names ``theta.<name>`` and ``<effect>.<parameter>`` of all estimates that are single numbers and vary, and the
+        correlation (n, n) of their normal scores: the parameter of a Gaussian copula.
     """
     h, rng = fit.hypothesis, np.random.default_rng(0)
     count = h.simulated
@@ -149,7 +155,7 @@ def correlation_of(fitter: Fitter, fit: Fit) -> tuple[tuple[str, ...], Array]:
 
 
 def smallest(found: Found) -> tuple[Detectable, ...]:
-    """The smallest effect of each kind that would have been confirmed, in its own unit and in motion."""
+    """The smallest effect of each kind that would have been detected, in the unit of its parameter and as motion."""
     best: dict[str, Detectable] = {}
     for column, size in _sizes(found):
         one = _detectable(found, column, size)
@@ -159,9 +165,9 @@ def smallest(found: Found) -> tuple[Detectable, ...]:
 
 
 def least_motions(found: Found) -> dict[str, float]:
-    """By kind: how far the object moves at least, where it would have been confirmed [standard deviations].
+    """By kind: how far the object moves at least, where it would have been detected [standard deviations].
 
-    Infinite of what would not have shown at its strongest.
+    Infinite of what would not have been detected at its strongest.
     """
     motions = dict.fromkeys((column.kind.name for column in found.columns), math.inf)
     for column, size in _sizes(found):
@@ -171,10 +177,11 @@ def least_motions(found: Found) -> dict[str, float]:
 
 
 def _sizes(found: Found) -> list[tuple[Column, float]]:
-    """Columns that would have shown within their bounds, each with the size from which on.
+    """Columns that would have been detected within their bounds, each with the size from which on.
 
-    The gain that it takes, one push not counted, is that of its replicates' tail; half the information times the
-    square of the effect, it comes at even odds.
+    Half the information about its amplitude times the amplitude squared is the expected gain. The smallest amplitude
+    is the one whose expected gain, with one push not counted, reaches what is needed to confirm the effect; it is
+    confirmed with a probability of about one half.
     """
     pushes = len(found.baseline.pushes)
     counted = max(1, pushes - 1) / pushes

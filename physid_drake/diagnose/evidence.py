@@ -1,4 +1,4 @@
-"""Everything that an answer rests on."""
+"""All that a diagnosis rests on."""
 
 from __future__ import annotations
 
@@ -20,19 +20,20 @@ Array = NDArray[np.float64]
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Evidence:
-    """What was computed, for the report and the model that leaves.
+    """All that was computed, for the report and for the model that is exported.
 
     Attributes:
-        known: what was identified: the recording, and the baseline in the cell.
-        found: all hypotheses, on the twin.
-        decision: what is said.
-        fitter: whose predictions are the cell's.
-        best: the hypothesis that was decided on, or comes nearest, in the cell; None where nothing is missing.
-        errors_after: per push (m,), recorded less what the best hypothesis predicts, fitted without that push; of the
-            baseline where there is none.
-        errors_partly: the same of effects that take a part away; None where there are none.
-        wrenches: what is missing from the baseline, window by window.
-        next_push: that would tell rivals apart.
+        known: the identification, with the recording and the baseline model in the Drake cell.
+        found: all hypotheses, fitted on the twin.
+        decision: the verdict.
+        fitter: the fitter whose predictions are the Drake cell's.
+        best: the hypothesis that was decided on, refined in the cell; None where nothing is missing, or nothing found
+            helps.
+        errors_after: per held-out push (m,), recorded less predicted features with the best hypothesis, in the
+            features' units; those of the baseline where there is none.
+        errors_partly: the same with effects that explain a part of the mismatch; None where there are none.
+        wrenches: force and torque that the baseline lacks, window by window.
+        next_push: the push that would distinguish rivals best; None where there is none.
     """
 
     known: Identification
@@ -47,31 +48,37 @@ class Evidence:
 
     @property
     def case(self) -> Case:
-        """The recording."""
+        """The recording, made ready."""
         return self.known.case
 
     @property
     def baseline(self) -> Fit:
-        """The baseline in the cell."""
+        """The baseline model in the Drake cell."""
         return self.known.fit
 
     @property
     def errors_before(self) -> tuple[Array, ...]:
-        """Per push (m,), recorded less what the baseline predicts, fitted without that push."""
+        """Per held-out push (m,), recorded less predicted features with the baseline, in the features' units."""
         return self.known.errors
 
     @property
     def named(self) -> bool:
-        """Whether effects are named."""
+        """Whether the verdict names effects."""
         return self.decision.verdict in ("explained", "ambiguous")
 
     @property
     def corrected(self) -> Fit:
-        """The model that leaves: with what was found, under a name or without one, else the baseline."""
+        """The model to export: with the effects or the unnamed force that was found, otherwise the baseline."""
         return self.baseline if self.best is None else self.best
 
 
 def predicted(evidence: Evidence, errors: tuple[Array, ...], push: int) -> Array:
-    """Window means (w, 3) [m, m, rad] of a push that was held out, of ``errors_before`` or ``errors_after``."""
+    """Predicted window means (w, 3), x, y [m], yaw [rad], of a held-out push.
+
+    Args:
+        evidence: of the diagnosis.
+        errors: its ``errors_before`` or ``errors_after``.
+        push: index of the push.
+    """
     features = evidence.case.features[push]
     return features.poses(features.recorded - errors[push])

@@ -1,4 +1,4 @@
-"""The model that leaves a diagnosis."""
+"""The model that a diagnosis exports."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SAME = 0.9  # determinant of the mean of frames: they lie within about 25 degree
 
 
 def model_of(evidence: Evidence) -> Model:
-    """The model that leaves, as ``model.yaml`` has it: with what was found, under a name or without one."""
+    """The model to export, for ``model.yaml``: with the effects or the unnamed force that was found."""
     case, fit, fitter = evidence.case, evidence.corrected, evidence.fitter
     h, spec = fit.hypothesis, case.pool.spec
     # Also of what these pushes do not tell: a drag is known over a mass, and belief in one goes with the other.
@@ -46,9 +46,14 @@ def model_of(evidence: Evidence) -> Model:
 
 
 def hand_frame(problems: Sequence[PushProblem]) -> tuple[Axes, bool]:
-    """The mean of the pushes' axes of P, and whether they are along and across the push instead of those of W.
+    """The axes of P in the pushes.
 
-    Those of W where they differ so much, either way, that there is no frame.
+    Args:
+        problems: the pushes.
+
+    Returns:
+        The mean axes (2, 2), as columns, and whether they turn with the push: then they are relative to its heading,
+        otherwise to W. The axes of W where the pushes have no common axes either way.
     """
     pushed = [p for p in problems if p.path is not None]
     fixed = [p.hand_axes for p in pushed]

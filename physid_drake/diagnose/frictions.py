@@ -1,4 +1,4 @@
-"""What the pushes' own frictions follow, where they differ by more than friction scatters."""
+"""What friction changes with between pushes, where it differs by more than usual."""
 
 from __future__ import annotations
 
@@ -14,13 +14,14 @@ CHANCE = 0.05  # of the best of all looks
 
 
 def friction_trend(fitter: Fitter, fit: Fit) -> str | None:
-    """What friction goes with from push to push, in words; None where with nothing, or no more than by chance.
+    """Which property of a push its friction is correlated with, in words; None where none is significant.
 
-    Looks at how far the object goes, how fast it is pushed, and which push it is, by Kendall's rank correlation.
+    Properties are the length of the object's motion, the speed of the push and its number. The strongest of Kendall's
+    rank correlations is reported if its p-value, corrected for three looks, is below ``CHANCE``.
 
     Args:
-        fitter: of the recording.
-        fit: the model whose pushes have frictions of their own.
+        fitter: of the fit.
+        fit: the model with a friction for each push.
     """
     case, frictions = fitter.case, fitter.frictions(fit)
     every = range(len(frictions))

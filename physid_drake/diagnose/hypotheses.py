@@ -1,4 +1,4 @@
-"""All hypotheses fitted: proposals in one queue, of which the better half goes on."""
+"""Fits all hypotheses: proposals are fitted together, and the better half goes on."""
 
 from __future__ import annotations
 
@@ -23,12 +23,24 @@ BESIDE = 12  # families of score tests beside a single effect
 
 
 def with_one_more(fitter: Fitter, fit: Fit, found: Sequence[Column]) -> list[Fit]:
-    """The model with each of the effects beside it whose columns are given, fitted; the best of each, best first."""
+    """A model with one more effect, for each effect whose columns are given; the best fit of each, best first.
+
+    Args:
+        fitter: of the fit.
+        fit: the model to which effects are added.
+        found: columns of the effects.
+    """
     return halved(fitter, fit, proposals(fit, scores(fitter, fit, found)))
 
 
 def with_two(fitter: Fitter, singles: Sequence[Fit], kinds: Sequence[type[Effect]]) -> list[Fit]:
-    """Pairs of effects, fitted, best first: the best single ones, each with what scores best beside it."""
+    """Models with two effects, best first: each of the best single ones with what scores best beside it.
+
+    Args:
+        fitter: of the fits.
+        singles: models with one effect, best first.
+        kinds: effects that may be added.
+    """
     found: list[Proposal] = []
     for single in singles:
         present = {part.kind for part in single.hypothesis.parts}
@@ -38,7 +50,7 @@ def with_two(fitter: Fitter, singles: Sequence[Fit], kinds: Sequence[type[Effect
 
 
 def freed(fitter: Fitter, fit: Fit) -> Fit:
-    """The fit with all coordinates of its effects, where some were held at first."""
+    """The fit with all coordinates of its effects free, where some were held; the same fit if that gains nothing."""
     h = fit.hypothesis
     parts = tuple(
         dc.replace(part, point=tuple(point.tolist()), free=tuple(range(len(point))))
@@ -55,7 +67,10 @@ def freed(fitter: Fitter, fit: Fit) -> Fit:
 
 
 def each_alone(fitter: Fitter, pair: Fit) -> list[Fit]:
-    """Each effect of a pair alone, fitted from where it is in the pair: a fit of its own may have stopped short."""
+    """Each effect of a pair alone, fitted from its values in the pair.
+
+    The earlier fit of it alone may have stopped early.
+    """
     h, z, fits = pair.hypothesis, pair.point.z, []
     for k in range(len(h.parts)):
         kept = dc.replace(h, parts=h.parts[:k] + h.parts[k + 1 :])
@@ -68,7 +83,7 @@ def each_alone(fitter: Fitter, pair: Fit) -> list[Fit]:
 
 
 def unnamed(fitter: Fitter, fit: Fit) -> list[Fit]:
-    """The model with smooth forces and frictions that have no name: each block of them, and all together."""
+    """The model with an unnamed force: fits with each block of smooth forces and frictions, and with all blocks."""
     beside = columns(fitter, fit, [UnnamedForce])
     fits = []
     for score in scores(fitter, fit, beside):
@@ -86,13 +101,15 @@ def unnamed(fitter: Fitter, fit: Fit) -> list[Fit]:
 
 
 def halved(fitter: Fitter, near: Fit, found: Sequence[Proposal], of_each: int = 2) -> list[Fit]:
-    """The best fit of each hypothesis, by successive halving of the proposals.
+    """The best fit of each hypothesis, by successive halving of proposals, best first.
 
     Args:
-        fitter: fits.
-        near: whose derivatives by the per-push parameters will do at first.
+        fitter: makes the fits.
+        near: a fit whose derivatives with respect to nuisance parameters are used at first.
         found: the proposals.
-        of_each: hypothesis so many proposals are kept at the first halving; none of a pair's at later ones.
+        of_each: proposals of each hypothesis that are kept in any case at the first halving; one less at the second.
+
+    Source: K. Jamieson, A. Talwalkar, AISTATS 2016, for successive halving.
     """
     hypotheses = [p.hypothesis for p in found]
     points = fitter.points(hypotheses, [p.z for p in found], [fitter.at_rest()] * len(found))

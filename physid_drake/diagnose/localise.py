@@ -1,8 +1,8 @@
-"""Where simulation and recording part: the missing wrench in short windows of every push.
+"""Where simulation and recording differ: the missing force and torque in short windows of every push.
 
-Small pulses of force and torque about the middle of every window of every push show what each would change; least
-squares then says which wrench is missing there, with its covariance. What the hand prescribes (the motion along its
-push) these pushes cannot tell: its covariance is large.
+A small pulse of force along and across the motion, and of torque, is simulated in each window. Least squares with
+these responses gives the wrench that is missing in each window, with its covariance. The covariance is large for what
+the hand imposes: a force along the motion changes little while the hand pushes.
 """
 
 from __future__ import annotations
@@ -32,20 +32,21 @@ LARGEST = 1.0  # of the friction force: prior standard deviation of what is miss
 
 @dc.dataclass(frozen=True, kw_only=True)
 class MissingWrench:
-    """What is missing in one window of one push.
+    """The wrench that the model lacks in one window of one push.
 
     Attributes:
         push: index of the push.
-        start, end: of the window [s].
-        wrench: (3,) along the motion, across it (to its left) [N], torque [N m].
-        std: (3,) standard deviations.
+        start: of the window [s].
+        end: of the window [s].
+        wrench: (3,) force along the object's motion and to the left of it [N], torque about the vertical [N m].
+        std: (3,) their standard deviations.
         phase: ``contact`` or ``free_slide``.
-        speed: mean of the object's [m/s].
-        heading: of its motion in W [rad].
+        speed: mean speed of the object [m/s].
+        heading: direction of its motion in W [rad].
         yaw: of B [rad].
-        place: (2,) in W [m].
-        spin: mean rate of yaw [rad/s].
-        columns: (m, 3) what a unit of each component would change in the push's features, in units of their noise.
+        place: (2,) of B in W [m].
+        spin: mean yaw rate [rad/s].
+        columns: (m, 3) change of the push's whitened features per N, N and N m of the wrench.
     """
 
     push: int
@@ -63,12 +64,12 @@ class MissingWrench:
 
     @property
     def stands_out(self) -> bool:
-        """Whether the force along or across is more than two standard deviations from nothing."""
+        """Whether the force along or across is more than two standard deviations from zero."""
         return bool((np.abs(self.wrench[:2]) > 2.0 * self.std[:2]).any())
 
 
 def missing_wrenches(fitter: Fitter, plain: Fit) -> tuple[MissingWrench, ...]:
-    """The missing wrench in all windows of the pushes that a model can roll out."""
+    """The missing wrench in all windows of the pushes that the model can roll out."""
     case, h, point = fitter.case, plain.hypothesis, plain.point
     force = case.around.friction * case.around.weight
     units = np.array([force, force, force * 0.5 * case.around.radius])
@@ -160,7 +161,7 @@ def _solved(
 
 
 def with_phases(case: Case, wrenches: Sequence[MissingWrench]) -> tuple[MissingWrench, ...]:
-    """The phase of each window: a free slide begins when the recorded tip is last at the object's outline."""
+    """The wrenches with their phases: after the recorded tip last touches the object's outline, it slides freely."""
     released = {i: _released(case, i) for i in {w.push for w in wrenches}}
     return tuple(
         dc.replace(w, phase="contact" if 0.5 * (w.start + w.end) <= released[w.push] else "free_slide")

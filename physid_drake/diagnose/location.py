@@ -1,4 +1,4 @@
-"""The windows in which most is missing, in words that a person can check: pushes, places, headings, speeds."""
+"""Windows of pushes in words that a person can check: push, place, heading, speed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ALL_ROUND = math.radians(120.0)  # of headings on either side of their mean: the
 
 
 def windows_in_words(windows: Sequence[Window]) -> str:
-    """Where some windows are; empty for none."""
+    """Where the windows are; an empty text for no windows."""
     if not windows:
         return ""
     pushes = list(dict.fromkeys(number_of(w.push) for w in sorted(windows, key=lambda w: w.push)))
@@ -28,7 +28,7 @@ def windows_in_words(windows: Sequence[Window]) -> str:
 
 
 def number_of(push: str) -> str:
-    """A push's number: its file's name without folder and ending."""
+    """A push's number: the name of its file without folder and ending."""
     return PurePosixPath(push).stem
 
 
@@ -41,7 +41,7 @@ def _places(windows: Sequence[Window]) -> str:
 
 
 def headings_of(headings: Sequence[float]) -> str:
-    """The arc that holds all headings [rad], in words."""
+    """The arc of all headings [rad], in degrees, in words."""
     mean = cmath.phase(sum((cmath.rect(1.0, h) for h in headings), 0j))
     off = [math.remainder(h - mean, 2.0 * math.pi) for h in headings]
     if max(map(abs, off)) > ALL_ROUND:
@@ -55,7 +55,7 @@ def headings_of(headings: Sequence[float]) -> str:
 
 
 def speeds_of(speeds: Sequence[float]) -> str:
-    """The range of speeds [m/s], in words."""
+    """The range of speeds [m/s], in mm/s, in words."""
     low, high = 1e3 * min(speeds), 1e3 * max(speeds)
     texts = [f"{value:.2g}" if value < 100.0 else f"{value:.0f}" for value in (low, high)]
     return f"{texts[0]} mm/s" if texts[0] == texts[1] else f"{texts[0]} to {texts[1]} mm/s"

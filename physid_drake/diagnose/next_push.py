@@ -1,4 +1,4 @@
-"""The push that would tell rival models apart."""
+"""The push that would distinguish rival models best."""
 
 from __future__ import annotations
 
@@ -31,19 +31,20 @@ TRAVEL = 0.12  # m of the hand after the touch
 RUN_UP, RAMP, BRAKE = 0.02, 0.05, 0.05  # m, s, s
 AFTER = 1.0  # s
 LONGEST_TIME_STEP = 2e-3  # s, for hands as fast as these, which a recording's may not be
-REPEATS = 0.02  # of the motion: how well a push repeats
+REPEATS = 0.02  # relative standard deviation of the motion when a push is repeated
 
 
 def next_push(case: Case, models: Sequence[Physics]) -> NextPush | None:
-    """The push, of a grid of directions, speeds and contact offsets, whose end tells the models apart best.
+    """The push whose end distinguishes the models best, out of a grid of directions, speeds and contact offsets.
 
     Args:
-        case: the recording.
+        case: the recording, made ready.
         models: the rivals.
 
     Returns:
-        The push and the probability that it settles the question; None without rivals, without a hand, or where
-        every push would diverge or may lose the object.
+        The push and the probability that its end shows which model is right; None without rivals, without a hand, or
+        where
+        in every push a model diverges or the object may leave the table.
     """
     if len(models) < 2 or case.recording.hand is None:
         return None
@@ -71,7 +72,7 @@ def next_push(case: Case, models: Sequence[Physics]) -> NextPush | None:
 
 
 def brisk_pool(case: Case) -> RolloutPool:
-    """A pool like the case's, for a fast hand."""
+    """A pool with the case's cell, with time steps that are short enough for a fast hand."""
     spec = case.pool.spec
     share = min(1.0, LONGEST_TIME_STEP / spec.config.solver.time_step_s)
     config = dc.replace(spec.config, solver=spec.config.solver.scaled(share))

@@ -1,4 +1,4 @@
-"""Proposals: hypotheses with starts, from score tests, and from what effects usually are."""
+"""Proposals: hypotheses with starts for their fits, from score tests and from small effects."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ MOST_THETA_MOVE = 0.25  # of the unit cube
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Proposal:
-    """A hypothesis and where its fit starts."""
+    """A hypothesis, and z (n,) where its fit starts."""
 
     hypothesis: Hypothesis
     z: Array
 
 
 def with_part(base: Hypothesis, kind: type[Effect], point: Array) -> Hypothesis:
-    """The hypothesis with one more effect about a point (k,) of its chart."""
+    """The hypothesis with one more effect, whose coordinates have the prior mean ``point`` (k,) in its chart."""
     part = Part(kind=kind, point=tuple(point.tolist()), free=kind.leading(base.around))
     return dc.replace(base, parts=(*base.parts, part))
 
 
 def proposals(fit: Fit, scores: Sequence[Score]) -> list[Proposal]:
-    """Starts beside a fit: where score tests lead, and small effects of either sign.
+    """Starts of fits with one more effect: where score tests lead, and small effects in the same direction.
 
     Args:
-        fit: the model beside which effects are proposed.
-        scores: of effects, best first.
+        fit: the model to which effects are added.
+        scores: of families of effects, best first.
     """
     made, times = [], Counter[str]()
     for score in scores:

@@ -1,4 +1,4 @@
-"""What became of each effect of the catalogue, and why."""
+"""The ranking: what each effect of the catalogue gains, and why it was found or not."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 from physid_drake.diagnose.decide import confirmed, kinds_of
 from physid_drake.diagnose.evidence import Evidence
 from physid_drake.diagnose.regimes import standard_error
-from physid_drake.diagnose.search import Weighed
+from physid_drake.diagnose.search import Scored
 from physid_drake.diagnose.values import Ranked
 from physid_drake.inference.replicates import surprise, without_best
 from physid_drake.inference.scores import scores
 
 
 def ranking_of(evidence: Evidence, classes: Sequence[Sequence[str]]) -> tuple[Ranked, ...]:
-    """All effects, best first, alone: what each gains, fitted or by its columns, and why it was found or not.
+    """All effects, each alone beside the baseline, best first.
 
     Args:
-        evidence: what was fitted.
-        classes: of each effect that is named, those that may stand in its place.
+        evidence: all that was fitted.
+        classes: of each effect that is named, names of the effects that cannot be distinguished from it.
     """
     found = evidence.found
     alone = {kinds_of(one)[0].name: one for one in found.named if len(kinds_of(one)) == 1}
@@ -42,7 +42,7 @@ def ranking_of(evidence: Evidence, classes: Sequence[Sequence[str]]) -> tuple[Ra
     )
 
 
-def _why(name: str, one: Weighed | None, named: set[str], alike: set[str], evidence: Evidence) -> str:
+def _why(name: str, one: Scored | None, named: set[str], alike: set[str], evidence: Evidence) -> str:
     if name in named:
         return "found"
     if name in alike:
@@ -51,6 +51,12 @@ def _why(name: str, one: Weighed | None, named: set[str], alike: set[str], evide
         return "cannot be simulated" if evidence.found.odd else "no larger gain than by chance"
     if not confirmed(evidence.found, one):
         return "not confirmed by held-out pushes"
-    if named:
+    return _why_confirmed(name, named, evidence.decision.refuted)
+
+
+def _why_confirmed(name: str, named: set[str], refuted: Scored | None) -> str:
+    if refuted is not None and name in {kind.name for kind in kinds_of(refuted)}:
+        return "held-out pushes are likelier with it, but not predicted better"
+    if named or refuted is not None:
         return "smaller gain on held-out pushes"
     return "confirmed by held-out pushes, but more than noise remains"

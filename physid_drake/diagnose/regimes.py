@@ -1,4 +1,4 @@
-"""Regimes that a recording spans: does what was learnt on slow pushes hold on fast ones, and across headings?"""
+"""Generalisation across regimes: from slow to fast pushes, and from some headings to others."""
 
 from __future__ import annotations
 
@@ -22,11 +22,13 @@ APART = 1.0  # rad between the mean headings of two groups: less is one directio
 
 
 def regime_gains(fitter: Fitter, before: Fit, after: Fit) -> tuple[RegimeGain, ...]:
-    """Fit both models to one half of the pushes, predict the other half, by speed and by heading.
+    """Gains of one half of the pushes when both models are fitted to the other half only.
+
+    Halves are made by speed and by heading, where these differ enough.
 
     Args:
-        fitter: of the recording.
-        before: the baseline.
+        fitter: of the fits.
+        before: the baseline model.
         after: the model with effects.
     """
     found, case = [], fitter.case
@@ -47,7 +49,7 @@ def regime_gains(fitter: Fitter, before: Fit, after: Fit) -> tuple[RegimeGain, .
 
 
 def standard_error(values: Array) -> float:
-    """Of the sum of values (n,) over pushes; infinite for one push."""
+    """Standard error of the sum of independent values (n,); infinite for one value."""
     return float(np.std(values, ddof=1) * np.sqrt(len(values))) if len(values) > 1 else math.inf
 
 
@@ -65,7 +67,7 @@ def _by_speed(case: Case) -> Halves | None:
 
 
 def speed_of(case: Case, i: int) -> float:
-    """Of push i, as of ``push_speed`` [m/s]."""
+    """Speed of push ``i`` [m/s], as defined by ``push_speed``."""
     return push_speed(case.problems[i])
 
 

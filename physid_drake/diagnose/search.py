@@ -1,4 +1,4 @@
-"""All hypotheses about a recording, fitted on the twin: what a decision rests on."""
+"""All hypotheses about a recording, fitted on the twin."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ SINGLES = 4  # effects, beside each of which a second one is looked for
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
-class Weighed:
-    """A fitted hypothesis and how likely it makes pushes that were held out.
+class Scored:
+    """A fitted hypothesis, with its gains on held-out pushes.
 
     Attributes:
-        fit: at its best.
-        alike: p-value of "the pushes' own frictions differ by no more than those of surfaces do".
-        gains: (n,) log predictive density of each push, given the others, over that of the baseline [log likelihood].
+        fit: with the highest likelihood that was found.
+        gains: (n,) log predictive density of each held-out push, less that of the baseline [log likelihood].
+        alike: p-value of the hypothesis that frictions of the pushes differ by no more than usual.
     """
 
     fit: Fit
@@ -43,33 +43,33 @@ class Weighed:
 
     @property
     def name(self) -> str:
-        """Of the hypothesis."""
+        """Names of the hypothesis's effects."""
         return self.fit.hypothesis.name
 
     @property
     def gain(self) -> float:
-        """Of all pushes [log likelihood]."""
+        """Sum of the gains [log likelihood]."""
         return float(self.gains.sum())
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Found:
-    """What was fitted.
+    """All that was fitted.
 
     Attributes:
-        fitter: that did it.
-        baseline: with tolerances.
-        alike: of the baseline, as of ``Weighed``.
-        columns: of the catalogue beside it.
-        linearly: what each effect gains by these columns, its best push not counted, by its name [log likelihood].
-        p_value: that the best gain of the catalogue over the baseline is chance.
-        by_chance: (r,) the same in replicates of this recording in which the baseline is true, by name.
-        rare: whether the p-value is below what was asked for.
-        odd: whether that is so, or friction scatters by much.
-        named: hypotheses of the catalogue, best first; empty where none was looked for.
-        left: that the best gain of the catalogue over the first of them is chance; 1 where none was looked for.
-        left_gain: that gain, linearly [log likelihood].
-        unnamed: hypotheses of smooth forces and frictions without a name, best first.
+        fitter: of all fits.
+        baseline: the fit without effects, with the errors that all pushes may share.
+        alike: of the baseline, as in ``Scored``.
+        columns: of the catalogue's effects at the baseline.
+        linearly: by an effect's name, its linearised gain on held-out pushes without the largest [log likelihood].
+        p_value: of the best of these gains.
+        by_chance: by an effect's name, the same gains (r,) in replicates of the recording without any effect.
+        rare: whether the p-value is below the false-alarm rate that was asked for.
+        odd: whether that is so, or the scatter of friction is large.
+        named: hypotheses with effects of the catalogue, best first; empty where none were fitted.
+        left: p-value of the catalogue's best gain beside the first of them; 1 where this was not looked at.
+        left_gain: that gain, linearised [log likelihood].
+        unnamed: models with an unnamed force, best first.
     """
 
     fitter: Fitter
@@ -81,14 +81,14 @@ class Found:
     by_chance: dict[str, Array]
     rare: bool
     odd: bool
-    named: tuple[Weighed, ...] = ()
+    named: tuple[Scored, ...] = ()
     left: float = 1.0
     left_gain: float = 0.0
-    unnamed: tuple[Weighed, ...] = ()
+    unnamed: tuple[Scored, ...] = ()
 
     @property
     def richest(self) -> Fit:
-        """The likeliest fit of all that was looked at."""
+        """The fit with the highest likelihood."""
         return max(
             [self.baseline, *(one.fit for one in (*self.named, *self.unnamed))], key=lambda fit: fit.log_likelihood
         )
@@ -97,15 +97,15 @@ class Found:
 def searched(
     fitter: Fitter, plain: Fit, kinds: Sequence[type[Effect]], *, seed: int, alpha: float, progress: Progress
 ) -> Found:
-    """Fit effects, pairs of them where one leaves something, and physics without a name.
+    """Fit single effects, pairs of effects where one does not suffice, and unnamed forces.
 
     Args:
         fitter: of the recording.
-        plain: the baseline.
-        kinds: of effects that may be in it.
-        seed: of all that is drawn.
-        alpha: a p-value below which something is missing.
-        progress: called with the stage.
+        plain: the baseline model's fit.
+        kinds: effects that can be in the recording.
+        seed: random seed.
+        alpha: false-alarm rate; a p-value below it claims a mismatch.
+        progress: called with the stage, steps done and steps in all.
     """
     search = _Search(fitter, plain, kinds, np.random.default_rng(seed), alpha)
     progress("test for missing physics", 0, 0)
@@ -168,15 +168,15 @@ class _Search:
         seen, by_chance = gains_by_chance(self._fitter, fit, beside, self._rng, of_all)
         return dc.replace(found, left=p_value(seen, by_chance), left_gain=max(seen.values()))
 
-    def ranked(self, fits: Sequence[Fit]) -> tuple[Weighed, ...]:
+    def ranked(self, fits: Sequence[Fit]) -> tuple[Scored, ...]:
         """The fits with what each gains over the baseline, best first."""
         made = [
-            Weighed(fit=fit, gains=self._fitter.held_out(fit) - self._before, alike=_alike(self._fitter, fit))
+            Scored(fit=fit, gains=self._fitter.held_out(fit) - self._before, alike=_alike(self._fitter, fit))
             for fit in fits
         ]
         return tuple(sorted(made, key=lambda one: -one.gain))
 
-    def _with_best_polished(self, fits: Sequence[Fit]) -> tuple[Weighed, ...]:
+    def _with_best_polished(self, fits: Sequence[Fit]) -> tuple[Scored, ...]:
         """Ranked, when the best one is polished: it may not have been the best before."""
         ranked = self.ranked(fits)
         for _ in range(POLISHINGS):
@@ -191,7 +191,7 @@ class _Search:
 
 
 def better_of(fits: Sequence[Fit], others: Sequence[Fit]) -> list[Fit]:
-    """The fits, but of hypotheses that others have fitted likelier theirs."""
+    """The fits, each replaced by the other fit of the same hypothesis if that has a higher likelihood."""
     likelier = {one.hypothesis.name: one for one in others}
     return [
         max(fit, likelier.get(fit.hypothesis.name, fit), key=lambda one: one.log_likelihood) for fit in fits

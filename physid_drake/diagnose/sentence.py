@@ -1,4 +1,4 @@
-"""A verdict in one sentence."""
+"""The verdict as one sentence."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ def sentence(
     Args:
         verdict: as in ``diagnosis.json``.
         findings: the effects that are named.
-        partly: what takes a good part of a mismatch away, if something does.
-        better: whether a model without a name predicts pushes better than the baseline model.
-        fewest: pushes that it takes to say anything; None where there are as many.
-        known: whether the noise was stated or seen.
-        quieter: how many times the noise is larger than what the baseline model leaves, where it is far larger.
-        rare: whether the baseline leaves so much by chance more seldom than was asked for.
+        partly: effects that explain a part of the mismatch; None where there are none.
+        better: whether a model with an unnamed force predicts held-out pushes better than the baseline.
+        fewest: least number of pushes for a diagnosis, where the recording has fewer; otherwise None.
+        known: whether the tracker's noise was stated or seen at rests.
+        quieter: noise over the baseline's errors, where that is very large; otherwise None.
+        rare: whether the p-value is below the false-alarm rate that was asked for.
     """
     match verdict:
         case "consistent" | "underpowered":

@@ -1,4 +1,4 @@
-"""The diagnosis as a Drake system: it looks at what an identification leaves once there is one."""
+"""The diagnosis as a Drake system, which diagnoses identifications as they arrive."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ Array = NDArray[np.float64]
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Examined:
-    """An identification, and what a diagnosis says of it. It does not change, and ports need not copy it.
+    """An identification and its diagnosis. It is immutable; a Drake port that copies its value gets the same object.
 
     Attributes:
-        known: what was identified.
-        diagnosis, evidence: what it says and what that rests on; None where nothing was diagnosed.
+        known: the identification.
+        diagnosis: the answer; None where nothing was diagnosed.
+        evidence: what the answer rests on; None where nothing was diagnosed.
     """
 
     known: Identification
@@ -38,7 +39,7 @@ class Examined:
 
     @property
     def theta(self) -> Array:
-        """The identified theta (d,), by which a reader tells a new one."""
+        """The identified theta (d,), each entry in its unit."""
         return self.known.theta
 
 
@@ -57,8 +58,8 @@ class DiagnosisSystem(LeafSystem):
         """Prepare.
 
         Args:
-            examine: what to run on an identification.
-            begin: when it first looks at one [s], so as not to diagnose what is soon replaced.
+            examine: called with each new identification; returns its diagnosis.
+            begin: time of the diagram [s] before which identifications are ignored, since they will soon be replaced.
         """
         LeafSystem.__init__(self)
         self.set_name("diagnosis")
@@ -69,7 +70,7 @@ class DiagnosisSystem(LeafSystem):
         self.DeclarePeriodicUnrestrictedUpdateEvent(PUSH_PERIOD, begin, self._receive)
 
     def examined(self, context: Context) -> Examined | None:
-        """The latest answer held in the state; None before the first."""
+        """The latest answer, from the state; None before the first."""
         latest: Examined | None = unboxed(context.get_abstract_state(self._memory).get_value())
         return latest
 

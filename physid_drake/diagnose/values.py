@@ -1,4 +1,4 @@
-"""What a diagnosis says."""
+"""The values of an answer, as ``diagnosis.json`` has them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,14 @@ from typing import Any
 
 @dc.dataclass(frozen=True, kw_only=True)
 class ParameterEstimate:
-    """One parameter of an effect: value, unit, 90 % interval, null value (None for what only shapes the effect)."""
+    """One parameter of an effect.
+
+    Attributes:
+        value: the estimate; a number, or rows of numbers.
+        unit: of the value; ``-`` for none.
+        ci90: ends of the 90 % interval.
+        null: the value at which the effect vanishes; None for a parameter that only shapes the effect.
+    """
 
     value: Any
     unit: str
@@ -21,11 +28,12 @@ class EffectFinding:
     """An effect that was found.
 
     Attributes:
-        name, element: as in the catalogue.
+        name: as in the catalogue.
+        element: what it belongs to, as in the catalogue.
         indistinguishable_from: names of effects that explain these pushes as well.
-        probability: that the name is right, among those of the catalogue.
-        parameters: by name.
-        statement: one sentence.
+        probability: that the name is right, if the effect is in the catalogue.
+        parameters: estimates by the parameter's name.
+        statement: the effect in words.
     """
 
     name: str
@@ -38,12 +46,13 @@ class EffectFinding:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Partly:
-    """What takes a good part of an unexplained mismatch away, and leaves more than it may.
+    """Effects that explain a good part of an unexplained mismatch, but not all of it.
 
     Attributes:
-        effects: names; confirmed by pushes that were held out.
-        share: of the mean square error of held-out pushes that they take away, in standard deviations.
-        position, rotation: root mean square errors of held-out pushes with them [m, rad].
+        effects: their names; held-out pushes confirm them.
+        share: by which they reduce the mean squared error of held-out pushes in units of tracker noise [-].
+        position: rms error of held-out pushes with them, in the plane [m].
+        rotation: rms error of held-out pushes with them [rad].
     """
 
     effects: tuple[str, ...]
@@ -57,10 +66,11 @@ class Window:
     """A part of a push.
 
     Attributes:
-        push: file.
-        start, end: [s].
-        place: of the object, x, y [m].
-        heading: of its motion in W [rad].
+        push: name of its file.
+        start: [s].
+        end: [s].
+        place: of the object in W, x, y [m].
+        heading: direction of its motion in W [rad].
         speed: of the object [m/s].
         phase: ``contact`` or ``free_slide``.
     """
@@ -76,14 +86,14 @@ class Window:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Location:
-    """Where simulation and recording part.
+    """Where simulation and recording differ.
 
     Attributes:
         statement: a sentence that a person can check.
-        phase: of ``contact``, ``free_slide``.
-        dof: of ``along_motion``, ``across_motion``, ``rotation``.
-        frame: in which what is missing is constant.
-        windows: where it is largest.
+        phase: some of ``contact``, ``free_slide``.
+        dof: some of ``along_motion``, ``across_motion``, ``rotation``.
+        frame: in which the missing force or torque is constant; ``none`` where there is no such frame.
+        windows: with the largest missing wrench.
     """
 
     statement: str
@@ -95,7 +105,14 @@ class Location:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class RegimeGain:
-    """Gain in log predictive density of pushes of one regime when both models are fitted to the other one only."""
+    """Gain of the model with effects over the baseline on pushes of one regime, both fitted to the other regime only.
+
+    Attributes:
+        fitted_on: the regime of the fit, in words.
+        tested_on: the regime of the test, in words.
+        gain: of log predictive density, summed over its pushes [log likelihood].
+        standard_error: of the gain [log likelihood].
+    """
 
     fitted_on: str
     tested_on: str
@@ -105,18 +122,21 @@ class RegimeGain:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class FitQuality:
-    """How well pushes are predicted that were held out of the fit, by the baseline model and with what was found.
+    """Errors of held-out pushes, with the baseline model and with the model that was found.
 
     Attributes:
-        rms_before, rms_after: root mean square errors, in standard deviations of the measurement.
-        position_before, position_after: of the place of B [m].
-        rotation_before, rotation_after: of its yaw [rad].
-        log_score_gain: gain in log predictive density over all pushes [log likelihood], and its standard error over
-            pushes.
-        log_score_gain_se: that standard error [log likelihood].
-        per_push: name, error before and after in standard deviations, of each.
-        regimes: gains where fit and test are of different kinds of pushes.
-        force_before, force_after: of the hand's force [N]; None where none was compared.
+        rms_before: of x, y and yaw with the baseline, in units of tracker noise.
+        rms_after: the same with the model that was found.
+        position_before: rms distance of B in the plane with the baseline [m].
+        position_after: the same with the model that was found.
+        rotation_before: rms error of the yaw with the baseline [rad].
+        rotation_after: the same with the model that was found.
+        log_score_gain: of log predictive density, summed over pushes [log likelihood].
+        log_score_gain_se: its standard error over pushes [log likelihood].
+        per_push: of each, name, and rms before and after in units of tracker noise.
+        regimes: gains where the models were fitted to another regime.
+        force_before: rms error of the hand's force with the baseline [N]; None where none was compared.
+        force_after: the same with the model that was found.
     """
 
     rms_before: float
@@ -135,13 +155,13 @@ class FitQuality:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class ThetaEstimate:
-    """One parameter of theta.
+    """The estimate of one parameter of theta.
 
     Attributes:
-        value: with what was found in the model; where it is not identifiable, about what was known beforehand.
+        value: in the model that was found; near the prior's value where it is not identifiable.
         unit: of the value.
-        ci90: 90 % interval; where it is not identifiable, no wider than the prior's.
-        identifiable: whether these pushes at least halve what was not known of it.
+        ci90: 90 % interval; no wider than the prior's where it is not identifiable.
+        identifiable: whether the pushes at least halve the prior's standard deviation.
         before: the baseline model's estimate.
     """
 
@@ -158,12 +178,12 @@ class Ranked:
 
     Attributes:
         name: as in the catalogue.
-        gain: in log-likelihood, linearised: of its score test.
-        p_value: that such an effect gains as much on held-out pushes by chance.
-        held_out_gain: of the effect, in log-likelihood of held-out pushes, over the model without it; linearised
-            where it was not fitted. None where it would have to act the other way round.
-        held_out_se: its standard error over pushes; None where it was not fitted.
-        why: it was found, or lost.
+        gain: of log likelihood in its score test, linearised.
+        p_value: probability of such a gain on held-out pushes, the largest not counted, where no effect is there.
+        held_out_gain: of log likelihood of held-out pushes over the baseline; linearised where the effect was not
+            fitted. None where it would need the wrong sign.
+        held_out_se: its standard error over pushes; None where the effect was not fitted.
+        why: the reason for which it was found or rejected, in words.
     """
 
     name: str
@@ -176,13 +196,14 @@ class Ranked:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Detectable:
-    """The smallest effect that these pushes would have shown.
+    """The smallest effect of a kind that would have been detected.
 
     Attributes:
-        name, parameter: of the effect.
-        value: the smallest that would have been seen; of several parameters, the one named, the others at rest.
+        name: of the effect.
+        parameter: the one that the value is of; the effect's other amplitudes are null.
+        value: the smallest that would have been detected.
         unit: of the value.
-        sigmas: how far such an effect moves the object, in standard deviations of the tracker.
+        sigmas: rms motion of the object by such an effect, in units of tracker noise.
     """
 
     name: str
@@ -194,14 +215,16 @@ class Detectable:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class NextPush:
-    """The push that would tell the rivals apart.
+    """The push that would distinguish the rivals best.
 
     Attributes:
-        direction_deg: of the hand's way in W.
-        speed_mps: of the hand.
-        contact_offset_m: of the hand's line from the centre of B, to its left.
-        start_x_m, start_y_m, start_yaw_deg: of the object in W before it; elsewhere it may tell something else.
-        settles_with_probability: that it tells which rival is right.
+        direction_deg: of the hand's motion in W [deg].
+        speed_mps: of the hand [m/s].
+        contact_offset_m: of the hand's line from the centre of B, to the left [m].
+        start_x_m: of the object in W [m].
+        start_y_m: of the object in W [m].
+        start_yaw_deg: of the object in W [deg].
+        settles_with_probability: probability that its end shows which rival is right.
     """
 
     direction_deg: float
@@ -214,7 +237,7 @@ class NextPush:
 
     @property
     def aim(self) -> str:
-        """Where the hand's line passes the object, in words."""
+        """On which side of the object's centre the hand's line passes, in words."""
         offset = round(1e3 * self.contact_offset_m)
         if offset == 0:
             return "through the centre"
@@ -222,7 +245,7 @@ class NextPush:
 
     @property
     def start(self) -> str:
-        """Where the object stands before it, in words."""
+        """Where the object stands before the push, in words."""
         place = f"({1e3 * self.start_x_m:.0f}, {1e3 * self.start_y_m:.0f}) mm"
         return f"with the object at {place}, yaw {self.start_yaw_deg:.0f} deg"
 
@@ -234,29 +257,30 @@ class Diagnosis:
     Attributes:
         recording: its name.
         verdict: ``consistent``, ``explained``, ``ambiguous``, ``unexplained`` or ``underpowered``.
-        sentence: the verdict for a person.
-        p_value: of the baseline model: that noise and scatter alone would leave as much; 1 where there is hardly any
-            noise, and no more is left than the cell's own error.
+        sentence: the verdict in words.
+        p_value: of the hypothesis that no physics is missing; 1 where held-out errors are no larger than the
+            difference between two simulators.
         alpha: false-alarm rate that was asked for.
-        effects: that were found, in the order in which they were; empty unless explained or ambiguous.
-        location: of the mismatch; None where there is none.
-        fit: of pushes that were held out.
-        theta: by parameter.
-        next_push: None where none would help, or nothing pushes.
-        seed: of all that is drawn.
-        ranking: the catalogue, best first.
-        detectable: the smallest effects that would have been seen.
-        undetectable: names of effects of which not even the strongest would have been seen.
-        left: what remains, in words.
-        partly: what takes a part of an unexplained mismatch away.
-        reduced_chi2_before, reduced_chi2_after: cost per degree of freedom, plain and with what was found.
-        friction_scatter: of the last model's friction, push to push, relative.
-        noise: ``position_m``, ``rotation_rad``, ``correlation_time_s`` (of both), ``jitter_s`` that were used, and
-            ``hand_m`` and ``force_n`` (of a component) where hand and force were, ``hand_correlation_time_s`` where
-            the hand's noise is slow.
-        warnings: what was found odd, one line each.
-        rollouts: how many were asked for, those of an interrupted run that were kept included.
-        pushes: of the whole recording, looked at or not.
+        effects: that were found; empty unless the verdict is ``explained`` or ``ambiguous``.
+        location: where the mismatch is; None where there is none.
+        fit: errors of held-out pushes.
+        theta: estimates by the parameter's name.
+        next_push: the push that would distinguish rivals best; None where there is none.
+        seed: random seed.
+        ranking: all effects of the catalogue, best first.
+        detectable: the smallest effects that would have been detected.
+        undetectable: names of effects that would not have been detected at any size within their bounds.
+        left: what the model that was found leaves, in words.
+        partly: effects that explain a part of an unexplained mismatch; None where there are none.
+        reduced_chi2_before: of the baseline model.
+        reduced_chi2_after: of the model that was found.
+        friction_scatter: relative standard deviation of friction between pushes in the model that was found [-].
+        noise: ``position_m``, ``rotation_rad``, ``correlation_time_s`` (of both) and ``jitter_s`` that were used;
+            ``hand_m`` and ``force_n`` (of a component) where they were compared; ``hand_correlation_time_s`` where
+            the hand's noise is correlated.
+        warnings: about the recording, one line each.
+        rollouts: number of rollouts, with those that an interrupted run had kept.
+        pushes: number of pushes in the recording, of which not all may have been used.
     """
 
     recording: str
@@ -285,7 +309,7 @@ class Diagnosis:
 
     @property
     def with_it(self) -> str | None:
-        """In words, what the model that leaves has beside the baseline model; None where nothing."""
+        """What the model that was found adds to the baseline, in words; None where it is the baseline."""
         if self.effects:
             return "with the effects found"
         return None if self.fit.rms_after == self.fit.rms_before else "with an unnamed force"

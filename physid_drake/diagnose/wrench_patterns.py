@@ -1,8 +1,8 @@
-"""Where a missing wrench lives: in which frame it is constant, on what it depends, in which phase it acts.
+"""The pattern of the missing wrench: in which frame it is constant, what it depends on, and in which phase it acts.
 
-Every look is a pattern of a wrench over all windows of all pushes, and is judged like an effect: by what it explains
-of what the baseline model leaves, theta and the per-push parameters projected out. Sign flips of whole pushes say
-how much the best of all looks explains by chance.
+A pattern is a wrench over all windows of all pushes, with a few coefficients. It is judged like an effect, by how
+much of the baseline model's errors it explains, with theta and the nuisance parameters projected out. Random sign
+flips of whole pushes give the distribution of the best of all patterns by chance.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ CHANCE = 0.05  # of the best of all looks
 SURE = 2.5  # standard deviations of a window's wrench
 PHASES = ("contact", "free_slide")
 DOFS = ("along_motion", "across_motion", "rotation")
-FEWEST_PUSHES = 6  # of which sign flips can tell anything: two of 2^5 patterns are 6 %
+FEWEST_PUSHES = 6  # with fewer, sign flips cannot be significant: two of 2^5 patterns are 6 %
 LOUDEST = 3.0  # standard deviations that one push may speak with
 AS_GOOD = 0.8  # of the gain in one phase: the pattern holds in both
-IMITATED = 1e-9  # of a look: less is rounding
+IMITATED = 1e-9  # of a pattern's columns: what is left without theta is rounding below this
 DIGITS = 6  # of gains that are compared: of looks that theta makes the same, the first, whatever the rounding
 A_PART = 0.25  # of the most that a phase or a degree of freedom has
 SAID = {"contact": "contact", "free_slide": "free sliding"}
@@ -41,13 +41,13 @@ SAID = {"contact": "contact", "free_slide": "free sliding"}
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Look:
-    """A pattern of a wrench.
+    """A pattern of the wrench.
 
     Attributes:
-        frame: in which it is constant, as ``diagnosis.json`` has it.
-        dof: the degrees of freedom that it moves.
-        words: from its coefficients (k,).
-        weights: (n, 3, k) the wrench in every window, along and across the motion and as a torque, per coefficient.
+        frame: in which it is constant, as in ``diagnosis.json``.
+        dof: degrees of freedom in which it has components.
+        words: describes it, given its coefficients (k,).
+        weights: (n, 3, k) force along and across the motion, and torque, in each of n windows, per coefficient.
     """
 
     frame: str
@@ -80,14 +80,17 @@ def locate(
     rng: np.random.Generator,
     frame: str | None = None,
 ) -> Location:
-    """The look that explains most; in no direction where none explains more than the best would by chance.
+    """The location of the mismatch, with the pattern that explains most.
+
+    No pattern is named where the best explains no more than the best does by chance.
 
     Args:
-        fitter: of the case.
+        fitter: of the fit.
         plain: the model that lacks something.
         wrenches: what it lacks, window by window.
-        rng: of the sign flips.
-        frame: of the physics that was found; of the looks those in this frame are in question, if there are any.
+        rng: draws sign flips.
+        frame: of the effect that was found; only patterns in this frame are considered, if there are any. None
+            considers all.
     """
     if not wrenches:
         return NOWHERE
@@ -110,12 +113,12 @@ def locate(
 
 
 def looks_at(wrenches: Sequence[MissingWrench], order: Array, phases: Sequence[str] = PHASES) -> list[Look]:
-    """All looks, in words and as patterns (n, 3, k) over the windows.
+    """All patterns over the windows.
 
     Args:
         wrenches: n windows.
-        order: (n,) of their pushes.
-        phases: in which they act; elsewhere the patterns are zero.
+        order: (n,) number of each window's push.
+        phases: in which patterns act; their weights are zero elsewhere.
     """
     heading, yaw, speed, spin = (np.array([getattr(w, name) for w in wrenches]) for name in
                                  ("heading", "yaw", "speed", "spin"))  # fmt: skip
@@ -226,7 +229,7 @@ def _explained(
     fitter: Fitter, plain: Fit, wrenches: Sequence[MissingWrench], looks: Sequence[Look], rng: np.random.Generator
 ) -> tuple[list[float], list[Array], Array]:
     """Gains (minus logs of a chi-square's p) and coefficients of looks, and (f,) the best gain of flipped pushes."""
-    # What differs from push to push may be what is missing, and not friction that scatters.
+    # A large scatter of friction may be the missing physics; it must not absorb it here.
     roots = [
         _root(push, prior) for push, prior in zip(plain.pushes, fitter.priors(min(plain.scatter, 1.0)), strict=True)
     ]

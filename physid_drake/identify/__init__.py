@@ -1,4 +1,4 @@
-"""The first story: theta from recorded pushes."""
+"""Identification: the parameters theta of the baseline model, from recorded pushes."""
 
 from physid_drake.identify.accuracy import Accuracy as Accuracy
 from physid_drake.identify.cells import Combination as Combination

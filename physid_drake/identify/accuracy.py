@@ -1,4 +1,4 @@
-"""How well pushes are predicted: errors in units that a person can check."""
+"""How well pushes are predicted: root mean square errors in physical units and in units of tracker noise."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ class Accuracy:
     """Root mean square errors of pushes, over the windows that are compared.
 
     Attributes:
-        rms: of their poses, in standard deviations.
-        per_push: the same of each.
-        position, rotation: of place and yaw [m, rad]; NaN of a yaw that was not measured.
-        end_position, end_rotation: in the last window of each [m, rad].
-        force: of the hand's force [N]; NaN where none was compared.
-        force_per_push: of the force of each, in standard deviations; NaN of those without.
-        diverged: pushes that could not be simulated, which are left out.
+        rms: of x, y and yaw, in units of tracker noise.
+        per_push: the same for each push.
+        position: of the distance in the plane [m].
+        rotation: of the yaw [rad]; NaN where no yaw was measured.
+        end_position: of the distance in each push's last window [m].
+        end_rotation: of the yaw in each push's last window [rad].
+        force: of the size of the hand's force [N]; NaN where none was compared.
+        diverged: number of pushes that could not be simulated, which are not in the errors.
     """
 
     rms: float
@@ -35,17 +36,21 @@ class Accuracy:
     end_position: float
     end_rotation: float
     force: float
-    force_per_push: tuple[float, ...]
     diverged: int = 0
 
 
 def accuracy_of(case: Case, errors: Sequence[Array | None]) -> Accuracy:
-    """Of what was recorded less what was predicted of each push (m_i,), in the features' units; None: no rollout."""
+    """The accuracy of predictions.
+
+    Args:
+        case: the recording, made ready.
+        errors: per push (m,), recorded less predicted features, in the features' units; None where there is no
+            rollout.
+    """
     made = [(f, e) for f, e in zip(case.features, errors, strict=True) if e is not None]
     poses = [f.poses(e) for f, e in made]
     forces = [f.forces(e) for f, e in made]
     scaled = [(p / f.sigmas)[:, : f.dofs] for (f, _), p in zip(made, poses, strict=True)]
-    scaled_forces = [p / f.force_sigmas for (f, _), p in zip(made, forces, strict=True)]
     turned = _joined([p for (f, _), p in zip(made, poses, strict=True) if f.dofs == 3])[:, 2]
     turned_last = np.array([p[-1, 2] for (f, _), p in zip(made, poses, strict=True) if f.dofs == 3])
     every, last = _joined(poses), np.array([p[-1] for p in poses]).reshape(-1, 3)
@@ -53,7 +58,7 @@ def accuracy_of(case: Case, errors: Sequence[Array | None]) -> Accuracy:
         rms=rms(np.concatenate([np.zeros(0), *map(np.ravel, scaled)])), per_push=tuple(rms(s) for s in scaled),
         position=math.sqrt(2.0) * rms(every[:, :2]), rotation=rms(turned),
         end_position=math.sqrt(2.0) * rms(last[:, :2]), end_rotation=rms(turned_last),
-        force=math.sqrt(2.0) * rms(_joined(forces, 2)), force_per_push=tuple(rms(s) for s in scaled_forces),
+        force=math.sqrt(2.0) * rms(_joined(forces, 2)),
         diverged=len(errors) - len(made),
     )  # fmt: skip
 
@@ -63,5 +68,5 @@ def _joined(parts: Sequence[Array], width: int = 3) -> Array:
 
 
 def rms(values: Array) -> float:
-    """Root mean square; NaN of nothing."""
+    """Root mean square; NaN of an empty array."""
     return float(np.sqrt(np.mean(np.square(values)))) if values.size else math.nan

@@ -1,4 +1,4 @@
-"""The hypothesis without effects, fitted from many starts, and with what pushes may differ by that is no physics."""
+"""Fits the hypothesis without effects from many starts, and with errors that are no missing physics."""
 
 from __future__ import annotations
 
@@ -24,13 +24,20 @@ Array = NDArray[np.float64]
 
 CANDIDATES, STARTS = 64, 4  # points of theta that are looked at, and from which the baseline is fitted
 LAST = 8  # steps of a fit
-RESEATINGS, WORTH = 12, 1.0  # at most, while one gains so much log likelihood
-TRIED = 8  # thetas, and the nominal one, at which a push must fail to be left to the cell, or out
-STICKS = "static_ratio"  # of theta: what sticks before it slips is the cell's
+RESEATINGS, WORTH = 12, 1.0  # most searches; gain of log likelihood that is worth another
+TRIED = 8  # thetas beside the nominal one: a push that fails at all of them is left to the cell, or out
+STICKS = "static_ratio"  # a parameter that the twin does not know: static over kinetic friction
 
 
 def fitter_of(case: Case, seed: int) -> Fitter:
-    """What fits hypotheses to a case, without pushes that nothing can roll out, and with noise as loud as it shows.
+    """A fitter for a case, without the pushes that cannot be rolled out.
+
+    Where the recording neither states nor shows the tracker's noise, it is estimated from what the baseline model
+    leaves.
+
+    Args:
+        case: the recording, made ready.
+        seed: of the starts of that fit of the baseline model.
 
     Raises:
         RecordingError: if no push can be rolled out.
@@ -69,10 +76,15 @@ def baseline_hypothesis(case: Case) -> Hypothesis:
 
 
 def baseline(fitter: Fitter, rng: np.random.Generator, starts: Sequence[Array] = ()) -> Fit:
-    """The model without effects, fitted from the best of many starts, and from given thetas (d,) beside them.
+    """The baseline model, fitted on the twin from the best of many starts.
+
+    Args:
+        fitter: of the recording.
+        rng: draws starts from the prior.
+        starts: thetas (d,) that are tried beside these, each entry in its unit.
 
     Raises:
-        RecordingError: if none of them can be rolled out.
+        RecordingError: if no start can be rolled out.
     """
     hypothesis = baseline_hypothesis(fitter.case)
     space = hypothesis.space
@@ -91,9 +103,15 @@ def baseline(fitter: Fitter, rng: np.random.Generator, starts: Sequence[Array] =
 
 
 def settled(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
-    """The fit with each push on the better of its ways, fitted again while that helps.
+    """The fit after repeated searches for better nuisance parameters, each followed by a fit.
 
-    Ways are looked for from draws: once in vain does not say that there are none.
+    The searches are those of ``multistart.reseated``. It ends after two searches in a row that gain nothing, since
+    starts are drawn and one search may miss a better minimum.
+
+    Args:
+        fitter: of the fit.
+        fit: where to begin.
+        rng: draws starts.
     """
     in_vain = 0
     for _ in range(RESEATINGS):
@@ -108,10 +126,10 @@ def settled(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
 
 
 def with_tolerances(fitter: Fitter, fit: Fit) -> Fit:
-    """The model with what pushes may differ by without its being physics.
+    """The fit with errors that are no missing physics, fitted anew; the fitter is changed to have them.
 
-    Each push's hand path has the errors that its stream's noise allows; all share slight errors of size, pressure,
-    centre and clocks.
+    Each push's hand path has the errors that its stream's noise allows; all pushes share slight errors of sizes, of
+    the pressure, of centres and of clocks (``effects.tolerated``).
     """
     h, predictor = fit.hypothesis, fitter.predictor
     predictor.with_directions(predictor.path_errors(fit.point.nuisance, h.physics(fit.point.z)))
@@ -127,7 +145,7 @@ def with_tolerances(fitter: Fitter, fit: Fit) -> Fit:
 
 
 def fitted_at(fitter: Fitter, h: Hypothesis, z: Array, near: Fit) -> Fit:
-    """A hypothesis fitted from a point that can be rolled out, with the per-push parameters of another fit."""
+    """A hypothesis fitted from z (n,), which can be rolled out, and from the nuisance parameters of another fit."""
     point = fitter.points([h], [z], [near.point.nuisance])[0]
     assert point is not None
     return fitter.fitted(fitter.started([h], [point], [None], TAIL), LAST)[0]

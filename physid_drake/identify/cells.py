@@ -1,4 +1,4 @@
-"""Friction that differs from cell to cell: what pushes tell of the cells."""
+"""Friction that differs between cells of the underside: which combinations of the cells are identifiable."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ Array = NDArray[np.float64]
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Combination:
-    """A combination of the cells' ln frictions, as these pushes tell it.
+    """A linear combination of the cells' ln frictions.
 
     Attributes:
         weights: (n,) of the cells; their magnitudes sum to 1.
-        strength: singular value of the whitened Jacobian relative to the prior, the other unknowns projected out.
-        left: share of the prior's standard deviation that the pushes leave: (1 + strength^2)^-1/2.
+        strength: singular value of the whitened Jacobian relative to the prior, with the other parameters projected
+            out [-].
+        left: posterior over prior standard deviation of the combination [-]: (1 + strength^2)^(-1/2).
     """
 
     weights: Array
@@ -32,22 +33,22 @@ class Combination:
 
     @property
     def identifiable(self) -> bool:
-        """Whether the pushes halve what the prior leaves open."""
+        """Whether the pushes leave less than ``MOST_PRIOR_LEFT`` of the prior's standard deviation."""
         return self.left < MOST_PRIOR_LEFT
 
 
 @dc.dataclass(frozen=True, kw_only=True)
 class IdentifiableCells:
-    """What pushes tell about the friction of the cells.
+    """What pushes say about the friction of the cells.
 
     Attributes:
-        grid: ``(nx, ny)``.
-        names: (n,) of the cells that are unknowns.
+        grid: number of cells along x and y of B.
+        names: (n,) of the cells whose friction is a parameter.
         friction: (n,) estimates [-].
-        left: (n,) share of the prior's standard deviation of ln friction that is left of each cell.
-        combinations: n of them, independent of one another, best identified first.
-        apart: pairs of neighbouring cells whose ratio of frictions is identifiable.
-        not_apart: pairs whose ratio is not.
+        left: (n,) posterior over prior standard deviation of each cell's ln friction [-].
+        combinations: n of them, uncorrelated in prior and posterior, the best identified first.
+        apart: names of neighbouring cells whose ratio of frictions is identifiable.
+        not_apart: names of neighbouring cells whose ratio is not.
     """
 
     grid: tuple[int, int]
@@ -65,16 +66,18 @@ class IdentifiableCells:
 
 
 def identifiable_cells(thetas: ThetaMap, theta: Array, prior: Array, posterior: Array) -> IdentifiableCells | None:
-    """What a fit tells about the cells; None without a grid.
+    """Which combinations of the cells' frictions a fit identifies; None without a grid of cells.
+
+    They are the generalised eigenvectors of posterior against prior covariance of ln friction.
 
     Args:
         thetas: the parameters.
-        theta: (d,) the estimate.
-        prior: covariance (d, d) before any push, in the unit cube.
-        posterior: after them.
+        theta: (d,) the estimate, each entry in its unit.
+        prior: covariance (d, d) of theta before any push, in the unit cube.
+        posterior: covariance (d, d) of theta given the pushes, in the unit cube.
 
-    Source: the generalised eigenvalues of posterior against prior covariance; A. Spantini et al., "Optimal low-rank
-    approximations of Bayesian linear inverse problems", SIAM J. Sci. Comput. 37, 2015.
+    Source: A. Spantini et al., "Optimal low-rank approximations of Bayesian linear inverse problems", SIAM J. Sci.
+        Comput. 37, 2015.
     """
     space = thetas.space
     grid = [name for name in friction_names(thetas.cells) if name in space.names]

@@ -12,14 +12,14 @@ class SearchConfig:
     Attributes:
         method: a name in ``search.SEARCHES``.
         candidates: number of thetas in the candidate set.
-        budget: thetas tried.
-        batch: thetas per update of the belief.
-        entropy_tolerance_nats: the search stops when the entropy of P_min moves less than this.
-        patience: over so many updates.
-        refine_every: trials after which the candidates gather where the best theta may be; 0 keeps one fixed set.
+        budget: largest number of thetas that are tried.
+        batch: thetas that are tried between two updates of the belief.
+        entropy_tolerance_nats: the search stops when the entropy of P_min has changed by less than this ...
+        patience: ... in so many updates.
+        refine_every: trials after which candidates are drawn anew where P_min is large; 0 keeps the first set.
         jobs: processes; 0 takes the machine's cores.
-        integrator: ``twin`` simulates every trial of the search in the compiled planar image of the cell, and in
-            Drake what that does not know; ``cell`` all of them in Drake, which takes a hundred times as long.
+        integrator: ``twin`` simulates trials with the compiled twin where it can, and with Drake otherwise; ``cell``
+            simulates all of them with Drake, which takes about a hundred times as long.
         online: learn from one push after another, with a small search for each, instead of from all at once.
     """
 

@@ -1,4 +1,4 @@
-"""Theta with intervals, of any hypothesis."""
+"""Estimates of theta with 90 % intervals, from the fit of any hypothesis."""
 
 from __future__ import annotations
 
@@ -16,21 +16,23 @@ from physid_drake.space import Parameter, ParameterSpace
 Array = NDArray[np.float64]
 
 Z90 = float(stats.norm.ppf(0.95))
-MOST_PRIOR_LEFT = 0.5  # share of the prior's standard deviation that may be left of what counts as identifiable
+MOST_PRIOR_LEFT = 0.5  # posterior over prior standard deviation, below which a parameter is identifiable
 AT_BOUND = 2e-3  # of the unit cube
 
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """One parameter of theta, as these pushes tell it.
+    """The estimate of one parameter of theta.
 
     Attributes:
-        name, unit: which.
-        value: best estimate.
-        ci90: 90 % interval; of what is not identifiable, no wider than the prior's.
-        identifiable: whether the pushes leave at most half of the prior's spread (``MOST_PRIOR_LEFT``).
-        prior: its value before.
-        at_bound: whether it ran into a bound that is none of physics: the truth may lie beyond.
+        name: of the parameter.
+        unit: of the values.
+        value: the estimate.
+        ci90: 90 % interval; of a parameter that is not identifiable, no wider than the prior's.
+        identifiable: whether the posterior standard deviation is less than ``MOST_PRIOR_LEFT`` of the prior's.
+        prior: the prior's value.
+        at_bound: whether the value is at a bound of the search that physics does not set: the true one may lie
+            beyond.
     """
 
     name: str
@@ -43,15 +45,23 @@ class Estimate:
 
 
 def t_factor(fit: Fit) -> float:
-    """How much wider than a normal interval one is with so few pushes; the cell's own error does not grow with it."""
+    """Width of a 90 % interval of Student's t over that of a normal distribution.
+
+    The degrees of freedom are pushes less coordinates that rollouts depend on, at least 2.
+    """
     free = max(2, len(fit.pushes) - fit.hypothesis.simulated)
     return float(stats.t.ppf(0.95, free)) / Z90
 
 
 def estimates_of(fitter: Fitter, fit: Fit) -> tuple[Estimate, ...]:
-    """Theta under a model: by the curvature of its likelihood, the per-push parameters integrated out.
+    """Estimates of theta, by the curvature of the posterior with the nuisance parameters integrated out.
 
-    As wide as a Student t of so few pushes has it, and no narrower than the cell's own error, which pushes share.
+    An interval is that of Student's t for so few pushes, with the simulator's own error added, which all pushes
+    share. Of a parameter that is not identifiable it is the prior's where that is uniform.
+
+    Args:
+        fitter: of the fit.
+        fit: of any hypothesis.
     """
     h = fit.hypothesis
     space, u, here = h.space, fit.point.z[: h.space.dimension], h.theta(fit.point.z)

@@ -1,4 +1,4 @@
-"""The story: a recording in, an identified model out. It is the hypothesis without effects."""
+"""Identification as a whole: from a recording to parameters with intervals. It is the hypothesis without effects."""
 
 from __future__ import annotations
 
@@ -30,25 +30,26 @@ from physid_drake.search import SearchResult
 Array = NDArray[np.float64]
 
 EXPLAINED = 1.5  # reduced chi-square below which the baseline model leaves no more than noise and its own error
-MOST_SCATTER = 0.08  # of friction between pushes: those that differ by more differ in something that the model lacks
+MOST_SCATTER = 0.08  # of friction between pushes [-]: a larger one stands for missing physics
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Identification:
-    """What was identified. It does not change, and is not copied where a Drake port would copy it.
+    """The result of an identification. It is immutable; a Drake port that copies its value gets the same object.
 
     Attributes:
-        case: the pushes.
-        fitter: whose predictions they are judged by.
+        case: the recording, made ready.
+        fitter: whose predictions ``fit`` is judged by: those of the Drake cell, or of the twin where the cell was not
+            asked.
         fit: theta, and each push's nuisance parameters.
-        found: the same where it was found, on the twin; a diagnosis goes on from it.
-        finder: that found it.
-        search: the search's result, whose belief holds P_min; None where there was none.
+        found: the fit on the twin, before the cell's steps; a diagnosis goes on from it.
+        finder: the fitter of ``found``.
+        search: the result of the search, whose belief holds P_min; None without a search.
         before: accuracy with the prior's theta; None where the cell was not asked.
-        errors: per push (m,), recorded less what the cell predicts with what all other pushes say; none where it was
-            not asked.
-        rough: noise of the process that counts beside the sensors'.
-        foreseen: accuracy on each push before it was learned from; None where all were learned at once.
+        errors: per push (m,), recorded less predicted features in the features' units, the cell's prediction made
+            with theta from all other pushes; empty where the cell was not asked.
+        rough: the process noise that was added to the sensors'.
+        foreseen: accuracy on each push before it was learned from; None where all were learned from at once.
     """
 
     case: Case
@@ -72,24 +73,24 @@ class Identification:
 
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:
-        """One per parameter."""
+        """An estimate with its interval for each parameter."""
         return estimates_of(self.fitter, self.fit)
 
     @cached_property
     def covariance(self) -> Array:
-        """Of theta (d, d) in the unit cube."""
+        """Covariance (d, d) of theta in the unit cube."""
         d = self.fit.hypothesis.space.dimension
         return self.fitter.covariance(self.fit)[:d, :d]
 
     @property
     def correlation(self) -> Array:
-        """Of theta (d, d), each entry on its parameter's scale."""
+        """Correlation (d, d) of theta, with parameters on a log scale as their logarithms."""
         stds = np.sqrt(np.diag(self.covariance))
         return np.asarray(self.covariance / np.outer(stds, stds))
 
     @cached_property
     def cells(self) -> IdentifiableCells | None:
-        """What the pushes tell about friction cells; None without a grid of them."""
+        """What the pushes say about friction cells; None without a grid of them."""
         d, h = self.fit.hypothesis.space.dimension, self.fit.hypothesis
         prior = np.linalg.inv(h.precision[:d, :d])
         return identifiable_cells(self.case.thetas, self.theta, np.asarray(prior), self.covariance)
@@ -101,12 +102,15 @@ class Identification:
 
     @cached_property
     def after(self) -> Accuracy | None:
-        """Accuracy on each push with what all others say; None where the cell was not asked."""
+        """Accuracy on held-out pushes, each with theta from all others; None where the cell was not asked."""
         return accuracy_of(self.case, self.errors) if self.errors else None
 
     @property
     def noise(self) -> dict[str, Any]:
-        """Of the sensors, by keys with their units; of hand and force where they are compared."""
+        """Standard deviations and times of the sensors' noise, by keys that end with their units.
+
+        Those of the hand and of its force are there where they are compared.
+        """
         case = self.case
         hand = {} if case.recording.hand is None else {"hand_m": case.sensors.hand}
         if case.sensors.hand_memory > 0.0:
@@ -123,44 +127,44 @@ class Identification:
 
     @cached_property
     def fitted(self) -> Accuracy:
-        """Accuracy of the fit, each push's nuisance parameters at their likeliest."""
+        """Accuracy of the fit, with each push's most probable nuisance parameters."""
         predictor = self.fitter.predictor
         pairs = zip(predictor.recorded, self.fit.point.predicted, predictor.whitening, strict=True)
         return accuracy_of(self.case, [np.asarray(np.linalg.solve(w, y - f)) for y, f, w in pairs])
 
     @property
     def friction_scatter(self) -> float:
-        """Standard deviation of friction from push to push [-]."""
+        """Relative standard deviation of friction between pushes [-]."""
         return UNIT_SCATTER * self.fit.scatter
 
     @property
     def degrees(self) -> int:
-        """Residuals less parameters."""
+        """Degrees of freedom: residuals less parameters."""
         return self.fit.degrees
 
     @property
     def reduced_chi2(self) -> float:
-        """Squares that are left, in units of noise, with what the priors cost, per degree of freedom."""
+        """Squared residuals in units of the noise, plus the prior's squares, over the degrees of freedom."""
         return self.fit.reduced_chi2
 
     @property
     def explains(self) -> bool:
-        """Whether the baseline model explains the pushes to their noise, with frictions that hardly differ."""
+        """Whether the baseline model explains the pushes to within noise, at a small scatter of friction."""
         return self.reduced_chi2 < EXPLAINED and not self.by_frictions
 
     @property
     def by_frictions(self) -> bool:
-        """Whether frictions that differ from push to push took up what the baseline model leaves."""
+        """Whether the fit needs frictions that differ between pushes by more than ``MOST_SCATTER``."""
         return self.friction_scatter > MOST_SCATTER
 
     @property
     def rollouts(self) -> int:
-        """How many were made."""
+        """Number of rollouts that were made."""
         return self.finder.predictor.count + self.fitter.predictor.count
 
 
 def unknowns_of(case: Case, fit: Fit) -> dict[str, dict[str, float]]:
-    """Each push's nuisance parameters, by its name, in their units."""
+    """Each push's nuisance parameters, by the push's name and theirs, each in its unit."""
     triples = zip(case.problems, case.nuisances, fit.point.nuisance, strict=True)
     return {push.name: dict(zip(n.names, (nuisance * n.stds).tolist(), strict=True)) for push, n, nuisance in triples}
 
@@ -168,13 +172,13 @@ def unknowns_of(case: Case, fit: Fit) -> dict[str, dict[str, float]]:
 def identified(
     case: Case, *, seed: int, search: ThetaSearch | None = None, progress: Progress | None = None
 ) -> Identification:
-    """Identify theta: search, many starts of a fit on the twin, and what the Drake cell says of the best.
+    """Identify theta: a search, fits from many starts on the twin, and a refit of the best in the Drake cell.
 
     Args:
-        case: the pushes.
+        case: the recording, made ready.
         seed: of the starts.
-        search: whose best theta is a start, too; None goes without.
-        progress: called with the stage, steps done, steps in all.
+        search: its best theta is one of the starts; None makes no search.
+        progress: called with the stage, steps done and steps in all.
 
     Raises:
         RecordingError: if no push can be rolled out.
@@ -191,14 +195,14 @@ def identified(
 def identified_with(
     known: Identification, rough: ProcessNoise, added: Sequence[Array], *, seed: int, progress: Progress
 ) -> Identification:
-    """The same with process noise beside the sensors'.
+    """The identification, made again with process noise added to the sensors'.
 
     Args:
-        known: what was identified without it.
+        known: the identification without it.
         rough: the process noise.
-        added: what it adds to each push's noise, as ``process_noise.learned`` has it.
+        added: covariances (m_i, m_i) that it adds to each push, from ``process_noise.learned``.
         seed: of the starts.
-        progress: called with the stage.
+        progress: called with the stage, steps done and steps in all.
     """
     finder = Fitter(known.case, known.finder.predictor.noisier(added))
     again = _identified(finder, seed, [known.theta], known.search, rough, progress)
@@ -221,14 +225,14 @@ def _identified(
 
 
 def in_the_cell(known: Identification) -> Identification:
-    """The same with what the Drake cell says of it."""
+    """The identification with its fit refined in the Drake cell, and with that cell's held-out errors."""
     judge = Judge(known.finder)
     fit = judge.judged(known.found)
     return dc.replace(known, fitter=judge.fitter, fit=fit, errors=judge.left_out(fit))
 
 
 def with_prior(known: Identification) -> Identification:
-    """The same with the accuracy of the prior's theta."""
+    """The identification with the accuracy that the prior's theta has in the Drake cell."""
     h = known.fit.hypothesis
     errors = Judge(known.finder).errors(h, [h.mean] * len(known.fit.pushes))
     return dc.replace(known, before=accuracy_of(known.case, errors))
@@ -238,7 +242,7 @@ class Identifier:
     """Identifies theta from a recording.
 
     Attributes:
-        case: the recording, ready.
+        case: the recording, made ready.
     """
 
     def __init__(
@@ -252,30 +256,32 @@ class Identifier:
         state: Path | None = None,
         most: int = MOST_PUSHES,
     ) -> None:
-        """Prepare.
+        """Check the recording and make it ready.
 
         Args:
             recording: the pushes.
-            cell: how the pushes are simulated.
-            theta: what is unknown.
-            search: how it is searched for.
-            seed: of everything random.
-            state: a file in which the search's belief is kept, to go on from.
-            most: pushes to look at; of more, so many are taken at equal distances.
+            cell: how pushes are simulated.
+            theta: which parameters are unknown.
+            search: how they are searched for.
+            seed: random seed.
+            state: a file that keeps the search's belief, from which an interrupted run goes on; None keeps none.
+            most: largest number of pushes that are used; of more, so many are taken at equal distances in their
+                order.
 
         Raises:
-            RecordingError: if the recording cannot be identified from; ``pushes/push_checks.py`` has all reasons.
+            RecordingError: if the recording cannot be identified from; ``pushes/push_checks.py`` lists the reasons.
         """
         self.case = case_of(recording, cell, theta, jobs=search.jobs, most=most)
         self._search, self._seed, self._state = search, seed, state
 
     def run(self, progress: Progress | None = None) -> Identification:
-        """Search, fit, judge.
+        """Search, fit on the twin, and refit in the Drake cell.
 
         Args:
-            progress: called with the stage, steps done, steps in all.
+            progress: called with the stage, steps done and steps in all.
 
         Raises:
+            RecordingError: if no push can be rolled out.
             KeyboardInterrupt: when interrupted; the search's state is kept, and a new run goes on from it.
         """
         say: Progress = progress or (lambda stage, done, total: None)

@@ -1,7 +1,7 @@
-"""The judge: the last hypotheses in the Drake cell, from which everything comes that is said of them.
+"""Refits hypotheses in the Drake cell, from whose rollouts all results are reported.
 
-The twin finds them; the cell, as stiff as a rigid object needs, says how well they fit. Steps are Gauss-Newton's with
-the cell's residuals and the twin's derivatives.
+The twin finds a fit; then Gauss-Newton steps are made with the residuals of a cell with stiff contacts and the
+derivatives of the twin.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ Array = NDArray[np.float64]
 
 TIME_STEP, LONGEST_TIME_STEP = 5e-4, 1e-3  # s: of the judge; of a hand that is not slow
 HAND_FREQUENCY, REST_DEPTH, STICTION = 3000.0, 3e-7, 1e-5  # rad/s, m, m/s: a contact that hardly gives
-STEPS, SETTLED = 2, 0.3  # at most; of log likelihood: a step that gained less is the last
+STEPS, SETTLED = 2, 0.3  # most steps; a step that gains less log likelihood is the last
 
 
 class Judge:
-    """Takes fits of the twin to the cell.
+    """Takes fits from the twin to the Drake cell.
 
     Attributes:
-        fitter: like the one that found them, but with the cell's predictions.
+        fitter: as the one that found the fits, but with the cell's predictions.
     """
 
     def __init__(self, fitter: Fitter) -> None:
@@ -39,7 +39,7 @@ class Judge:
         self.fitter.tolerances = fitter.tolerances
 
     def judged(self, fit: Fit) -> Fit:
-        """The fit where the cell likes it best, with what the cell predicts there."""
+        """The fit after steps that raise its likelihood in the cell; the same where the cell cannot roll it out."""
         h, point = fit.hypothesis, self.fitter.points([fit.hypothesis], [fit.point.z], [fit.point.nuisance])[0]
         if point is None:  # the cell cannot roll it out: what the twin says stands
             return fit
@@ -57,9 +57,13 @@ class Judge:
         return best
 
     def errors(self, h: Hypothesis, zs: Sequence[Array]) -> list[Array | None]:
-        """Recorded less predicted (m_i,) of each push at a z of its own, in the features' units; None of no rollout.
+        """Recorded less predicted features (m_i,) of each push, in the features' units; None without a rollout.
 
-        Nothing of a push is known to its prediction but the start of the object and the hand's path.
+        Of the push itself, a prediction uses only the recorded start of the object and the hand's path.
+
+        Args:
+            h: the hypothesis.
+            zs: (n,) for each push.
         """
         rests, predictor = self.fitter.at_rest(), self.fitter.predictor
         asks = [Ask(i, h.physics(z), rests[i]) for i, z in enumerate(zs)]
@@ -67,7 +71,11 @@ class Judge:
         return [None if one is None else np.asarray(np.linalg.solve(w, y - one)) for one, y, w in pairs]
 
     def left_out(self, fit: Fit) -> tuple[Array, ...]:
-        """The errors (m_i,) of each push, simulated with what all others say; linearly, where it cannot be."""
+        """Errors (m_i,) of each held-out push, in the features' units.
+
+        The push is rolled out by the cell with z from all other pushes. Where there is no rollout, they are
+        linearised about the fit.
+        """
         zs = [self.fitter.without(fit, i) for i in range(len(fit.pushes))]
         made = []
         for push, z, whitening, error in zip(
@@ -79,7 +87,10 @@ class Judge:
 
 
 def stiff(config: CellConfig) -> CellConfig:
-    """A cell whose contacts hardly give; of a hand so slow that time steps are long, the cell as it is."""
+    """The cell with stiffer contacts and a shorter time step.
+
+    A cell whose time step is long, since its hand is slow, is returned as it is.
+    """
     solver, contact = config.solver, config.contact
     if solver.time_step_s > LONGEST_TIME_STEP:
         return config

@@ -1,4 +1,4 @@
-"""Identification push by push: what is believed after t pushes and one new push make what is believed after t + 1."""
+"""Identification push by push: from the belief after t pushes and a new push to the belief after t + 1."""
 
 from __future__ import annotations
 
@@ -41,12 +41,13 @@ class OnlineBelief:
 
     Attributes:
         space: of theta.
-        pushes: so far.
-        finder: fits them; None before a push in which the object moves.
+        pushes: all so far.
+        finder: the fitter of ``fit``; None before the first push in which the object moves.
         fit: theta, and each push's nuisance parameters.
-        search: of the newest push, over candidates drawn from P_{t-1}. None before the first push.
-        foreseen: recorded less predicted of each push before it was learned from; by its name.
-        rollouts: made so far.
+        search: of the newest push, over candidates drawn from P_{t-1}; None before the first push.
+        foreseen: by a push's name (m,), recorded less predicted features before it was learned from, in the features'
+            units; None where there is no rollout.
+        rollouts: number of rollouts so far.
     """
 
     space: ParameterSpace
@@ -62,7 +63,7 @@ class OnlineBelief:
 
     @property
     def mean(self) -> Array:
-        """Of the Gaussian (d,), in the unit cube."""
+        """Mean (d,) in the unit cube."""
         if self.fit is None:
             return np.asarray(self.space.to_unit(self.space.nominal))
         return self.fit.point.z[: self.space.dimension]
@@ -74,7 +75,7 @@ class OnlineBelief:
 
     @property
     def covariance(self) -> Array:
-        """Of the Gaussian (d, d), in the unit cube."""
+        """Covariance (d, d) in the unit cube."""
         d = self.space.dimension
         if self.finder is None or self.fit is None:
             return np.diag(np.square(self.space.prior_std_unit))
@@ -82,11 +83,14 @@ class OnlineBelief:
 
     @property
     def information(self) -> Array:
-        """Inverse covariance (d, d) of the Gaussian, in the unit cube."""
+        """Inverse covariance (d, d) in the unit cube."""
         return np.asarray(np.linalg.inv(self.covariance))
 
     def draw(self, rng: np.random.Generator, count: int) -> Array:
-        """Thetas (count, d) drawn from P_t; a share of them from P_0."""
+        """Thetas (count, d), each entry in its unit, drawn from P_t.
+
+        A tenth are drawn from P_0, since P_t may exclude the true theta.
+        """
         spread = count if self.fit is None else max(1, int(PRIOR_SHARE * count))
         wide = self.space.sample(rng, spread, from_prior=True)
         if spread == count:
@@ -98,10 +102,10 @@ class OnlineBelief:
 
 
 class OnlineIdentifier:
-    """Learns theta from one push after another; holds nothing but what does not change.
+    """Learns theta from one push after another. What it has learned is in the belief that it returns, not in itself.
 
     Attributes:
-        thetas: what is unknown.
+        thetas: which parameters are unknown.
     """
 
     def __init__(
@@ -111,17 +115,17 @@ class OnlineIdentifier:
         """Prepare.
 
         Args:
-            recording: says what is pushed, by what and how it is measured; its pushes, if it has any, are asked only
-                whether one could learn from them.
+            recording: object, table, hand and sensors. Its pushes, if it has any, are checked for whether one could
+                learn from them, and not used.
             cell: how pushes are simulated.
-            theta: what is unknown.
-            search: its method and number of processes; the other numbers are those of the batch search.
-            seed: of everything random.
+            theta: which parameters are unknown.
+            search: method and number of processes; its other fields are those of the batch search, and not used.
+            seed: random seed.
             budget: trials of the search on a new push.
-            progress: called with the stage, steps done, steps in all.
+            progress: called with the stage, steps done and steps in all.
 
         Raises:
-            RecordingError: if the recording cannot be learned from; ``pushes/push_checks.py`` has all reasons.
+            RecordingError: if the recording cannot be learned from; ``pushes/push_checks.py`` lists the reasons.
         """
         refuse(recording)
         self.thetas: ThetaMap = theta_space(recording.object, solid_of(recording.object.shape), cell, theta)
@@ -130,11 +134,11 @@ class OnlineIdentifier:
         self._progress: Progress = progress or (lambda stage, done, total: None)
 
     def start(self) -> OnlineBelief:
-        """P_0: the prior."""
+        """P_0, the prior."""
         return OnlineBelief(space=self.thetas.space)
 
     def case(self, pushes: tuple[Push, ...]) -> Case:
-        """Pushes, ready to be fitted.
+        """Pushes, made ready to be fitted.
 
         Raises:
             RecordingError: if the object moves in none of them.
@@ -145,11 +149,16 @@ class OnlineIdentifier:
     def learn(self, belief: OnlineBelief, push: Push) -> OnlineBelief:
         """P_{t+1} from P_t and one new push.
 
-        A small search over candidates drawn from P_t finds where the new push is explained. The fit of all pushes
-        goes on from the best of these trials and from the fit before.
+        A small search over candidates drawn from P_t finds thetas that explain the new push. All pushes are then
+        fitted from the best of these and from the previous fit. A push in which nothing moves, or which cannot be
+        rolled out, changes only the list of pushes.
+
+        Args:
+            belief: P_t.
+            push: the new one.
 
         Raises:
-            KeyboardInterrupt: when interrupted; the belief is as it was.
+            KeyboardInterrupt: when interrupted; the belief that was given is unchanged.
 
         Source: Zhu, Kimmel, Boularias, section III.B, for the search.
         """
@@ -173,7 +182,7 @@ class OnlineIdentifier:
         )  # fmt: skip
 
     def identification(self, belief: OnlineBelief) -> Identification | None:
-        """The belief as an identification, with intervals; None before the first push in which something moved."""
+        """The belief as an identification, with intervals; None before the first push in which the object moved."""
         finder, fit = belief.finder, belief.fit
         if finder is None or fit is None:
             return None

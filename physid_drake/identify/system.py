@@ -30,7 +30,7 @@ class RecordingPlayer(LeafSystem):
     """
 
     def __init__(self, pushes: tuple[Push, ...]) -> None:
-        """Prepare to play ``pushes``."""
+        """Play these pushes, in their order."""
         LeafSystem.__init__(self)
         self.set_name("recording_player")
         self._pushes = pushes
@@ -42,7 +42,10 @@ class RecordingPlayer(LeafSystem):
 
 
 class Learner(Protocol[Known]):
-    """Learns theta from pushes; what it knows is a value that the system's state holds, so it keeps none itself."""
+    """Learns theta from pushes.
+
+    What it has learned is a value that the Drake system's state holds; the learner itself keeps nothing.
+    """
 
     def start(self) -> Known:
         """What is known before any push."""
@@ -53,51 +56,51 @@ class Learner(Protocol[Known]):
         ...
 
     def identification(self, belief: Known) -> Identification | None:
-        """The identification that this makes; None if it is too early."""
+        """The identification from what is known; None where it is too early for one."""
         ...
 
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Collected:
-    """The pushes so far, and the identification of all of them once there are enough."""
+    """The pushes so far, and the identification from all of them once there are enough."""
 
     pushes: tuple[Push, ...] = ()
     latest: Identification | None = None
 
 
 class BatchLearner:
-    """Collects pushes, and identifies from all of them at once when it has enough."""
+    """Collects pushes, and identifies from all of them at once when there are enough."""
 
     def __init__(self, identify: Identify, *, after: int) -> None:
         """Prepare.
 
         Args:
-            identify: what to run on the pushes collected.
-            after: number of pushes that it waits for.
+            identify: called with the pushes once there are enough.
+            after: number of pushes to wait for.
         """
         self._identify, self._after = identify, after
 
     def start(self) -> Collected:
-        """No push."""
+        """No pushes."""
         return Collected()
 
     def learn(self, belief: Collected, push: Push) -> Collected:
-        """One push more; those beyond the number waited for are not looked at."""
+        """What is known with one more push; pushes beyond ``after`` are ignored."""
         if len(belief.pushes) >= self._after:
             return belief
         pushes = (*belief.pushes, push)
         return Collected(pushes=pushes, latest=self._identify(pushes) if len(pushes) == self._after else None)
 
     def identification(self, belief: Collected) -> Identification | None:
-        """The identification from all pushes; None before."""
+        """The identification from all pushes; None before there are enough."""
         return belief.latest
 
 
 class IdentificationSystem(LeafSystem):
-    """Learns from each push that arrives: all at once when there are enough, or push by push.
+    """Learns from each push that arrives at its input port.
 
-    Its state holds what the learner knows, and the name of the push that it last learned from: a push is new if its
-    name is.
+    Its abstract state holds what the learner knows, and the name of the push that it last learned from; a push with
+    another name is new.
 
     .. pydrake_system::
         name: identification
@@ -113,8 +116,8 @@ class IdentificationSystem(LeafSystem):
 
         Args:
             learner: ``BatchLearner`` or ``OnlineIdentifier``.
-            dimension: of theta.
-            nominal: (dimension,) theta before the first identification.
+            dimension: d, of theta.
+            nominal: (d,) theta before the first identification, each entry in its unit.
         """
         LeafSystem.__init__(self)
         self.set_name("identification")
@@ -129,11 +132,11 @@ class IdentificationSystem(LeafSystem):
         self.DeclarePeriodicUnrestrictedUpdateEvent(PUSH_PERIOD, 0.0, self._receive)
 
     def belief(self, context: Context) -> Any:
-        """What the learner knows, held in the state."""
+        """What the learner knows, from the state."""
         return context.get_abstract_state(self._memory).get_value()[0]
 
     def identification(self, context: Context) -> Identification | None:
-        """The latest identification held in the state; None before the first."""
+        """The latest identification, from the state; None before the first."""
         return self._learner.identification(self.belief(context))
 
     def _receive(self, context: Context, state: State) -> EventStatus:

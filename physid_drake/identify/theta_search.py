@@ -1,4 +1,4 @@
-"""Greedy entropy search over theta, the paper's: which theta is likeliest to explain the pushes best."""
+"""The search over theta: which theta explains the pushes best, by the entropy of P_min as in the paper."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from physid_drake.inference.fit import Fitter
 from physid_drake.inference.predictions import Predictor
 from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.progress import Progress
-from physid_drake.run_folder import part_of
 from physid_drake.search import SearchResult, search_minimum, search_named
+from physid_drake.whole_files import part_of
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ DIVERGED = 3.0  # nats of a theta's cost for each push whose rollout diverges
 
 
 class ThetaSearch:
-    """The configured search, over candidates drawn from the prior; its belief is kept in a file, to go on from.
+    """The configured search, over candidates drawn from the prior; it can go on from a file that keeps its belief.
 
     Source: S. Zhu, A. Kimmel and A. Boularias, "Information-theoretic model identification and policy search using
     physics engines with application to robotic manipulation", 2017, section III.
@@ -37,15 +37,18 @@ class ThetaSearch:
 
         Args:
             config: of the search.
-            rng: draws the candidates, and the search's own numbers.
-            state: where its belief is kept; None keeps it nowhere.
-            progress: called with the stage, trials done, trials in all.
+            rng: draws candidates, and is given to the search.
+            state: file that keeps the belief; None keeps none.
+            progress: called with the stage, trials done and trials in all.
         """
         self._config, self._chooser = config, search_named(config.method)
         self._rng, self._state, self._progress = rng, state, progress
 
     def run(self, fitter: Fitter) -> SearchResult:
-        """The theta with the least log of the rms misfit: its minimum is the misfit's, and it spans decades."""
+        """Minimise ``log_misfits`` over theta.
+
+        The logarithm is taken because misfits span orders of magnitude; its minimum is the misfit's.
+        """
         config, space, case = self._config, fitter.case.thetas.space, fitter.case
         # Its rollouts are its trials: a search that goes on from a file makes fewer.
         by_cell = config.integrator == "cell"
@@ -85,9 +88,16 @@ class ThetaSearch:
 
 
 def log_misfits(predictor: Predictor, pushes: Sequence[int], nuisances: Sequence[Array], thetas: Array) -> Array:
-    """Log of the rms error (k,) of some pushes at thetas (k, d), in standard deviations.
+    """Natural logarithm of the rms error (k,) of some pushes at k thetas, the errors in units of the noise.
 
-    Of what came to an end, if most did: a push that diverges at every theta must not hide the others.
+    A push whose rollout diverges adds ``DIVERGED`` instead of its errors, so that one which diverges at every theta
+    does not hide the others. Where half of the pushes or more diverge the result is infinite.
+
+    Args:
+        predictor: makes the rollouts.
+        pushes: indices of the pushes.
+        nuisances: each push's nuisance parameters (k,).
+        thetas: (k, d), each entry in its unit.
     """
     vectors = iter(predictor.vectors([Ask(i, Physics(theta), nuisances[i]) for theta in thetas for i in pushes]))
     costs = []

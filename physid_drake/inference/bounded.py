@@ -1,4 +1,4 @@
-"""The likeliest of normally distributed unknowns within bounds."""
+"""The most probable value of normally distributed unknowns that must stay within bounds."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ Bounds = tuple[Array, Array]
 
 
 def bounded(precision: Array, right: Array, bounds: Bounds | None) -> Array:
-    """The beta (d,) that is likeliest within bounds: no rollout can be made beyond.
+    """The beta (d,) within bounds that minimises 0.5 beta^T P beta - right^T beta, P being the precision.
+
+    Outside the bounds no rollout can be made.
 
     Args:
-        precision: (d, d).
-        right: (d,) precision times the estimate.
-        bounds: least and greatest beta, of as many coordinates as it has, the first; the others have none.
+        precision: P (d, d), symmetric, positive definite.
+        right: (d,) precision times the unbounded estimate.
+        bounds: least and greatest values of the first coordinates, (b,) each with b <= d; the remaining d - b are
+            not bounded. None bounds none.
     """
     beta = np.asarray(np.linalg.solve(precision, right), dtype=np.float64) if len(right) else np.zeros(0)
     if bounds is None:
@@ -25,7 +28,7 @@ def bounded(precision: Array, right: Array, bounds: Bounds | None) -> Array:
     least, most = np.append(bounds[0], [-np.inf] * free), np.append(bounds[1], [np.inf] * free)
     if np.all((least <= beta) & (beta <= most)):
         return beta
-    # In units in which each alone is known to one: theirs are far apart, and what is least known is not rounding.
+    # Scaled to a diagonal of 1: units differ by orders of magnitude, and small eigenvalues are no rounding.
     scale = np.diag(precision) ** -0.5
     values, vectors = np.linalg.eigh(precision * np.outer(scale, scale))
     roots = np.sqrt(np.maximum(values, 1e-14 * values[-1]))

@@ -1,4 +1,7 @@
-"""Fits of many hypotheses at once: bounded Levenberg-Marquardt over z and all per-push parameters."""
+"""Fits of many hypotheses at once: Levenberg-Marquardt within bounds, over z and all pushes' nuisance parameters.
+
+Source: K. Levenberg, Quart. Appl. Math. 2, 1944; D. Marquardt, J. SIAM 11, 1963.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +23,7 @@ from physid_drake.inference.push import (
     cost_of,
     held_out,
     noise_scale_of,
+    normal_equations,
     weighed,
     without,
 )
@@ -31,23 +35,23 @@ from physid_drake.pushes.case import Case
 Array = NDArray[np.float64]
 Nuisances = tuple[Array, ...]
 
-MOST_OWN, MOST_FRICTION = 3.0, 8.0  # standard deviations: unknowns go no further out
+MOST_OWN, MOST_FRICTION = 3.0, 8.0  # standard deviations: largest size of nuisance parameters
 MOST_THETA_MOVE = 0.25  # of the unit cube in one step
-RENEWED = 5.0  # of the cost, per push: a step that gained as much has left the place of its derivatives
+RENEWED = 5.0  # of the cost, per push: derivatives are computed anew after a step that gained more
 SETTLED = 0.3  # of the cost: a step that gained less is the last
 FIRST_DAMPING, EASED, HARDENED, HARDEST = 1e-3, 0.2, 8.0, 1e4
-QUIETEST = 1e-3  # a noise that nobody knows may be as small as this share of what is taken for it
+QUIETEST = 1e-3  # smallest noise scale where the noise is not known
 MIDDLE = int(np.argmin(np.abs(np.log(SCATTERS))))  # of the scatters: the prior's median
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Point:
-    """Where a fit is, and what it predicts there.
+    """A point of a hypothesis, and what rollouts there predict.
 
     Attributes:
-        z: (n,).
-        nuisance: each push's nuisance parameters (k,).
-        predicted: each push's whitened features (m,).
+        z: (n,) coordinates that all pushes share.
+        nuisance: each push's nuisance parameters (k,), in units of ``Nuisance.stds``.
+        predicted: each push's features (m,), whitened: in units of the noise.
     """
 
     z: Array
@@ -57,19 +61,19 @@ class Point:
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Fit:
-    """A hypothesis at a point, linearised there.
+    """A hypothesis at a point, with derivatives there and what follows from them.
 
     Attributes:
         hypothesis: what is fitted.
         point: where.
-        pushes: linearised at it.
-        scatter: of friction, push to push, in units of the columns'.
-        noise_scale: how many times as large as noise errors are; 1 of a hypothesis that explains the pushes.
-        tail: degrees of freedom of a push's errors.
-        weighed: the pushes with their unknowns integrated out.
-        cost: of the point: twice the negative log posterior of z and the per-push parameters, but for a constant.
-        damping: of the next step.
-        done: whether steps gain nothing any more.
+        pushes: residuals and derivatives of each push at the point.
+        scatter: standard deviation of friction between pushes, in units of ``pushes.case.UNIT_SCATTER``.
+        noise_scale: errors over what the noise model says [-]; 1 where the hypothesis explains the pushes.
+        tail: degrees of freedom of the t distribution of a push's errors.
+        weighed: each push with its nuisance parameters integrated out.
+        cost: of the point: twice the negative log posterior of z and of all nuisance parameters, up to a constant.
+        damping: Levenberg-Marquardt parameter of the next step [-].
+        done: whether further steps gain nothing.
     """
 
     hypothesis: Hypothesis
@@ -85,29 +89,39 @@ class Fit:
 
     @property
     def log_likelihood(self) -> float:
-        """Marginal over the per-push parameters, with the priors of z and scatter."""
+        """Log likelihood with nuisance parameters integrated out, plus log priors of z and scatter."""
         z, h = self.point.z, self.hypothesis
         prior = -0.5 * h.surprise(z) + log_prior_of_scatter(self.scatter)
         return sum(one.log_density for one in self.weighed) + prior
 
     @property
     def degrees(self) -> int:
-        """Residuals less shared parameters, at least 1."""
+        """Degrees of freedom, at least 1: residuals less coordinates that rollouts depend on."""
         return max(1, sum(len(push.residual) for push in self.pushes) - self.hypothesis.simulated)
 
     @property
     def reduced_chi2(self) -> float:
-        """Squares that are left, in units of noise, with what the priors cost, per degree of freedom."""
+        """Squared residuals in units of the noise, plus the prior's squares, over the degrees of freedom."""
         squares = self.hypothesis.surprise(self.point.z) + sum(one.square for one in self.weighed)
         return squares / self.degrees
 
     def again(self) -> Fit:
-        """The fit, to be stepped on from."""
+        """The same fit with the initial damping, from which further steps can be made."""
         return dc.replace(self, damping=FIRST_DAMPING, done=False)
 
 
 class Fitter:
-    """Fits hypotheses to a case's pushes."""
+    """Fits hypotheses to a case's pushes.
+
+    Attributes:
+        case: the recording, made ready.
+        predictor: makes rollouts and compares them with the recording.
+        count: number of pushes.
+        least: smallest noise scale [-].
+        tolerances: per push (m, t): what the features change by one standard deviation of each of the t errors that
+            all pushes may share without its being physics (slight errors of sizes, centres and clocks).
+        most: per push (k,): largest size of each nuisance parameter, in standard deviations.
+    """
 
     def __init__(self, case: Case, predictor: Predictor) -> None:
         self.case, self.predictor = case, predictor
@@ -119,21 +133,30 @@ class Fitter:
         ]
 
     def shared_by_all(self, columns: Sequence[Array]) -> None:
-        """Let predictions have N(0, 1) multiples of columns (m_i, t), the same for all pushes."""
+        """Set the errors that all pushes share: columns (m_i, t) per push; the t coefficients are N(0, 1)."""
         self.tolerances = tuple(columns)
 
     def priors(self, scatter: float) -> list[Array]:
-        """Standard deviations (k,) of each push's nuisance parameters."""
+        """Standard deviations (k,) of each push's nuisance parameters, at a scatter in units of the unit scatter."""
         return [np.where(np.array(n.names) == "friction", scatter, 1.0) for n in self.case.nuisances]
 
     def at_rest(self) -> Nuisances:
-        """All per-push parameters at zero."""
+        """All nuisance parameters at zero, per push (k,)."""
         return tuple(np.zeros(len(n.names)) for n in self.case.nuisances)
 
     def points(
         self, hypotheses: Sequence[Hypothesis], zs: Sequence[Array], nuisances: Sequence[Nuisances]
     ) -> list[Point | None]:
-        """What hypotheses predict at z with the per-push parameters; None where the twin cannot say it of a push."""
+        """Rollouts of all pushes, in one batch.
+
+        Args:
+            hypotheses: one for each point.
+            zs: (n,) of each.
+            nuisances: of each point, every push's nuisance parameters (k,).
+
+        Returns:
+            A point for each hypothesis; None where a push could not be rolled out.
+        """
         asks = []
         for h, z, nuisance in zip(hypotheses, zs, nuisances, strict=True):
             physics = h.physics(z)
@@ -153,7 +176,15 @@ class Fitter:
         return points
 
     def cost(self, hypothesis: Hypothesis, point: Point, scatter: float, noise_scale: float, tail: float) -> float:
-        """Twice the negative log posterior of z and the per-push parameters, but for a constant."""
+        """Twice the negative log posterior of z and of all nuisance parameters, up to a constant.
+
+        Args:
+            hypothesis: for the prior of z.
+            point: where.
+            scatter: of friction between pushes, in units of the unit scatter.
+            noise_scale: errors over what the noise model says [-].
+            tail: degrees of freedom of a push's errors.
+        """
         total = hypothesis.surprise(point.z)
         for i, prior in enumerate(self.priors(scatter)):
             total += self.cost_of_push(i, point.nuisance[i], point.predicted[i], prior, noise_scale, tail)
@@ -162,12 +193,24 @@ class Fitter:
     def cost_of_push(
         self, i: int, nuisance: Array, predicted: Array, prior: Array, noise_scale: float, tail: float
     ) -> float:
-        """The part of the cost that is push i's."""
+        """The part of ``cost`` that belongs to push ``i``.
+
+        Args:
+            i: index of the push.
+            nuisance: (k,) its nuisance parameters.
+            predicted: (m,) its whitened features.
+            prior: (k,) standard deviations of the nuisance parameters.
+            noise_scale: errors over what the noise model says [-].
+            tail: degrees of freedom of the push's errors.
+        """
         error = self.predictor.recorded[i] - predicted
         return cost_of(float(error @ error), len(error), noise_scale, tail) + float(np.sum((nuisance / prior) ** 2))
 
     def roughly(self, point: Point) -> float:
-        """How far a point is from the recording, for rankings: pushes that are far off count by their logarithm."""
+        """Distance of a point from the recording, for ranking: sum over pushes of m log(1 + mean squared error).
+
+        With the logarithm, one push that is far off does not decide.
+        """
         total = 0.0
         for y, f in zip(self.predictor.recorded, point.predicted, strict=True):
             total += len(y) * math.log1p(float((y - f) @ (y - f)) / len(y))
@@ -184,14 +227,16 @@ class Fitter:
         *,
         theta: bool = True,
     ) -> list[Fit]:
-        """Fits at points, with derivatives by differences.
+        """Fits at points, with derivatives by differences of rollouts, all in one batch.
 
         Args:
-            hypotheses: of each point.
+            hypotheses: one for each point.
             points: where.
-            like: fits whose derivatives by the per-push parameters are near enough; None takes them anew.
+            like: for each point a fit whose derivatives with respect to the nuisance parameters are taken over; None
+                computes them.
             tail: degrees of freedom of a push's errors.
-            theta: take derivatives by theta anew beside such a fit, too.
+            theta: whether derivatives with respect to theta are computed where ``like`` has a fit; otherwise they are
+                taken over from it, too.
         """
         asks: list[Ask] = []
         kept = [0 if theta or near is None else h.space.dimension for h, near in zip(hypotheses, like, strict=True)]
@@ -204,12 +249,12 @@ class Fitter:
         ]
 
     def renewed(self, fits: Sequence[Fit]) -> list[Fit]:
-        """The fits, all with the same tail, with all derivatives anew."""
+        """The same fits with all derivatives computed anew; they must all have the same tail."""
         hypotheses, points = [fit.hypothesis for fit in fits], [fit.point for fit in fits]
         return self.started(hypotheses, points, [None] * len(fits), fits[0].tail) if fits else []
 
     def robust(self, fits: Sequence[Fit]) -> list[Fit]:
-        """The fits with pushes that have heavy tails."""
+        """The same fits with the heavy-tailed distribution of a push's errors (``push.TAIL``)."""
         return [self._found(fit.hypothesis, fit.point, fit.pushes, fit, TAIL) for fit in fits]
 
     def _asks(self, h: Hypothesis, point: Point, skipped: int, *, nuisance: bool) -> list[Ask]:
@@ -295,12 +340,12 @@ class Fitter:
     # Iteration.
 
     def fitted(self, fits: Sequence[Fit], rounds: int, *, roughly: bool = False) -> list[Fit]:
-        """The fits after so many steps at most, all of them in one batch.
+        """The fits after at most ``rounds`` steps each, all of them in one batch.
 
         Args:
-            fits: where they are.
-            rounds: at most.
-            roughly: keep the derivatives by theta and by the per-push parameters, however far a step leads.
+            fits: where they begin.
+            rounds: largest number of steps.
+            roughly: keep the derivatives with respect to theta and to nuisance parameters, however far a step leads.
         """
         now = list(fits)
         for _ in range(rounds):
@@ -341,7 +386,7 @@ class Fitter:
         return np.concatenate([of_theta, [c.std for c in h.coordinates], free])
 
     def step(self, fit: Fit) -> tuple[Array, Nuisances]:
-        """Where a damped Gauss-Newton step leads, within bounds."""
+        """Where a damped Gauss-Newton step within bounds leads: z (n,), and nuisance parameters (k,) per push."""
         h, point = fit.hypothesis, fit.point
         precision, right = normal_equations(fit.weighed, h.mean - point.z, h.precision)
         damped = precision + np.diag(fit.damping * np.diag(precision))
@@ -355,10 +400,15 @@ class Fitter:
         return np.clip(point.z + dz, *h.bounds), nuisance
 
     def held_out(self, fit: Fit, folds: Sequence[Sequence[int]] | None = None) -> Array:
-        """Log predictive density (n,) of each push given the others, or given those outside its fold.
+        """Log predictive density (n,) of each held-out push, given the other pushes or those outside its fold.
 
-        Each bears its part of how unlikely theta, the tolerances and the scatter of friction are: where all pushes
-        agree on a centre of mass that is off by ten tolerances, the others would predict each of them at no cost.
+        From each an equal part of the prior's cost of theta, of the shared errors and of the scatter of friction is
+        taken. Otherwise a hypothesis could place, say, the centre of mass ten tolerances off at no cost, since all
+        pushes agree on it and predict each other.
+
+        Args:
+            fit: at which the pushes are linearised.
+            folds: indices of pushes that are held out together; None holds out each alone.
         """
         h = fit.hypothesis
         scores = held_out(
@@ -370,14 +420,14 @@ class Fitter:
         return np.asarray(scores - cost / len(scores))
 
     def without(self, fit: Fit, push: int) -> Array:
-        """Where z (n,) is likeliest for all pushes but one, within bounds and no further than a step goes."""
+        """The most probable z (n,) for all pushes but one, linearised, within bounds and within reach of one step."""
         h = fit.hypothesis
         dz, _ = without([push], h.mean - fit.point.z, h.precision, fit.weighed)
         reach = self._reach(h)
         return np.clip(fit.point.z + np.clip(dz, -reach, reach), *h.bounds)
 
     def seen_at(self, fit: Fit, point: Point) -> Fit:
-        """A fit at another point of its hypothesis, with the derivatives that it has."""
+        """A fit at another point of the same hypothesis, with the derivatives of the given fit."""
         pushes = tuple(
             dc.replace(push, residual=y - f + push.nuisance @ nuisance)
             for push, y, f, nuisance in zip(
@@ -387,7 +437,7 @@ class Fitter:
         return self._found(fit.hypothesis, point, pushes, fit, fit.tail)
 
     def frictions(self, fit: Fit) -> Array:
-        """Each push's own share (n,) of friction beside what all share, in units of the columns' scatter."""
+        """Each push's deviation (count,) of friction from the shared one, in units of the unit scatter."""
         return np.array(
             [
                 nuisance[n.index("friction")]
@@ -396,15 +446,7 @@ class Fitter:
         )
 
     def covariance(self, fit: Fit) -> Array:
-        """Of z (n, n), the per-push parameters integrated out."""
+        """Covariance (n, n) of z, with the nuisance parameters integrated out."""
         h = fit.hypothesis
         precision, _ = normal_equations(fit.weighed, h.mean - fit.point.z, h.precision)
-        return np.asarray(np.linalg.pinv(precision))
-
-
-def normal_equations(found: Sequence[Weighed], mean: Array, precision: Array) -> tuple[Array, Array]:
-    """Precision (n, n) of dz, and precision times estimate (n,), with a prior of such a mean and precision."""
-    whole = sum((one.precision for one in found), precision)
-    right = sum((one.right for one in found), precision @ mean)
-    ridge = 1e-12 * float(np.trace(whole)) * np.eye(len(right))
-    return np.asarray(whole + ridge), np.asarray(right)
+        return np.asarray(np.linalg.inv(precision))

@@ -1,4 +1,4 @@
-"""A hypothesis: which physics is added to the baseline, and the coordinates z in which it is fitted."""
+"""A hypothesis: which effects are added to the baseline model, and the coordinates z in which it is fitted."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Part:
 
     Attributes:
         kind: its class.
-        point: (k,) of its chart: where coordinates that are not free stay, and the middle of the others' prior.
-        free: indices of the coordinates that are fitted.
+        point: (k,) in its chart: the values of coordinates that are not fitted, and the prior mean of the others.
+        free: indices in the chart of the coordinates that are fitted.
     """
 
     kind: type[Effect]
@@ -36,10 +36,16 @@ class Part:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Hypothesis:
-    """Baseline parameters and the effects beside them.
+    """The baseline model with some effects, none for the baseline itself.
 
-    z is the point of the unit cube of theta (d,), followed by the free coordinates of each part's chart, and by how
-    much there is of what all pushes may share without its being physics, in standard deviations.
+    z (n,) is the point theta (d,) in the parameters' unit cube, followed by the free coordinates of each effect's
+    chart, followed by the coefficients of the errors that all pushes may share, in standard deviations.
+
+    Attributes:
+        space: of theta.
+        around: object, table and speeds of the recording, from which effects make their charts.
+        parts: the effects.
+        tolerances: number of errors that all pushes may share.
     """
 
     space: ParameterSpace
@@ -49,12 +55,12 @@ class Hypothesis:
 
     @property
     def name(self) -> str:
-        """The effects' names, in the order of the alphabet, joined."""
+        """The effects' names in alphabetical order, joined with ``+``; ``baseline`` without any."""
         return " + ".join(sorted(part.kind.name for part in self.parts)) or "baseline"
 
     @property
     def dimension(self) -> int:
-        """Of z."""
+        """Number n of coordinates."""
         return len(self.mean)
 
     @cached_property
@@ -70,21 +76,21 @@ class Hypothesis:
 
     @cached_property
     def mean(self) -> Array:
-        """Of the prior (n,)."""
+        """Prior mean (n,) of z."""
         theta = np.asarray(self.space.to_unit(self.space.nominal))
         effects = [part.point[j] for part in self.parts for j in part.free]
         return np.concatenate([theta, effects, np.zeros(self.tolerances)])
 
     @cached_property
     def std(self) -> Array:
-        """Of the prior (n,); infinite where nothing is known."""
+        """Prior standard deviations (n,) of z; infinite where nothing is known."""
         return np.concatenate(
             [self.space.prior_std_unit, [c.std for c in self.coordinates], np.ones(self.tolerances)]
         )
 
     @cached_property
     def whitening(self) -> Array:
-        """What (n, n) takes z less its mean to independent numbers of unit variance; 0 where nothing is known."""
+        """Matrix W (n, n): W (z - mean) is N(0, I) under the prior; rows are zero where nothing is known."""
         d = self.space.dimension
         made = np.diag(1.0 / self.std)
         if self.space.correlation:
@@ -94,21 +100,21 @@ class Hypothesis:
 
     @cached_property
     def precision(self) -> Array:
-        """Of the prior (n, n)."""
+        """Prior precision (n, n) of z, the inverse of its covariance; 0 where nothing is known."""
         return np.asarray(self.whitening.T @ self.whitening)
 
     def surprise(self, z: Array) -> float:
-        """Twice the negative log prior density of z (n,), but for a constant."""
+        """Squared Mahalanobis distance of z (n,) from the prior's mean: twice the negative log density."""
         return float(np.sum((self.whitening @ (z - self.mean)) ** 2))
 
     @property
     def known(self) -> Index:
-        """Indices in z of what something is known of beforehand: theta and the tolerances."""
+        """Indices in z of theta and of the shared errors, whose priors are informative in every recording."""
         return np.concatenate([np.arange(self.space.dimension), np.arange(self.simulated, self.dimension)])
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
-        """Least and greatest z (n,)."""
+        """Least and greatest z, (n,) each."""
         d, t = self.space.dimension, np.full(self.tolerances, np.inf)
         least = np.concatenate([np.full(d, THETA_WITHIN[0]), [c.lower for c in self.coordinates], -t])
         most = np.concatenate([np.full(d, THETA_WITHIN[1]), [c.upper for c in self.coordinates], t])
@@ -116,26 +122,26 @@ class Hypothesis:
 
     @property
     def simulated(self) -> int:
-        """How many coordinates, the first, a rollout depends on."""
+        """Number of coordinates that a rollout depends on, the first ones: all but the shared errors."""
         return self.dimension - self.tolerances
 
     def steps(self, z: Array) -> Array:
-        """Of differences (simulated,), away from bounds."""
+        """Step sizes (simulated,) for differences at z, with signs that lead away from the nearer bound."""
         d, n = self.space.dimension, self.simulated
         sizes = np.concatenate([np.full(d, THETA_STEP), [c.step for c in self.coordinates]])
         middle = np.concatenate([np.full(d, 0.5), self.bounds[1][d:n] - sizes[d:]])
         return np.asarray(np.where(z[:n] <= middle, sizes, -sizes))
 
     def physics(self, z: Array) -> Physics:
-        """What all pushes share at z."""
+        """Theta and effects at z."""
         return Physics(self.theta(z), self.effects(z))
 
     def theta(self, z: Array) -> Array:
-        """The baseline's parameters (d,), each in its unit."""
+        """The baseline model's parameters (d,) at z, each in its unit."""
         return np.asarray(self.space.from_unit(z[: self.space.dimension]))
 
     def points(self, z: Array) -> list[Array]:
-        """Where each effect is in its chart."""
+        """The point (k,) at z in each effect's chart."""
         points, at = [], self.space.dimension
         for part in self.parts:
             point = np.array(part.point)

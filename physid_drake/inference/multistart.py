@@ -1,4 +1,4 @@
-"""A push may have two ways to go: its nuisance parameters, looked for from many starts."""
+"""Searches a push's nuisance parameters from many starts, since a push can go two ways."""
 
 from __future__ import annotations
 
@@ -12,15 +12,20 @@ from physid_drake.inference.slopes import nuisance_slopes, nuisance_steps
 
 Array = NDArray[np.float64]
 
-ODD = 1.5  # of what noise leaves of a push: more is to be explained
+ODD = 1.5  # mean squared error in units of the noise: above it, the fit does not explain a push
 DRAWN, STEPS = 4, 4  # starts of a push's nuisance parameters that are drawn; steps from each
 
 
 def reseated(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
-    """The fit with the unknowns of each push that it does not explain where they are likeliest; z stays where it is.
+    """The fit with better nuisance parameters of the pushes that it does not explain, at the same z.
 
-    An object that is about to slip off the hand goes one way or the other. Given z, a push's cost depends on its own
-    unknowns alone, so that all pushes are looked at in one batch.
+    An object that is about to slip off the hand goes one way or the other, so that the cost has several minima. Given
+    z, a push's cost depends on its own nuisance parameters alone; therefore all pushes are searched in one batch.
+
+    Args:
+        fitter: of the fit.
+        fit: where to search.
+        rng: draws starts.
     """
     left = [y - f for y, f in zip(fitter.predictor.recorded, fit.point.predicted, strict=True)]
     odd = [i for i, errors in enumerate(left) if float(errors @ errors) > ODD * len(errors)]

@@ -20,20 +20,21 @@ from physid_drake.twin.twin import Wander
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-WANDER_STEP = 0.02  # of a friction, for differences
+WANDER_STEP = 0.02  # relative change of a friction, for differences
 HATS = 7  # places on a push's way between which a friction is linear
-ALIKE = 0.02  # m of way: over which a friction that wanders is the same
+ALIKE = 0.02  # m: correlation length of friction along the way
 
 
 class Predictor:
-    """Predicts a case's pushes.
+    """Predicts the features of a case's pushes.
 
     Attributes:
-        case: whose.
-        rollouts: makes them.
-        noise: per push (m, m), of its features in their units: the sensors', and what the simulator may be off by.
-        whitening: per push (m, m), takes features to units of the noise.
-        recorded: per push (m,), in units of the noise.
+        case: the recording, made ready.
+        rollouts: makes the rollouts.
+        noise: per push (m, m), covariance of its features in the features' units: of the sensors, and of the
+            simulator's own error.
+        whitening: per push (m, m), multiplies features to give them in units of the noise, uncorrelated.
+        recorded: per push (m,), the recorded features, whitened.
     """
 
     def __init__(self, case: Case, by_cell: Collection[int] = ()) -> None:
@@ -44,29 +45,29 @@ class Predictor:
 
     @property
     def count(self) -> int:
-        """Of rollouts."""
+        """Number of rollouts that were made."""
         return self.rollouts.count
 
     @property
     def by_cell(self) -> frozenset[int]:
-        """The pushes that the twin cannot roll out, whatever theta; the cell does."""
+        """Indices of the pushes that the twin cannot roll out at any theta; the cell rolls them out."""
         return self.rollouts.by_cell
 
     def judging(self, pool: RolloutPool) -> Predictor:
-        """The same in another cell, of which a pool makes all rollouts."""
+        """A copy whose rollouts are all made by the cell of a pool."""
         other = copy(self)
         other.rollouts = self.rollouts.in_cell(pool)
         return other
 
     def apart(self) -> Predictor:
-        """The same, with a count of its own."""
+        """A copy that counts its rollouts from zero."""
         other = copy(self)
         other.rollouts = copy(self.rollouts)
         other.rollouts.count = 0
         return other
 
     def noisier(self, added: Sequence[Array]) -> Predictor:
-        """The same, with covariances (m_i, m_i) added to the pushes' noise, in units of what it is."""
+        """A copy with covariances (m_i, m_i) added to the pushes' noise, in units of the noise as it is."""
         other = copy(self)
         roots = [np.linalg.inv(whitening) for whitening in self.whitening]
         other.noise = [n + r @ one @ r.T for n, r, one in zip(self.noise, roots, added, strict=True)]
@@ -74,7 +75,7 @@ class Predictor:
         return other
 
     def with_directions(self, directions: Sequence[Array]) -> None:
-        """Count N(0, 1) multiples of columns (m_i, j) of features, in their units, as noise."""
+        """Set the whitening; N(0, 1) multiples of columns (m_i, j), in the features' units, count as noise."""
         self.whitening = [
             solve_triangular(np.linalg.cholesky(noise + more @ more.T), np.eye(len(noise)), lower=True)
             for noise, more in zip(self.noise, directions, strict=True)
@@ -82,14 +83,21 @@ class Predictor:
         self.recorded = [w @ f.recorded for w, f in zip(self.whitening, self.case.features, strict=True)]
 
     def vectors(self, asks: Sequence[Ask]) -> list[Array | None]:
-        """Features (m_i,) of each rollout, in units of the noise; None of one that cannot be made."""
+        """Whitened features (m_i,) of each rollout; None where it cannot be made."""
         return [
             None if one is None else np.asarray(self.whitening[ask.push] @ self.case.features[ask.push].of(one))
             for ask, one in zip(asks, self.rollouts.predictions(asks), strict=True)
         ]
 
     def path_errors(self, nuisances: Sequence[Array], physics: Physics) -> list[Array]:
-        """Columns (m_i, e) of features, in their units: what each error that a hand's path may have changes."""
+        """What each possible error of a hand's path changes: columns (m_i, e) per push, in the features' units.
+
+        One column is for an error of one standard deviation.
+
+        Args:
+            nuisances: each push's nuisance parameters (k,).
+            physics: theta and effects of the rollouts.
+        """
         columns = []
         for i, problem in enumerate(self.case.problems):
             asks = [Ask(i, physics, nuisances[i], path_error=k) for k in range(-1, len(problem.path_errors))]
@@ -98,10 +106,15 @@ class Predictor:
         return columns
 
     def wanders(self, nuisances: Sequence[Array], physics: Physics) -> list[tuple[Array, Array]]:
-        """What frictions change that wander on a push's way: columns (m_i, HATS), of table and tip.
+        """What a friction that varies along a push's way changes: two arrays of columns (m_i, HATS) per push.
 
-        In units of the noise, for a friction that differs by all of itself. The columns are independent; frictions at
-        neighbouring places are not.
+        The first is of the friction with the table, the second of that with the tip. Columns are in units of the
+        noise and are to be multiplied with independent N(0, s^2) numbers, s being the friction's relative standard
+        deviation; the correlation between neighbouring places is in the columns.
+
+        Args:
+            nuisances: each push's nuisance parameters (k,).
+            physics: theta and effects of the rollouts.
         """
         made = []
         for i, problem in enumerate(self.case.problems):
@@ -122,7 +135,13 @@ class Predictor:
 
 
 def wander_hats(problem: PushProblem) -> tuple[list[tuple[float, float]], Array]:
-    """When a push comes by places on its way [s], how long it is near them [s], and a root of their correlation."""
+    """Places on a push's way between which a friction is interpolated linearly.
+
+    Returns:
+        For each of ``HATS`` places the time at which the object is there and the half width of its hat function [s];
+        and
+        a Cholesky factor (HATS, HATS) of the places' correlation, which decays over ``ALIKE`` of way.
+    """
     times = np.concatenate([[problem.begin], problem.times])
     way = way_of(np.vstack([problem.start.pose, problem.poses]))
     first, last = np.interp(np.clip(problem.moving, times[0], times[-1]), times, way)

@@ -1,9 +1,9 @@
-"""Frictions that wander along a push's way, under the object and at the tip: learned from what a model leaves.
+"""Process noise: frictions with table and tip that vary along a push's way, estimated from what a model leaves.
 
-Repeated pushes of a real object end millimetres apart, however quiet the tracker is (K.-T. Yu et al., IROS 2016;
-M. Bauza and A. Rodriguez, ICRA 2017). That is noise of the process, which no deterministic model explains. It is
-learned from what the richest hypothesis leaves, so that it does not take missing physics for noise, and counts from
-then on beside the sensors' noise.
+Repeated pushes of a real object end millimetres apart, however small the tracker's noise is (K.-T. Yu et al., IROS
+2016; M. Bauza and A. Rodriguez, ICRA 2017); no deterministic model explains that. The process noise is estimated from
+what the richest hypothesis leaves, so that missing physics is not taken for noise, and is added to the sensors' noise
+from then on.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ from physid_drake.inference.scatter import SCATTERS, log_prior_of_scatter
 
 Array = NDArray[np.float64]
 
-SHARES = (0.0, 0.02, 0.04, 0.08, 0.16, 0.32)  # of friction, standard deviation
+SHARES = (0.0, 0.02, 0.04, 0.08, 0.16, 0.32)  # relative standard deviations of friction
 EVEN = 0.5  # probability beforehand that both surfaces are even
-ROUNDS = 4  # in which noise scale and weights find each other
+ROUNDS = 4  # iterations of noise scale and weights
 
 
 @dc.dataclass(frozen=True, kw_only=True)
 class ProcessNoise:
-    """Standard deviations of frictions along the way [-]: with the table, and at the tip."""
+    """Relative standard deviations [-] of the friction with the table, and with the tip, along a push's way."""
 
     table: float = 0.0
     tip: float = 0.0
 
     @property
     def is_none(self) -> bool:
-        """Whether both surfaces are even."""
+        """Whether there is none of either."""
         return self.table == 0.0 and self.tip == 0.0
 
 
@@ -45,7 +45,15 @@ EVEN_SURFACES = ProcessNoise()
 
 
 def learned(fitter: Fitter, fit: Fit) -> tuple[ProcessNoise, list[Array]]:
-    """The likeliest process noise beside a fit, and what it adds to the noise (m, m) of each push, in units of it."""
+    """The process noise of highest posterior probability beside a fit, out of a grid.
+
+    Args:
+        fitter: of the recording.
+        fit: where its pushes are linearised.
+
+    Returns:
+        It, and what it adds to the covariance (m, m) of each push, in units of the noise.
+    """
     found = fitter.predictor.wanders(fit.point.nuisance, fit.hypothesis.physics(fit.point.z))
 
     def covariances(noise: ProcessNoise) -> list[Array]:

@@ -1,9 +1,10 @@
-"""A push, linearised in what all pushes share and in its per-push parameters, which are integrated out.
+"""A push, linearised in what all pushes share and in its nuisance parameters, which are integrated out.
 
-In units of the noise, a push is r = X dz + J u + e with u ~ N(0, diag(prior^2)) its nuisance parameters and
-e ~ t_nu(0, noise scale^2 I): one heavy tail for a push as a whole, so that a push about which something else is odd
-counts less, the less the further it is off. The noise scale is shared by all pushes: 1 where a hypothesis explains
-them. Far from an explanation it is large; then u stays near zero and cannot imitate what is missing.
+In units of the noise, a push is r = X dz + J u + e, where u ~ N(0, diag(prior^2)) are its nuisance parameters and
+e ~ t_nu(0, s^2 I) its errors: a multivariate t distribution with nu degrees of freedom (``tail``) and the noise scale
+s. Its one heavy tail is for the push as a whole: a push that the model explains worse than the others counts less.
+All pushes share s, which is 1 where a hypothesis explains them. Far from an explanation s is large; this keeps u near
+zero, so that nuisance parameters do not imitate missing physics.
 """
 
 from __future__ import annotations
@@ -20,18 +21,18 @@ Array = NDArray[np.float64]
 
 TAIL = 15.0  # degrees of freedom of a push's noise
 NO_TAIL = 1e6  # of noise that is normal
-TOO_ALIKE = 1e-10  # of information about coordinates that act alike, as a share of that about each: less is rounding
-WEIGHINGS = 5  # rounds in which a push's weight and unknowns find each other
+TOO_ALIKE = 1e-10  # least eigenvalue of information scaled to a diagonal of 1: less is rounding
+WEIGHINGS = 5  # iterations of a push's weight and its nuisance parameters
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class LinearPush:
-    """One push at a point z.
+    """One push, linearised at a point z; all in units of the noise.
 
     Attributes:
-        residual: (m,) recorded less predicted, as if the push's nuisance parameters were zero.
-        shared: (m, n) derivatives of the prediction with respect to z.
-        nuisance: (m, k) with respect to u.
+        residual: r (m,), recorded less predicted features, had the push's nuisance parameters been zero.
+        shared: X (m, n), derivatives of the prediction with respect to z.
+        nuisance: J (m, k), derivatives with respect to u.
     """
 
     residual: Array
@@ -40,27 +41,40 @@ class LinearPush:
 
 
 def cost_of(square: float, count: int, noise_scale: float, tail: float) -> float:
-    """Twice the negative log density of ``count`` errors e with e^T e = ``square``, but for a constant."""
+    """Twice the negative log density of a push's errors e, up to a constant.
+
+    Args:
+        square: e^T e.
+        count: m, the number of errors.
+        noise_scale: s.
+        tail: nu, degrees of freedom.
+    """
     return (tail + count) * math.log1p(square / (tail * noise_scale**2)) + 2.0 * count * math.log(noise_scale)
 
 
 def weight_of(square: float, count: int, noise_scale: float, tail: float) -> float:
-    """What a push counts: 1 where its errors are as large as noise."""
+    """Weight of a push: the factor on its squared errors in the Gaussian that stands for the t distribution.
+
+    It is 1 / s^2 where the mean squared error is s^2, and less where errors are larger.
+    Arguments as in ``cost_of``.
+
+    Source: K. Lange, R. Little, J. Taylor, J. Am. Stat. Assoc. 84, 1989.
+    """
     return (tail + count) / (tail * noise_scale**2 + square)
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Weighed:
-    """A push with its unknowns integrated out.
+    """A push with its nuisance parameters integrated out.
 
     Attributes:
-        precision: (n, n) that it gives z.
-        right: (n,) precision times estimate.
-        nuisance: (k,) most likely unknowns at dz = 0.
-        to_own: (k, n) how they change with dz.
-        log_density: of the push at dz = 0.
-        square: of its errors there.
-        weight: of them.
+        precision: (n, n), information of the push about dz.
+        right: (n,), precision times the push's estimate of dz.
+        nuisance: (k,), the most probable u at dz = 0.
+        to_nuisance: (k, n), derivative of the most probable u with respect to dz.
+        log_density: of the push at dz = 0, u integrated out.
+        square: e^T e of the errors at dz = 0 and the most probable u.
+        weight: of the push, as in ``weight_of``.
     """
 
     precision: Array
@@ -75,15 +89,15 @@ class Weighed:
 def weighed(
     residual: Array, shared: Array, nuisance: Array, prior: Array, noise_scale: float, tail: float = TAIL
 ) -> Weighed:
-    """Integrate a push's nuisance parameters out, by Laplace's method.
+    """Integrate a push's nuisance parameters out, by Laplace's approximation.
 
     Args:
-        residual: (m,).
-        shared: (m, n).
-        nuisance: (m, k).
-        prior: (k,) standard deviations of u.
-        noise_scale: of all pushes.
-        tail: degrees of freedom of their errors.
+        residual: r (m,).
+        shared: X (m, n).
+        nuisance: J (m, k).
+        prior: (k,), standard deviations of u.
+        noise_scale: s.
+        tail: nu, degrees of freedom of the errors.
     """
     count, total = len(residual), float(residual @ residual)
     scaled = nuisance * prior  # of unknowns v = u / prior ~ N(0, I); in the eigenvectors' basis all is diagonal
@@ -113,15 +127,15 @@ def _log_constant(count: int, tail: float) -> float:
 
 
 def noise_scale_of(squares: Sequence[float], counts: Sequence[int], least: float, tail: float) -> float:
-    """The likeliest noise scale of pushes whose errors are known.
-
-    The scale of a t distribution, by expectation maximisation.
+    """The noise scale s of highest likelihood for pushes with known errors, by expectation maximisation.
 
     Args:
-        squares: of each push's errors, e^T e.
-        counts: of them.
-        least: that it can be.
-        tail: degrees of freedom of a push's errors.
+        squares: e^T e of each push.
+        counts: m of each push.
+        least: smallest s.
+        tail: nu, degrees of freedom of a push's errors.
+
+    Source: K. Lange, R. Little, J. Taylor, J. Am. Stat. Assoc. 84, 1989.
     """
     q, m = np.array(squares), np.array(counts, dtype=np.float64)
     square = max(least**2, float(np.median(q / m)))
@@ -140,17 +154,20 @@ def held_out(
     tail: float = TAIL,
     folds: Sequence[Sequence[int]] | None = None,
 ) -> Array:
-    """Log predictive density (n,) of each push given the others.
+    """Log predictive density of each push, given the other pushes or those outside its fold.
 
     Args:
         pushes: linearised at the fitted z.
-        priors: (k,) of each push's nuisance parameters.
-        mean: (n,) of the prior of dz.
-        precision: (n, n) of it.
-        noise_scale: of the pushes.
-        found: the pushes, weighed.
-        tail: degrees of freedom of their errors.
-        folds: indices of pushes that are held out together; each alone where None.
+        priors: (k,) of each push, standard deviations of its nuisance parameters.
+        mean: (n,), prior mean of dz.
+        precision: (n, n), prior precision of dz.
+        noise_scale: s.
+        found: the same pushes, weighed.
+        tail: nu, degrees of freedom of the errors.
+        folds: indices of pushes that are held out together; None holds out each alone.
+
+    Returns:
+        An array with one number per push.
     """
     scores = np.zeros(len(pushes))
     for fold in [[i] for i in range(len(pushes))] if folds is None else folds:
@@ -166,14 +183,47 @@ def held_out(
 
 
 def without(fold: Sequence[int], mean: Array, precision: Array, found: Sequence[Weighed]) -> tuple[Array, Array]:
-    """What all pushes but some say of dz: estimate (n,), and a root (n, n) of its covariance."""
+    """Posterior of dz without some pushes.
+
+    Args:
+        fold: indices of the pushes that are left out.
+        mean: (n,), prior mean of dz.
+        precision: (n, n), prior precision of dz.
+        found: all pushes, weighed.
+
+    Returns:
+        The mean (n,), and R (n, n) with R R^T the covariance.
+    """
     kept = [one for i, one in enumerate(found) if i not in fold]
     information = sum((one.precision for one in kept), precision)
     right = sum((one.right for one in kept), precision @ mean)
-    # In units in which each coordinate alone is known to one: theirs are far apart, and some no push may tell.
+    # Scaled to a diagonal of 1, since units differ by orders of magnitude; what nothing is known of gets a ridge.
     nothing = np.where(np.diag(information) > 0.0, 0.0, TOO_ALIKE * np.trace(information))
     information = information + np.diag(nothing)
     scale = np.diag(information) ** -0.5
     values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
     root = scale[:, None] * vectors / np.sqrt(np.maximum(values, TOO_ALIKE))
     return root @ (root.T @ right), root
+
+
+def normal_equations(found: Sequence[Weighed], mean: Array, precision: Array) -> tuple[Array, Array]:
+    """Posterior precision (n, n) of dz given all pushes, and that precision times the posterior mean (n,).
+
+    Args:
+        found: the pushes, weighed.
+        mean: (n,), prior mean of dz.
+        precision: (n, n), prior precision of dz.
+    """
+    whole = sum((one.precision for one in found), precision)
+    right = sum((one.right for one in found), precision @ mean)
+    return ridged(np.asarray(whole)), np.asarray(right)
+
+
+def ridged(precision: Array) -> Array:
+    """The precision (n, n) with a ridge that makes it invertible: each diagonal entry grows by a factor of 1 + 1e-12.
+
+    This does not depend on the coordinates' units. A coordinate whose diagonal entry is 0, which neither a push nor
+    the prior says anything about, gets 1e-12 of the trace instead.
+    """
+    size = np.diag(precision)
+    return precision + np.diag(1e-12 * np.where(size > 0.0, size, float(size.sum())))

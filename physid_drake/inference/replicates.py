@@ -1,7 +1,7 @@
-"""The same recording without any effect, many times: how large the best held-out gain of the catalogue is by chance.
+"""Distribution of the catalogue's best held-out gain where no effect is there, by replicates of the recording.
 
-Replicates are drawn from a fitted model at this recording's pushes, with its noise and scatter, refitted and searched
-by linear algebra on the score tests' columns.
+Replicates are drawn from a fitted model at this recording's pushes, with its noise and scatter of friction. Each is
+refitted and searched with the linearised pushes and the columns of the score tests, without rollouts.
 """
 
 from __future__ import annotations
@@ -15,25 +15,26 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from physid_drake.inference.fit import Fit, Fitter
+from physid_drake.inference.push import ridged
 from physid_drake.inference.scatter import log_prior_of_scatter, scatters_beside
 from physid_drake.inference.scores import Column, by_family
 
 Array = NDArray[np.float64]
 
 REPLICATES = 300
-TAIL_SHARE = 0.15  # of the replicates: whose excesses give the tail beyond the largest
+TAIL_SHARE = 0.15  # of the replicates: their excesses over the least of them give the tail
 FEWEST = 10  # replicates in which an effect has the right sign: fewer have no tail
 LEAST_SCALE = 1.0  # nats, of a tail: a likelihood ratio of x nats has a chance of exp(-x) at most (Markov)
 MOST_GAIN = 1e6  # nats
 
 
 def without_best(gains: Array) -> Array:
-    """Sum of gains (n, ...) of pushes over another hypothesis, without the largest: no push decides alone."""
+    """Sum of gains (n, ...) over the first axis, that of pushes, without the largest: no push decides alone."""
     return np.asarray(gains.sum(axis=0) - np.where(np.isfinite(gains).all(axis=0), gains.max(axis=0), 0.0))
 
 
 def of_all(gains: Array) -> Array:
-    """Sum of gains (n, ...) of pushes over another hypothesis [log likelihood]."""
+    """Sum of gains (n, ...) over the first axis, that of pushes [log likelihood]."""
     return np.asarray(gains.sum(axis=0))
 
 
@@ -44,20 +45,21 @@ def gains_by_chance(
     rng: np.random.Generator,
     summed: Callable[[Array], Array] = without_best,
 ) -> tuple[dict[str, float], dict[str, Array]]:
-    """Held-out gains, linearly, of the best family of each effect, by its name.
+    """Held-out gains of each effect's best family, linearised, in the recording and in replicates without an effect.
 
-    A push that is odd in the fit is as loud in all replicates.
+    A push whose errors are large in the fit has errors as large in all replicates.
 
     Args:
         fitter: of the recording.
-        fit: what is true in the replicates.
-        found: the columns of effects beside it.
+        fit: the model from which replicates are drawn.
+        found: columns of the effects beside it (``scores.columns``).
         rng: draws the replicates.
-        summed: what the gains (n, ...) of pushes come to. That there is an effect, no push decides alone; whether a
-            model is enough, any push may.
+        summed: makes one number of the gains (n, ...) of n pushes. To claim an effect, no push should decide alone
+            (``without_best``); to claim that a model is not enough, one push may (``of_all``).
 
     Returns:
-        Of the recording, and (REPLICATES,) where the fitted model is true [log likelihood].
+        By the effects' names, the gain in the recording, and the gains (REPLICATES,) in the replicates [log
+        likelihood].
     """
     drawn = [
         np.column_stack([push.residual, _drawn(push.nuisance, prior, one.weight**-0.5, rng)])
@@ -74,9 +76,15 @@ def gains_by_chance(
 
 
 def surprise(values: Array, replicates: Array) -> Array:
-    """Minus the logarithm of the chance that a replicate has as large a value, of each (n,).
+    """Minus the logarithm of the probability that a replicate has at least such a value, for each of values (n,).
 
-    Beyond the largest seventh of the replicates by the exponential tail that these have.
+    Above the quantile that 15 % of the replicates exceed, an exponential tail with their mean excess is used.
+
+    Args:
+        values: to look at; not finite where an effect has the wrong sign, whose surprise is 0.
+        replicates: (r,) of the same number; those that are not finite count as smaller than any value.
+
+    Where fewer than ``FEWEST`` replicates are finite, every finite value has the surprise log(r).
     """
     some = np.sort(replicates[np.isfinite(replicates)])
     if len(some) < FEWEST:
@@ -91,7 +99,7 @@ def surprise(values: Array, replicates: Array) -> Array:
 
 
 def gain_of(wanted: float, replicates: Array) -> float:
-    """The value whose surprise is as wanted, beyond the replicates [log likelihood]."""
+    """The gain [log likelihood] whose ``surprise`` among the replicates (r,) is ``wanted``."""
     low, high = np.array([0.0]), np.array([1.0])
     while surprise(high, replicates)[0] < wanted and high[0] < MOST_GAIN:
         high *= 2.0
@@ -102,10 +110,15 @@ def gain_of(wanted: float, replicates: Array) -> float:
 
 
 def p_value(seen: dict[str, float], by_chance: dict[str, Array]) -> float:
-    """Chance that some effect gains as surprisingly much where the fitted model is true.
+    """Probability, where the fitted model is true, that some effect has a gain as surprising as the recording's best.
 
-    Each effect's gain is compared with its own by chance, so that one that has many shapes to choose from does not
-    hide what one with a single number shows.
+    Each effect's gain is compared with that effect's own replicates: an effect with many shapes gains more by chance,
+    and would otherwise hide one with a single number. The result takes into account that the best of all is looked
+    at.
+
+    Args:
+        seen: gain of each effect in the recording [log likelihood].
+        by_chance: its gains in the replicates, (REPLICATES,) each.
     """
     if not seen:
         return 1.0
@@ -152,8 +165,7 @@ class _Table:
         """
         index = np.array([*range(self.n), *(self.n + j for j in members)], dtype=np.intp)
         blocks, rights = self.precisions[:, index[:, None], index], self.rights[:, index]
-        whole, right = self.prior[np.ix_(index, index)] + blocks.sum(axis=0), rights.sum(axis=0)
-        whole = whole + 1e-12 * float(np.trace(whole)) * np.eye(len(index))
+        whole, right = ridged(self.prior[np.ix_(index, index)] + blocks.sum(axis=0)), rights.sum(axis=0)
         # Of replicates the fitted model is true, and what is known beforehand is about it.
         right[: self.n, 0] -= self.h.precision @ self.off
         inverse, log_det = np.linalg.inv(whole), np.linalg.slogdet(whole)[1]

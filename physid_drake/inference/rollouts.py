@@ -1,4 +1,4 @@
-"""Rollouts of recorded pushes, many in one call: by the twin, and by the cell where only it can."""
+"""Rollouts of recorded pushes, many in one call: by the twin, and by the Drake cell where the twin cannot."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MOST_SETTINGS = 4096  # of pushes that are kept
 
 @dc.dataclass(frozen=True, eq=False)
 class Physics:
-    """What all pushes share: parameters theta (d,) and effects; null ones are left out."""
+    """What all pushes share: parameters theta (d,), each in its unit, and effects, without those that are null."""
 
     theta: Array
     effects: tuple[Effect, ...] = ()
@@ -44,10 +44,14 @@ class Physics:
 
 @dc.dataclass(frozen=True, eq=False)
 class Ask:
-    """A rollout: a push with its nuisance parameters (k,), in units of their priors' standard deviations.
+    """A rollout to make.
 
-    ``path_error``, where it is not negative, is the one that its hand's path has; ``wander`` what frictions and
-    forces do for a while.
+    Attributes:
+        push: index of the push.
+        physics: theta and effects.
+        nuisance: (k,) the push's nuisance parameters, in units of their priors' standard deviations.
+        path_error: index of the error that the hand's path has; -1 for the path as it was fitted.
+        wander: how frictions or forces differ for a short time.
     """
 
     push: int
@@ -58,11 +62,11 @@ class Ask:
 
 
 class Rollouts:
-    """Rolls out pushes.
+    """Rolls out a recording's pushes.
 
     Attributes:
-        count: of rollouts.
-        by_cell: the pushes that the twin cannot roll out, whatever theta; the cell does.
+        count: number of rollouts that were made.
+        by_cell: indices of the pushes that the twin cannot roll out at any theta; the cell rolls them out.
     """
 
     def __init__(
@@ -77,14 +81,14 @@ class Rollouts:
         self._settings: dict[tuple[int, int, bytes], PushSetting] = {}
 
     def in_cell(self, pool: RolloutPool) -> Rollouts:
-        """The same, all in the cell of a pool."""
+        """A copy that makes all rollouts in the cell of a pool, and counts from zero."""
         other = copy(self)
         other.count, other.pool = 0, pool
         other.by_cell = frozenset(range(len(self.problems)))
         return other
 
     def predictions(self, asks: Sequence[Ask]) -> list[Prediction | None]:
-        """What each rollout says; None of one that cannot be made."""
+        """What each rollout predicts; None where it cannot be made, as of an object that tips or leaves the table."""
         answers: list[Prediction | None] = [None] * len(asks)
         foreign = {id(p) for p in {id(ask.physics): ask.physics for ask in asks}.values() if not knows(p.effects)}
         of_cell = [k for k, ask in enumerate(asks) if ask.push in self.by_cell or id(ask.physics) in foreign]

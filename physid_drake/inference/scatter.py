@@ -1,4 +1,7 @@
-"""The scatter of friction between pushes: the values that are looked at, and what is known of it beforehand."""
+"""The scatter of friction between pushes: a grid of values, and its prior.
+
+It is the relative standard deviation of a push's friction, in units of ``pushes.case.UNIT_SCATTER``.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,14 @@ SCATTER_PRIOR = (1.0, 0.6)  # median, in units of it, and standard deviation of 
 
 
 def log_prior_of_scatter(scatter: float) -> float:
-    """Of the friction scatter between pushes, but for a constant."""
+    """Log prior density of the scatter, up to a constant: log-normal with ``SCATTER_PRIOR``."""
     return -0.5 * float(np.log(scatter / SCATTER_PRIOR[0]) / SCATTER_PRIOR[1]) ** 2
 
 
 def scatters_beside(scatter: float) -> tuple[float, ...]:
-    """Those that a refit may come to: from a little more down to the least, every second one.
+    """Every second value of the grid, from two places above the scatter down to the least: what a refit tries.
 
-    What orders frictions from push to push leaves less of them to chance.
+    Mostly down, since an effect such as a drift of friction leaves less of the scatter to chance.
     """
     k = SCATTERS.index(scatter)
     return SCATTERS[k % 2 : k + 3 : 2]

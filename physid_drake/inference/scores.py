@@ -1,4 +1,7 @@
-"""Score tests: what effects would change at a fitted model, and how much of what is left that explains, linearly."""
+"""Score tests: what each effect would change at a fitted model, and how much of the misfit that explains, linearised.
+
+Source: C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from numpy.typing import NDArray
 from physid_drake.effects import Coordinate, Effect, Family
 from physid_drake.inference.bounded import bounded
 from physid_drake.inference.fit import Fit, Fitter
-from physid_drake.inference.push import weighed
+from physid_drake.inference.push import ridged, weighed
 from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.inference.scatter import log_prior_of_scatter, scatters_beside
 from physid_drake.inference.slopes import slope
@@ -22,13 +25,14 @@ Array = NDArray[np.float64]
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Column:
-    """What one coordinate of an effect changes, where a family of its score tests leaves the null.
+    """The change of all pushes with one coordinate of an effect, at a point of its chart where the effect is null.
 
     Attributes:
-        kind, family: the effect, and where in its chart.
+        kind: the effect's class.
+        family: gives the point of its chart, and which coordinates leave it.
         index: of the coordinate in the chart.
-        coordinate: itself.
-        pushes: derivative (m_i,) of each push, in units of noise.
+        coordinate: its description.
+        pushes: derivative (m_i,) of each push's prediction with respect to the coordinate, in units of the noise.
     """
 
     kind: type[Effect]
@@ -39,19 +43,20 @@ class Column:
 
     @property
     def null(self) -> float:
-        """The coordinate's value where the family is null."""
+        """The coordinate's value at the family's point, where the effect is null."""
         return self.family.point[self.index]
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Score:
-    """How much a family explains.
+    """How much one family of an effect explains.
 
     Attributes:
-        kind, family: which.
-        gain: in log likelihood.
-        point: (k,) of the chart, where the linear fit ends.
-        dz: (n,) change of the model's own coordinates that goes with it.
+        kind: the effect's class.
+        family: of its score tests.
+        gain: of log likelihood, linearised.
+        point: (k,) in the effect's chart, where the linearised fit ends.
+        dz: (n,), change of the fitted model's own coordinates in that fit.
     """
 
     kind: type[Effect]
@@ -62,7 +67,7 @@ class Score:
 
 
 def columns(fitter: Fitter, fit: Fit, kinds: Sequence[type[Effect]]) -> list[Column]:
-    """The columns of all families of effects, the model's own effects staying where they are."""
+    """Columns of all families of some effects at a fitted model, whose own effects stay in the rollouts."""
     around = fitter.case.around
     blank = [
         Column(kind=kind, family=family, index=j, coordinate=kind.chart(around)[j], pushes=())
@@ -122,7 +127,7 @@ def _added_up(blank: Column, parts: Sequence[Column]) -> Column:
 
 
 def by_family(found: Sequence[Column]) -> list[list[int]]:
-    """Indices of the columns of each family."""
+    """Indices of the columns that belong to the same family of an effect, family by family."""
     families: dict[tuple[str, Family], list[int]] = {}
     for k, c in enumerate(found):
         families.setdefault((c.kind.name, c.family), []).append(k)
@@ -130,7 +135,15 @@ def by_family(found: Sequence[Column]) -> list[list[int]]:
 
 
 def scores(fitter: Fitter, fit: Fit, found: Sequence[Column]) -> list[Score]:
-    """The score test of each family, best first: how much a model with it gains, all else refitted, linearly."""
+    """The score test of each family, best first: the gain of log likelihood if it is added and all else is refitted.
+
+    Refits are linear: of z, the family's coordinates (within their bounds), all nuisance parameters and the scatter.
+
+    Args:
+        fitter: of the recording.
+        fit: the model to which families are added.
+        found: its columns.
+    """
     n, families = fit.hypothesis.dimension, by_family(found)
     best: list[tuple[float, Array]] = [(-math.inf, np.zeros(0))] * (1 + len(families))
     for scatter in scatters_beside(fit.scatter):
@@ -170,8 +183,7 @@ def _equations(fitter: Fitter, fit: Fit, found: Sequence[Column], scatter: float
 
 def _solved(precision: Array, right: Array, index: list[int], some: Sequence[Column]) -> tuple[float, Array]:
     """Gain in log likelihood of some coordinates, the last of which are those of columns, and where they end."""
-    block, r = precision[np.ix_(index, index)], right[index]
-    block = block + 1e-12 * float(np.trace(block)) * np.eye(len(index))
+    block, r = ridged(precision[np.ix_(index, index)]), right[index]
     free = [np.inf] * (len(index) - len(some))
     least = [-one for one in free] + [c.coordinate.lower - c.null for c in some]
     most = free + [c.coordinate.upper - c.null for c in some]

@@ -1,4 +1,4 @@
-"""Derivatives by differences of rollouts."""
+"""Derivatives by one-sided differences of rollouts."""
 
 from __future__ import annotations
 
@@ -13,12 +13,18 @@ NUISANCE_STEP = 0.5  # of the prior's standard deviation, for differences
 
 
 def nuisance_steps(nuisance: Array) -> list[Array]:
-    """Each of a push's nuisance parameters (k,) stepped, towards its middle."""
+    """Nuisance parameters (k,) of a push, one list entry for each of them with a step towards zero."""
     return [nuisance + step for step in np.diag(_nuisance_sizes(nuisance))]
 
 
 def nuisance_slopes(base: Array, nuisance: Array, vectors: Iterator[Array | None]) -> Array:
-    """Derivatives (m, k) by a push's nuisance parameters, from the rollouts of ``own_steps``."""
+    """Derivatives (m, k) of a prediction with respect to a push's nuisance parameters.
+
+    Args:
+        base: (m,), the prediction at ``nuisance``.
+        nuisance: (k,).
+        vectors: predictions (m,) at each of ``nuisance_steps``; k of them are taken.
+    """
     return np.column_stack([slope(base, next(vectors), size) for size in _nuisance_sizes(nuisance)])
 
 
@@ -27,5 +33,5 @@ def _nuisance_sizes(nuisance: Array) -> Array:
 
 
 def slope(base: Array, moved: Array | None, step: float) -> Array:
-    """Of a prediction (m,); none where the step cannot be rolled out."""
+    """Derivative (m,) of a prediction; zero where the stepped rollout could not be made."""
     return np.zeros_like(base) if moved is None else (moved - base) / step

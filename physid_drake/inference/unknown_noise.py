@@ -1,6 +1,6 @@
-"""How loud a noise is that nobody states and no rest shows: as loud as what the baseline leaves.
+"""Estimates a noise that the recording does not state and no rest shows: as large as what the baseline model leaves.
 
-Only ratios speak then: the baseline is taken to leave noise, and an effect has to leave much less of it.
+Then only ratios count: the baseline is assumed to leave noise alone, and an effect has to leave much less.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from physid_drake.pushes.tracker_noise import FORCE_SCATTER, ForceNoise
 Array = NDArray[np.float64]
 
 SCATTERS = tuple(FORCE_SCATTER * np.geomspace(1.0, 16.0, 9))  # of a wandering force
-OFFSETS = (0.0, *np.geomspace(0.02, 0.64, 6))  # of a force that is off over a whole push
+OFFSETS = (0.0, *np.geomspace(0.02, 0.64, 6))  # of an error of the force that is constant over a push
 
 
 def as_loud_as_left(fitter: Fitter, fit: Fit) -> Case:
-    """The case with noise as large as what a model leaves, as most pushes say; no quieter than it is."""
+    """The case with noise as large as the errors that a model leaves in most pushes, and no smaller than it was."""
     forces: list[Array] = []
     for i, (push, features) in enumerate(zip(fit.pushes, fitter.case.features, strict=True)):
         left = np.linalg.solve(fitter.predictor.whitening[i], push.residual - push.nuisance @ fit.point.nuisance[i])

@@ -1,4 +1,4 @@
-"""A story: a model and a goal in, the best push out. The same search as the identification's, over a policy."""
+"""Planning: from a model and a goal to the best push, with the same search as the identification's."""
 
 from physid_drake.plan.closed_loop import Step as Step
 from physid_drake.plan.closed_loop import Task as Task

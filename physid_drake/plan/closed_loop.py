@@ -1,4 +1,4 @@
-"""Several pushes to a goal: after each one the object is seen, the belief updated, and the next push planned."""
+"""Several pushes to a goal: after each, the object is seen, the model updated and the next push planned."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ Pose = tuple[float, float, float]
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Task:
-    """What several pushes are for.
+    """A goal, and how it is to be reached.
 
     Attributes:
-        goal: x, y [m].
-        pushes: at most.
-        tolerance: within which the object is left where it is [m].
-        policy: a name in ``policies.POLICIES``, of one push.
-        budget: settings that each plan tries.
-        noise: of the tracker, standard deviations of x, y [m] and yaw [rad].
-        friction_scatter: of one push's support friction [-].
-        order: pushes that were made before the first.
+        goal: x, y in W [m].
+        pushes: largest number of pushes.
+        tolerance: distance from the goal at which no further push is made [m].
+        policy: name in ``policies.POLICIES`` of a family of single pushes.
+        budget: settings that are tried for each plan.
+        noise: standard deviations of the tracker, x, y [m] and yaw [rad].
+        friction_scatter: relative standard deviation of friction between pushes [-].
+        order: number of pushes that were made before the first, for effects that depend on it.
     """
 
     goal: Point
@@ -47,13 +47,13 @@ class Task:
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Step:
-    """One push of several.
+    """One push, with what was learned from it.
 
     Attributes:
-        plan: of it; None where the object was left where it was.
-        seen: where the object was seen after it.
-        miss: of the goal, as seen [m].
-        model: what is known after it.
+        plan: of the push; None where no push was made.
+        seen: where the object was seen after it, x, y [m], yaw [rad].
+        miss: distance from the goal, as seen [m].
+        model: with what was learned.
     """
 
     plan: Plan | None
@@ -63,15 +63,16 @@ class Step:
 
 
 def closed_loop(model: Model, robot: Robot, task: Task, rng: np.random.Generator) -> Iterator[Step]:
-    """Push, see, learn and plan again, until the object is within the tolerance or all pushes are made.
+    """See, plan, push and learn, until the object is within the tolerance of the goal or all pushes are made.
 
     Args:
-        model: with its intervals, which are the belief.
-        robot: sees the object and pushes it.
-        task: what for.
-        rng: of the plans.
+        model: whose intervals are the belief that the pushes update.
+        robot: sees and pushes the object.
+        task: the goal.
+        rng: random numbers of the plans.
 
     Raises:
+        ConfigError: if goal or object is not on the table, or the model has no hand.
         RobotError: if the robot cannot push.
     """
     seen = robot.see()
@@ -91,12 +92,12 @@ def closed_loop(model: Model, robot: Robot, task: Task, rng: np.random.Generator
 
 
 def open_loop(model: Model, robot: Robot, task: Task, rng: np.random.Generator) -> Iterator[Step]:
-    """The same pushes without looking: each begins where the model thinks that the last one ended.
+    """The same pushes without feedback: each is planned from where the model predicts that the last one ended.
 
-    Arguments as of ``closed_loop``. The first push is planned to the goal, and so is every other one: of a model that
-    thinks that it is there already, the object is left where it is.
+    No push is made where the object is predicted to be within the tolerance already. Arguments as of ``closed_loop``.
 
     Raises:
+        ConfigError: if the goal is not on the table, or the model has no hand.
         RobotError: if the robot cannot push.
     """
     thought = robot.see()

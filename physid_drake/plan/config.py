@@ -5,17 +5,18 @@ import dataclasses as dc
 
 @dc.dataclass
 class PlanConfig:
-    """The plan that the main job makes with what it identified, and again with what its diagnosis finds.
+    """The plan that ``run_cell`` makes with the identified parameters, and again with what its diagnosis finds.
 
     Attributes:
         policy: a name in ``policies.POLICIES``.
-        goal_m: ``[x, y]`` of the goal; empty for 0.3 m ahead of the object's start along +x, or as fits on the table.
-        start_m: ``[x, y]`` of the object; empty for where it stood before the recording's first push.
-        start_deg: its yaw, where ``start_m`` is given.
+        goal_m: ``[x, y]`` of the goal [m]; empty for 0.3 m ahead of the object's start along +x, or as fits on the
+            table.
+        start_m: ``[x, y]`` of the object [m]; empty for where it was before the recording's first push.
+        start_deg: its yaw [deg], where ``start_m`` is given.
         budget: settings that the search tries.
-        sweep: settings of the cost's curve; 0 for none.
-        draws: of theta, for the spread under the belief; 0 for none.
-        tolerance_m: of the goal, within which an end counts as a success.
+        sweep: points of the curve of cost over one setting; 0 for none.
+        draws: posterior samples for the spread of the cost; 0 for none.
+        tolerance_m: distance from the goal up to which a push counts as a success [m].
     """
 
     policy: str = "push"

@@ -1,4 +1,4 @@
-"""How a push may go: a model's estimates, this push's friction and the object's start, drawn from the belief."""
+"""Posterior samples of a push: of the model's parameters, of this push's friction and of the object's start."""
 
 from __future__ import annotations
 
@@ -25,11 +25,17 @@ Array = NDArray[np.float64]
 Z90 = float(stats.norm.ppf(0.95))
 FURTHEST = 3.0  # standard deviations
 LEAST_FRICTION = 0.01
-FIRST_GUESS = 4.0  # pushes' worth, of friction's scatter before any push
+FIRST_GUESS = 4.0  # pushes that the prior guess of friction's scatter counts as
 
 
 def uncertain_names(model: Model) -> list[str]:
-    """What the model gives an interval for that draws can use: two numbers, not an interval for each cell."""
+    """Names of the values that samples vary: those with an interval of two numbers.
+
+    A name is ``theta.<name>`` or ``<effect>.<name>``.
+
+    Raises:
+        ConfigError: if an interval is neither two ordered numbers nor rows of them.
+    """
     names = []
     for name, interval in model.intervals.items():
         numbers = _interval(name, interval)
@@ -40,11 +46,11 @@ def uncertain_names(model: Model) -> list[str]:
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Draw:
-    """One way in which a push may go.
+    """One posterior sample of a push.
 
     Attributes:
-        model: with this push's friction in it.
-        situation: with where the object really starts.
+        model: with sampled parameters and this push's friction.
+        situation: with the sampled start of the object.
     """
 
     model: Model
@@ -52,7 +58,10 @@ class Draw:
 
 
 def scatter_freedom(pushes: int) -> float:
-    """Degrees of freedom with which so many pushes tell friction's scatter: theirs and those of the first guess."""
+    """Degrees of freedom of an estimate of the scatter of friction from so many pushes.
+
+    A prior guess counts as ``FIRST_GUESS`` further pushes.
+    """
     return FIRST_GUESS + pushes
 
 
@@ -65,25 +74,26 @@ def draws_of(
     friction_scatter: float = 0.0,
     scatter_freedom: float = math.inf,
 ) -> tuple[Draw, ...]:
-    """Draws from the belief that intervals, correlation and scatter are.
+    """Posterior samples of a push.
 
-    Each estimate has its interval, and is normal to either side, log-normal where it is positive or its interval is
-    that of a logarithm; a Gaussian copula ties them.
-    Estimates that the model's correlation does not hold are independent. Friction's departure in this push is
-    Student's: normal, with a variance that a few pushes have told.
+    Each value has its interval as 90 % interval. It is normal to either side of the estimate, or log-normal if it is
+    positive or its interval is symmetric about the estimate's logarithm. A Gaussian copula with the model's
+    correlation joins the values; those that it does not hold are independent. The relative deviation of this push's
+    friction has Student's t distribution, that of a normal variable whose variance was estimated.
 
     Args:
         model: with its intervals.
-        situation: where the object is seen, and how well.
-        count: how many.
-        rng: scrambles a Sobol sequence, so that few draws cover the belief evenly.
-        friction_scatter: standard deviation of one push's support friction over that of theta [-].
-        scatter_freedom: degrees of freedom with which the scatter is known; infinite if it is exact.
+        situation: where the object is seen, and with which standard deviation.
+        count: number of samples.
+        rng: scrambles a Sobol sequence, so that few samples cover the posterior evenly.
+        friction_scatter: relative standard deviation of friction between pushes [-].
+        scatter_freedom: degrees of freedom of that estimate; infinite if it is exact.
 
     Raises:
-        ConfigError: if an interval is not two numbers or names what the model has not.
+        ConfigError: if an interval is not two ordered numbers, or belongs to no parameter of the model.
 
-    Source: A. Gelman et al., Bayesian Data Analysis, 3rd ed., 2013, section 3.2 (Student's predictive).
+    Source: A. Gelman et al., Bayesian Data Analysis, 3rd ed., 2013, section 3.2, for the predictive distribution; R.
+    B. Nelsen, An Introduction to Copulas, 2nd ed., 2006, for the copula.
     """
     names = uncertain_names(model)
     if count < 1:
@@ -105,7 +115,7 @@ def draws_of(
 
 
 def root_of(correlation: Array) -> Array:
-    """The symmetric root (n, n) of a correlation, which need not be regular."""
+    """The symmetric square root (n, n) of a correlation (n, n), which may be singular."""
     values, vectors = np.linalg.eigh(correlation)
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
 
@@ -127,7 +137,7 @@ def _interval(name: str, interval: Any) -> tuple[float, float] | None:
 
 
 def value_of(model: Model, name: str) -> float:
-    """A value that has an interval, by the interval's name.
+    """The model's value to which an interval belongs, by the interval's name.
 
     Raises:
         ConfigError: if the model has no such value.
@@ -149,12 +159,15 @@ def value_of(model: Model, name: str) -> float:
 
 
 def moved(model: Model, scores: dict[str, float], scatter: float) -> Model:
-    """The model with every uncertain value moved by its score, in standard deviations.
+    """The model with its uncertain values at given scores.
 
     Args:
         model: with intervals.
-        scores: by the intervals' names.
-        scatter: of this push's support friction, over that of theta [-].
+        scores: by an interval's name, how many standard deviations the value is moved by.
+        scatter: relative deviation of this push's friction [-].
+
+    Raises:
+        ConfigError: if an interval belongs to no parameter of the model.
     """
     body, effects = model.body, {e.name: e for e in model.effects}
     for name, score in scores.items():
@@ -185,7 +198,7 @@ def _shifted(value: float, interval: tuple[float, float], score: float, allowed:
     if high < 0.0 and value < 0.0 and _is_logarithms(-value, -high, -low):
         return allowed.nearest(-math.exp(_drawn(math.log(-value), math.log(-high), math.log(-low), -score)))
     moved = _drawn(value, low, high, score)
-    # An interval that stays on one side of zero is of something that has a sign.
+    # An interval on one side of zero belongs to a value whose sign is known.
     if low >= 0.0:
         return allowed.nearest(max(0.0, moved))
     return allowed.nearest(min(0.0, moved) if high <= 0.0 else moved)

@@ -1,4 +1,4 @@
-"""What a push that was made says of a model: its estimates, intervals and correlation afterwards."""
+"""Updates a model's estimates, intervals and correlation with a push that was made."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from physid_drake.policies import PlannedPush
 Array = NDArray[np.float64]
 Pose = tuple[float, float, float]
 
-OWN_ERROR = (1e-3, 1e-3, 0.01)  # m, m, rad: by which a right model misses a push, beside the tracker's noise
+OWN_ERROR = (1e-3, 1e-3, 0.01)  # m, m, rad: standard deviation of a right model's error, beside the tracker's noise
 STEP = (0.1,)  # standard deviations, of differences
 MOST_STEPS = 6
 LOST = 1e3  # standard deviations: of a rollout that diverged, in all that is compared
@@ -29,10 +29,10 @@ class MadePush:
     """A push that was made.
 
     Attributes:
-        planned: what was to be done.
-        path: that the hand was told to go.
+        planned: the push.
+        path: the hand's path that was commanded.
         situation: where the object was seen before it.
-        end: where it was seen after it, at rest: x, y [m], yaw [rad].
+        end: where the object was seen at rest after it, x, y [m], yaw [rad].
     """
 
     planned: PlannedPush
@@ -42,26 +42,26 @@ class MadePush:
 
 
 def learned(model: Model, made: MadePush, *, noise: Sequence[float], friction_scatter: float = 0.0) -> Model:
-    """The model after one more push: Gauss-Newton to the most likely estimates, and their Gaussian spread there.
+    """The model after one more push: the most probable estimates, and a Gaussian about them.
 
-    The belief is the model's intervals, tied by its correlation. Where the push ended is compared, which needs no
-    common clock. This push's own friction is an unknown beside the estimates, and is forgotten. A model without
-    intervals learns nothing.
+    The prior is the model's intervals with its correlation. Only the pose in which the object came to rest is
+    compared, so that no common clock is needed. The friction of this push is estimated along, and not kept. A model
+    without intervals is returned unchanged.
 
     Args:
-        model: before it.
+        model: before the push.
         made: the push.
-        noise: of the tracker, standard deviations of x, y [m] and yaw [rad].
-        friction_scatter: standard deviation of one push's support friction over that of theta [-].
+        noise: standard deviations of the tracker, x, y [m] and yaw [rad].
+        friction_scatter: relative standard deviation of friction between pushes [-].
 
-    Source: J. Nocedal, S. Wright, Numerical Optimization, 2nd ed., 2006, chapter 10 (Gauss-Newton); D. MacKay,
-    Information Theory, Inference, and Learning Algorithms, 2003, chapter 27 (Laplace's method).
+    Source: J. Nocedal, S. Wright, Numerical Optimization, 2nd ed., 2006, chapter 10, for Gauss-Newton; D. MacKay,
+        Information Theory, Inference, and Learning Algorithms, 2003, chapter 27, for Laplace's approximation.
     """
     names = uncertain_names(model)
     if not names:
         return model
     root = root_of(np.eye(len(names)) if model.correlation is None else model.correlation.among(names))
-    # Where the object starts is seen as badly as where it ends.
+    # The start is seen with the same noise as the end.
     spread = np.sqrt(2.0 * np.square(noise) + np.square(OWN_ERROR))
 
     def residuals(scores: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The story: a model, a policy and a cost in, the best push out, with what the belief says of its success."""
+"""Plans a push: from a model, a policy and a cost to the best settings, with the spread of their cost."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ FASTER = 1.2  # times the speed of the fastest recorded push, which noise may ma
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Spread:
-    """What the belief says of one setting.
+    """Posterior samples of what one push comes to.
 
     Attributes:
-        costs: (n,) of the draws [m]; the loss where the object is lost or does not stop, or the rollout diverged.
+        costs: (n,) of the samples [m]; that of a lost object where the rollout diverged.
         ends: (n, 3) x, y [m], yaw [rad].
-        endings: (n) how they ended.
+        endings: (n,) how they ended.
     """
 
     costs: Array
@@ -54,32 +54,32 @@ class Spread:
 
     @property
     def band(self) -> tuple[float, float]:
-        """5 % and 95 % quantile of the cost [m]."""
+        """5 % and 95 % quantiles of the cost [m]."""
         low, high = np.quantile(self.costs, [0.05, 0.95]).tolist()
         return low, high
 
     @property
     def losses(self) -> int:
-        """Draws in which the object fell or toppled."""
+        """Number of samples in which the object fell or toppled."""
         return sum(e in (Ending.FELL, Ending.TOPPLED) for e in self.endings)
 
     @property
     def moving(self) -> int:
-        """Draws in which the object had not stopped when the rollout ended."""
+        """Number of samples in which the object had not stopped when the rollout ended."""
         return sum(e is Ending.MOVING for e in self.endings)
 
     @property
     def diverged(self) -> int:
-        """Draws whose rollout diverged."""
+        """Number of samples whose rollout diverged."""
         return sum(e is Ending.DIVERGED for e in self.endings)
 
     def successes(self, tolerance: float) -> int:
-        """Draws that end at rest within a tolerance [m]."""
+        """Number of samples that end at rest with a cost of at most ``tolerance`` [m]."""
         ended = [e is Ending.AT_REST for e in self.endings]
         return int(np.count_nonzero((self.costs <= tolerance) & ended))
 
     def success_rate(self, tolerance: float) -> tuple[float, tuple[float, float]]:
-        """Share of successes, and its 90 % interval (Wilson's)."""
+        """Share of successes, and its 90 % interval (Wilson's); ``tolerance`` in m."""
         hits, count = self.successes(tolerance), len(self.costs)
         interval = stats.binomtest(hits, count).proportion_ci(confidence_level=0.9, method="wilson")
         return hits / count, (float(interval.low), float(interval.high))
@@ -87,7 +87,14 @@ class Spread:
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class SweepRow:
-    """One setting of a sweep: the setting's value, cost [m] and ending under the likely theta, spread if drawn."""
+    """One point of the curve of cost over a setting.
+
+    Attributes:
+        value: of the setting, in its unit.
+        cost: with the most probable parameters [m].
+        ending: with the most probable parameters.
+        spread: by posterior samples; None where there are none.
+    """
 
     value: float
     cost: float
@@ -100,19 +107,20 @@ class Plan:
     """The best push of a policy.
 
     Attributes:
-        model: that it was planned with.
-        policy: the family.
-        cost_function: what was made small.
+        model: with which it was planned.
+        policy: the family of pushes.
+        cost_function: what was minimised.
         situation: where the object starts.
-        tolerance: cost up to which an end counts as a success [m].
-        settings: (d,) best settings, each in its unit.
-        predicted: the trajectory under the likely theta.
-        cost: its cost [m]; infinite if every rollout diverged.
-        loss: the cost of an object that is lost or does not stop [m].
-        spread: under the belief, or None if nothing was drawn.
-        sweep: cost along the policy's swept setting, the others as the search found them best.
-        search: what the search found; with ``risk`` its errors are mean costs under the belief.
-        risk: whether the mean over the belief was made small instead of the likely theta's cost.
+        tolerance: cost up to which a push counts as a success [m].
+        settings: (d,) the best ones, each in its unit.
+        predicted: the trajectory with the most probable parameters.
+        cost: of that trajectory [m]; infinite if every rollout diverged.
+        loss: cost of an object that is lost or does not stop [m].
+        spread: by posterior samples; None where there are none.
+        sweep: cost over the policy's swept setting, the others at their best values.
+        search: the result of the search; with ``risk`` its errors are mean costs.
+        risk: whether the mean cost over posterior samples was minimised, instead of that of the most probable
+            parameters.
     """
 
     model: Model
@@ -149,28 +157,28 @@ def plan(
 ) -> Plan:
     """Search a policy's settings for the least cost.
 
-    The cost is that of the trajectory under the most likely theta, as in the paper, or with ``risk`` the mean over
-    draws of theta from the model's intervals, where an object that is lost costs more than any that is not.
+    The cost is that of the trajectory with the most probable parameters, as in the paper. With ``risk`` it is the
+    mean over posterior samples, in which a lost object costs more than any that is not lost.
 
     Args:
         model: the object, with its effects.
         policy: the family of pushes.
-        cost: what is to be small.
+        cost: to be minimised.
         situation: where the object starts.
-        rng: of candidates, search and draws; the same state gives the same plan.
-        budget: settings tried.
+        rng: of candidates, search and samples; the same state gives the same plan.
+        budget: settings that are tried.
         search: a name in ``search.SEARCHES``.
-        draws: of theta, for the spread; 0 for none. A model without intervals has no spread.
-        risk: make the mean over the draws small.
-        sweep: settings of the sweep; 0 for none.
-        tolerance: cost up to which an end counts as a success [m].
-        friction_scatter: of support friction from push to push [-], drawn along.
-        scatter_freedom: degrees of freedom with which the scatter is known; infinite if it is exact.
+        draws: posterior samples for the spread; 0 for none. A model without intervals has no spread.
+        risk: minimise the mean cost over posterior samples.
+        sweep: points of the curve of cost over one setting; 0 for none.
+        tolerance: cost up to which a push counts as a success [m].
+        friction_scatter: relative standard deviation of friction between pushes [-].
+        scatter_freedom: degrees of freedom of that estimate; infinite if it is exact.
         progress: called with the stage, steps done and steps in all.
 
     Raises:
-        ConfigError: if a number is out of its range, the search is unknown, the model has no hand, or ``risk`` has
-            nothing to draw from.
+        ConfigError: if a number is out of its range, the search is unknown, the model has no hand, or ``risk`` has no
+            samples.
 
     Source: Zhu, Kimmel, Boularias, section III.C, policy optimization.
     """
@@ -189,23 +197,23 @@ def plan(
         raise ConfigError(
             "plan: --risk needs posterior samples (--draws above 0), and a model with intervals to sample from."
         )
-    story = _Story(model, drawn, policy, cost, situation, progress or (lambda stage, done, total: None))
-    objective = story.mean_costs if risk else story.likely_costs
+    rollouts = _Rollouts(model, drawn, policy, cost, situation, progress or (lambda stage, done, total: None))
+    objective = rollouts.mean_costs if risk else rollouts.likely_costs
     found = search_minimum(
         objective, policy.space, policy.space.sample(streams[1], CANDIDATES, from_prior=False),
         search_named(search), budget=budget, rng=streams[2], refine_every=REFINE_EVERY, entropy_tolerance=0.0,
-        on_trial=lambda belief: story.tell_search(belief, budget),
+        on_trial=lambda belief: rollouts.tell_search(belief, budget),
     )  # fmt: skip
-    tried = story.best if math.isfinite(story.best[1]) else (np.array(found.theta_best), math.inf)
-    rows = story.sweep(tried[0], sweep)
+    tried = rollouts.best if math.isfinite(rollouts.best[1]) else (np.array(found.theta_best), math.inf)
+    rows = rollouts.sweep(tried[0], sweep)
     best = _better(policy, tried, rows, risk=risk)
-    predicted = story.trajectory(model, best)
+    predicted = rollouts.trajectory(model, best)
     pushes = policy.pushes(best)
-    # What was made small on its own draws looks better there than it is.
+    # With risk, fresh samples: on those that were minimised over, the cost is too low.
     told = spread_of(fresh if risk else drawn, pushes, cost, model=model, situation=situation) if drawn else None
     return Plan(
         model=model, policy=policy, cost_function=cost, situation=situation, tolerance=tolerance, settings=best,
-        predicted=predicted, cost=cost_of(cost, predicted, model.table), loss=story.loss,
+        predicted=predicted, cost=cost_of(cost, predicted, model.table), loss=rollouts.loss,
         spread=told, sweep=rows, search=found, risk=risk,
     )  # fmt: skip
 
@@ -213,13 +221,13 @@ def plan(
 def spread_of(
     draws: Sequence[Draw], pushes: tuple[PlannedPush, ...], cost: Cost, *, model: Model, situation: Situation
 ) -> Spread:
-    """What draws from the belief say of pushes: the hand aims at where the object is seen.
+    """What pushes come to in posterior samples; the hand aims at where the object is seen.
 
     Args:
-        draws: at least one.
+        draws: the samples, at least one.
         pushes: made one after the other.
         cost: of the end.
-        model: that the pushes are made for.
+        model: with which the hand's path is made.
         situation: where the object is seen.
     """
     path = path_of(model, pushes[0], situation.start)
@@ -234,12 +242,13 @@ def spread_of(
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Hindsight:
-    """What a diagnosis says of the plan that was made before it.
+    """What a diagnosis changes for the plan that was made before it.
 
     Attributes:
-        baseline: the plan that was made before, without effects; None where this one is that plan.
-        outcome: what comes of the plain plan's push with the effects: its trajectory and cost [m].
-        caveat: what the diagnosis leaves open; empty if nothing.
+        baseline: the plan that was made with the baseline model; None where this one is that plan.
+        outcome: trajectory and cost [m] of the baseline plan's push, simulated with the effects; None where there is
+            none.
+        caveat: a warning that the diagnosis gives; empty if none.
     """
 
     baseline: Plan | None = None
@@ -248,11 +257,11 @@ class Hindsight:
 
 
 def caveat_of(verdict: str, alike: Mapping[str, Sequence[str]]) -> str:
-    """What a diagnosis leaves open that may change what comes of a plan; empty if nothing.
+    """The warning that a diagnosis gives for plans made with its model; empty if none.
 
     Args:
         verdict: of the diagnosis.
-        alike: per effect that was found, what these pushes cannot tell it from.
+        alike: for each effect that was found, names of effects that it cannot be distinguished from.
     """
     rivals = {name: others for name, others in alike.items() if others}
     if rivals:
@@ -266,7 +275,12 @@ def caveat_of(verdict: str, alike: Mapping[str, Sequence[str]]) -> str:
 
 
 def caveats_of(made: Plan, hindsight: Hindsight | None = None) -> list[str]:
-    """All that may keep a plan from coming true, as far as it is known, a line each."""
+    """All warnings about a plan, one line each: of its diagnosis, of its speed, and of the robots' reach.
+
+    Args:
+        made: the plan.
+        hindsight: what a diagnosis changes for it; None without a diagnosis.
+    """
     speed, known = max(push.speed for push in made.policy.pushes(made.settings)), made.model.top_speed
     caveats = [hindsight.caveat] if hindsight is not None and hindsight.caveat else []
     if known is not None and speed > FASTER * known:
@@ -278,7 +292,7 @@ def caveats_of(made: Plan, hindsight: Hindsight | None = None) -> list[str]:
 
 
 def outcome_under(made: Plan, model: Model) -> Outcome:
-    """What another model says of a plan's push: its trajectory and cost [m]."""
+    """Trajectory and cost [m] of a plan's push, simulated with another model."""
     pushes, path = made.policy.pushes(made.settings), made.predicted.paths[0]
     trajectory = trajectory_of(model, pushes, made.situation, path=path, believed=made.model)
     return trajectory, cost_of(made.cost_function, trajectory, model.table)
@@ -304,7 +318,7 @@ def _check(budget: int, draws: int, sweep: int, tolerance: float, search: str) -
     search_named(search)
 
 
-class _Story:
+class _Rollouts:
     """The rollouts of one plan."""
 
     def __init__(

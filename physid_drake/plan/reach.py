@@ -1,4 +1,4 @@
-"""Where the robots reach on a table: discs about their bases, as they stand behind the shipped table's edges."""
+"""The reach of robots on a table: discs about their bases, which stand behind edges as in the shipped cell."""
 
 from __future__ import annotations
 
@@ -24,24 +24,27 @@ INSIDE = 0.05  # m: so far within a robot's reach an object is to stop
 
 @dc.dataclass(frozen=True, kw_only=True)
 class RobotReach:
-    """A disc on the table.
+    """The reach of a robot on the table: a disc.
 
     Attributes:
-        base: x, y of its centre [m].
-        radius: m. Seen from above and at the table's height, so that it is an upper bound.
+        base: x, y of its centre in W [m].
+        radius: at the table's height [m]. It neglects the hand's orientation, and is therefore an upper bound.
     """
 
     base: tuple[float, float]
     radius: float
 
     def beyond(self, places: Array) -> Array:
-        """How far places (n, 2) lie outside [m]; 0 within."""
+        """Distance (n,) of places (n, 2) from the disc [m]; 0 inside it."""
         away = np.atleast_2d(places) - np.array(self.base)
         distance: Array = np.hypot(away[:, 0], away[:, 1])
         return np.asarray(np.maximum(0.0, distance - self.radius), dtype=np.float64)
 
     def chords(self, table: Corners) -> Array:
-        """Rows (n, 3) of x and of y from and to [m], of what of it lies on a table; none where it is beyond."""
+        """The part of the disc that is on a table, for drawing: rows (n, 3) of x, and of y from and to [m].
+
+        There are no rows where no part is on the table.
+        """
         (x0, y0), (x1, y1) = table
         x = np.linspace(max(x0, self.base[0] - self.radius), min(x1, self.base[0] + self.radius), CHORDS)
         half = np.sqrt(np.maximum(0.0, self.radius**2 - (x - self.base[0]) ** 2))
@@ -52,7 +55,7 @@ class RobotReach:
 
 
 def reaches(table: Corners) -> dict[str, RobotReach]:
-    """The robots' reach, by ``motoman`` and ``baxter``.
+    """The reach of ``motoman`` and ``baxter``, by these names.
 
     Each stands as far behind the middle of its edge of the table (-x, +x) as in the shipped cell.
 
@@ -68,15 +71,15 @@ def reaches(table: Corners) -> dict[str, RobotReach]:
 
 
 def goal_within(name: str, table: Corners, start: tuple[float, float]) -> tuple[WithinDisc, tuple[float, float]]:
-    """The cost of an object that is to stop where a robot reaches it, and the nearest place [m] that is well inside.
+    """The cost of resting where a robot reaches, and the place [m] well inside its reach nearest to the start.
 
     Args:
         name: of the robot.
         table: lower and upper corner of its top [m].
-        start: of the object [m].
+        start: of the object, x, y [m].
 
     Raises:
-        ConfigError: if there is no such robot, or it reaches no place on the table, or the object already.
+        ConfigError: if there is no such robot, it reaches no place on the table, or it reaches the object already.
     """
     robots = reaches(table)
     if name not in robots:
@@ -93,7 +96,9 @@ def goal_within(name: str, table: Corners, start: tuple[float, float]) -> tuple[
 
 
 def beyond_reach(table: Corners, hand: Array, end: Array) -> list[str]:
-    """What of a plan the robots of the shipped cell do not reach, a line each; of another cell nobody knows.
+    """Parts of a plan that the robots of the shipped cell cannot reach, one line each.
+
+    There is no line for a table of another size.
 
     Args:
         table: lower and upper corner of its top [m].

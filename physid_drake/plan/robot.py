@@ -1,4 +1,4 @@
-"""A robot that makes planned pushes: what the loop of pushing, learning and planning needs of one."""
+"""Robots that make planned pushes, for the loop of pushing, learning and planning."""
 
 from __future__ import annotations
 
@@ -22,22 +22,30 @@ REST = 0.2  # s recorded after the object has stopped
 
 
 class Robot(Protocol):
-    """Something that sees the object and makes planned pushes."""
+    """Sees the object, and makes planned pushes."""
 
     def see(self) -> Pose:
-        """Where the object stands: x, y [m], yaw [rad]."""
+        """The object's pose, x, y [m], yaw [rad]."""
         ...
 
     def execute(self, push: PlannedPush, *, aim: Pose | None = None) -> Push:
-        """Make one push and record it; ``aim``: where the hand takes the object to be, None for where it is seen."""
+        """Make one push and record it.
+
+        Args:
+            push: to make.
+            aim: pose of the object at which the hand aims, x, y [m], yaw [rad]; None for where it is seen.
+
+        Raises:
+            RobotError: if it cannot push.
+        """
         ...
 
 
 class SimulatedRobot:
-    """A robot whose world is a model that nobody else sees; the object stays where a push has left it.
+    """A robot whose world is a simulated model. The object stays where a push has left it.
 
     Attributes:
-        ending: how the last push ended; AT_REST before the first.
+        ending: how the last push ended; ``AT_REST`` before the first.
     """
 
     def __init__(
@@ -46,30 +54,30 @@ class SimulatedRobot:
         """Put the object on the table.
 
         Args:
-            hidden: the world.
-            start: of the object.
-            sensors: standard deviations of its white noise; None is none.
+            hidden: the model of the world, which whoever plans does not know.
+            start: of the object, x, y [m], yaw [rad].
+            sensors: standard deviations of white noise; None is no noise.
             rng: draws the noise.
-            pushes: how many were made before: the friction of a hidden world may drift with them.
+            pushes: number of pushes that were made before, for effects that depend on it.
         """
         self._hidden, self._pose, self._sensors, self._rng = hidden, start, sensors, rng
         self._pushes = pushes
         self.ending = Ending.AT_REST
 
     def see(self) -> Pose:
-        """The object's pose with the tracker's noise."""
+        """The object's pose, x, y [m], yaw [rad], with the tracker's noise."""
         x, y, yaw = np.array(self._pose) + self._rng.standard_normal(3) * self._sensors.object_std
         return float(x), float(y), float(yaw)
 
     def execute(self, push: PlannedPush, *, aim: Pose | None = None) -> Push:
-        """Push, record at 100 Hz until the object has rested for 0.2 s, and leave the object there.
+        """Make one push, and record it at 100 Hz until the object has rested for 0.2 s.
 
         Args:
             push: to make.
-            aim: where the hand takes the object to be; None for where it is seen.
+            aim: pose of the object at which the hand aims, x, y [m], yaw [rad]; None for where it is seen.
 
         Raises:
-            RobotError: if the push before lost the object, or the rollout diverges.
+            RobotError: if an earlier push lost the object, or the rollout diverges.
         """
         if self.ending not in (Ending.AT_REST, Ending.MOVING):
             raise RobotError(f"robot: the object {self.ending.value} in the last push; put it back first.")

@@ -1,4 +1,4 @@
-"""Planning as a Drake system: it searches a policy under the belief once there is an identification."""
+"""Planning as a Drake system, which plans with identifications as they arrive."""
 
 from __future__ import annotations
 
@@ -35,7 +35,9 @@ _STREAM = 2  # of the run's seed; the identification takes the two before
 
 
 class PolicySystem(LeafSystem):
-    """Plans the next push with what was identified, or diagnosed; its state holds that theta and the plan with it.
+    """Plans the next push with what was identified or diagnosed.
+
+    Its state holds the theta of the latest plan, and the plan.
 
     .. pydrake_system::
         name: policy
@@ -50,9 +52,10 @@ class PolicySystem(LeafSystem):
         """Prepare.
 
         Args:
-            make_plan: what to run on what the port brings, an identification or what was made of one.
-            dimension: of the policy's settings; they are nan before the first plan.
-            begin: when it first looks at what was identified [s], so as not to plan with what is soon replaced.
+            make_plan: called with what arrives at the port, an ``Identification`` or an ``Examined`` one; returns a
+                plan.
+            dimension: of the policy's settings; the output is NaN before the first plan.
+            begin: time of the diagram [s] before which identifications are ignored, since they will soon be replaced.
         """
         LeafSystem.__init__(self)
         self.set_name("policy")
@@ -66,7 +69,7 @@ class PolicySystem(LeafSystem):
         self.DeclarePeriodicUnrestrictedUpdateEvent(PUSH_PERIOD, begin, self._receive)
 
     def plan(self, context: Context) -> Plan | None:
-        """The latest plan held in the state; None before the first."""
+        """The latest plan, from the state; None before the first."""
         latest: Plan | None = context.get_abstract_state(self._memory).get_value()[1]
         return latest
 
@@ -88,10 +91,10 @@ class PolicySystem(LeafSystem):
 
 
 class RobotSystem(LeafSystem):
-    """Makes each new plan's first push, on an object that is put back to its start before; shows the recording of it.
+    """Makes the first push of each new plan, with the object back at its start, and outputs the recording.
 
-    Its state holds the number of pushes, the latest one, and the settings that it was planned with. The robot is made
-    anew for every push, from its number: what it does depends on nothing that a Context does not carry.
+    Its state holds the number of pushes, the latest recording, and the settings with which it was planned. A robot is
+    made anew for every push, from the push's number, so that nothing is kept outside of the Context.
 
     .. pydrake_system::
         name: robot
@@ -105,7 +108,7 @@ class RobotSystem(LeafSystem):
         """Prepare.
 
         Args:
-            make_robot: a robot before the object at its start, by the push's number.
+            make_robot: called with a push's number; returns a robot whose object is at its start.
             first: the push to make before there is a plan.
         """
         LeafSystem.__init__(self)
@@ -135,16 +138,16 @@ class RobotSystem(LeafSystem):
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Planner:
-    """What the main job plans once it knows theta, and again once it knows what else acts.
+    """Makes the plans of ``run_cell``: with the identified parameters, and with what a diagnosis found.
 
     Attributes:
         config: of the plan.
         spec: of the cell.
-        situation: the object where the recording began.
-        goal: x, y [m].
+        situation: where the object starts.
+        goal: x, y in W [m].
         name: of the recording.
         seed: of the run.
-        hand: how the recorded pushes used it.
+        hand: how the recorded pushes used the hand.
     """
 
     config: PlanConfig
@@ -161,11 +164,14 @@ class Planner:
         return policy_named(self.config.policy, Reach(heading=0.0, travel=1.0, inner_radius=1.0)).space.dimension
 
     def run(self, result: Identification, progress: Progress | None = None) -> Plan:
-        """Plan with the identified theta and its intervals.
+        """Plan with the identified parameters and their intervals.
 
         Args:
             result: the identification.
             progress: called with the stage, steps done and steps in all.
+
+        Raises:
+            ConfigError: if the recording has no hand.
         """
         model = identified_model(result, self.spec, self.name, hand=self.hand)
         return self.with_model(
@@ -175,13 +181,16 @@ class Planner:
     def with_model(
         self, model: Model, *, friction_scatter: float, pushes: int, progress: Progress | None = None
     ) -> Plan:
-        """Plan with a model of the object, such as the one that a diagnosis leaves.
+        """Plan with a model, such as the one that a diagnosis exports.
 
         Args:
-            model: the cell, with intervals, and with effects.
-            friction_scatter: of support friction from push to push [-].
-            pushes: that it was learnt from.
+            model: with its intervals and effects.
+            friction_scatter: relative standard deviation of friction between pushes [-].
+            pushes: number of pushes from which the model was learned.
             progress: called with the stage, steps done and steps in all.
+
+        Raises:
+            ConfigError: if the model has no hand.
         """
         stream = np.random.SeedSequence(self.seed).spawn(_STREAM + 1)[_STREAM]
         return plan(
@@ -194,17 +203,17 @@ class Planner:
 
 
 def planner_of(config: PlanConfig, spec: CellSpec, problems: Sequence[PushProblem], name: str, seed: int) -> Planner:
-    """The planner of a recording: the object stands where the configuration says, else where it was before any push.
+    """The planner for a recording; the object starts where the configuration says, or where it was at first.
 
     Args:
         config: of the plan.
         spec: of the cell.
-        problems: the recording's pushes, the first one's start and contact height are taken.
+        problems: the recording's pushes; the start and the contact height of the first are used.
         name: of the recording.
         seed: of the run.
 
     Raises:
-        ConfigError: if start or goal is not on the table, or too near to one another.
+        ConfigError: if start or goal is not on the table, or they are too close to each other.
     """
     first = problems[0]
     start = first.start.pose
@@ -223,13 +232,13 @@ def planner_of(config: PlanConfig, spec: CellSpec, problems: Sequence[PushProble
 
 
 def identified_model(result: Identification, spec: CellSpec, name: str, *, hand: HandUse = UNKNOWN_HAND) -> Model:
-    """The baseline model with the identified theta, its intervals and how they vary together.
+    """The baseline model with the identified parameters, their intervals and their correlation.
 
     Args:
         result: the identification.
-        spec: of the cell it was made with.
+        spec: of its cell.
         name: of the recording.
-        hand: how the recorded pushes used it.
+        hand: how the recorded pushes used the hand.
     """
     intervals = {f"theta.{e.name}": list(e.ci90) for e in result.estimates}
     return Model(

@@ -1,4 +1,4 @@
-"""A task made from a goal: which way and how far the hand goes, unless it is told."""
+"""Policies for a goal: in which direction and how far the hand moves, unless these are given."""
 
 from __future__ import annotations
 
@@ -27,11 +27,12 @@ ROOM_SHARE = 0.6  # of the way to the table's edge
 
 @dc.dataclass(frozen=True, kw_only=True)
 class Choices:
-    """What a person may fix; None leaves it to the task.
+    """Settings that a person fixes; None leaves them to the policy.
 
     Attributes:
-        speed: of ``push_direction`` [m/s].
-        direction: of ``push_speed``, else the middle of the directions searched [rad].
+        speed: of the hand, for ``push_direction`` [m/s].
+        direction: of the hand in W, for ``push_speed``; otherwise the middle of the directions that are searched
+            [rad].
         travel: of the hand from the touch to the brake [m].
     """
 
@@ -41,20 +42,21 @@ class Choices:
 
 
 def policy_for(name: str, model: Model, start: Pose, goal: Point, choices: Choices | None = None) -> Policy:
-    """The policy of a name, towards a goal.
+    """A policy towards a goal.
 
-    The hand goes half the way, or as far as leaves a slide that half the greatest speed's energy makes, if that is
-    further; ``push_direction`` carries the object all the way but for its slide.
+    Unless it is given, the hand's travel is half the distance to the goal; it is longer if half of the kinetic energy
+    at the greatest speed would not slide the object the rest of the way. In ``push_direction`` it is the whole
+    distance less the slide from the given speed.
 
     Args:
         name: in ``POLICIES``.
-        model: for the friction, which says how far an object slides.
-        start: of the object.
+        model: its friction says how far the object slides.
+        start: of the object, x, y [m], yaw [rad].
         goal: x, y [m].
-        choices: what is fixed.
+        choices: settings that are fixed.
 
     Raises:
-        ConfigError: if the policy is unknown, does not take a choice, or start or goal is not on the table.
+        ConfigError: if the policy is unknown or does not take a choice, or start or goal is not on the table.
     """
     choices = choices or Choices()
     check_task(start, goal, model.table)
@@ -70,10 +72,15 @@ def policy_for(name: str, model: Model, start: Pose, goal: Point, choices: Choic
 
 
 def check_task(start: Pose, goal: Point, table: Corners) -> None:
-    """Refuse a start or a goal that is not on the table, and a goal where the object is already.
+    """Refuse a start or goal that is not on the table, and a goal closer than ``NEAREST`` to the start.
+
+    Args:
+        start: of the object, x, y [m], yaw [rad].
+        goal: x, y [m].
+        table: lower and upper corner of its top [m].
 
     Raises:
-        ConfigError: saying which.
+        ConfigError: if one of these is so; it says which.
     """
     check_place("goal", goal, table)
     check_place("start", start[:2], table)
@@ -85,8 +92,13 @@ def check_task(start: Pose, goal: Point, table: Corners) -> None:
 def check_place(what: str, place: Point, table: Corners) -> None:
     """Refuse a place that is not on the table.
 
+    Args:
+        what: the name of the place, for the message.
+        place: x, y [m].
+        table: lower and upper corner of its top [m].
+
     Raises:
-        ConfigError: if it is not finite or beyond an edge.
+        ConfigError: if it is not finite or not on the table.
     """
     (x0, y0), (x1, y1) = table
     x, y = place
@@ -98,7 +110,10 @@ def check_place(what: str, place: Point, table: Corners) -> None:
 
 
 def default_goal(start: Pose, table: Corners) -> Point:
-    """A goal 0.3 m ahead of the object along +x, or as fits on the table; the roomiest way where +x has none."""
+    """A goal [m] for an object at ``start``: 0.3 m ahead along +x, or less if the table ends.
+
+    Where there is hardly room along +x, it lies along the axis with the most room.
+    """
     (x0, y0), (x1, y1) = table
     x, y = start[:2]
     rooms = {(1.0, 0.0): x1 - x, (-1.0, 0.0): x - x0, (0.0, 1.0): y1 - y, (0.0, -1.0): y - y0}

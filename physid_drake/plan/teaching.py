@@ -1,4 +1,4 @@
-"""The next push that teaches most: the expected information about theta of pushes that were not made yet."""
+"""The most informative push: the expected information about theta of pushes that were not made yet."""
 
 from __future__ import annotations
 
@@ -30,17 +30,19 @@ Pose = tuple[float, float, float]
 
 RATE = 100.0  # Hz of the recording that is expected
 AFTER = 1.0  # s recorded after the hand has stopped
+SCATTER = 1.0  # of friction from push to push, in units of UNIT_SCATTER
+NOISE_SCALE = 1.0  # times the noise: as where the cell explains the pushes
 
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Lesson:
-    """What pushes are expected to teach.
+    """The expected information of pushes.
 
     Attributes:
-        best: index of the push that teaches most.
-        gains: (n,) expected information of each push about theta [log likelihood]; 0 where its rollout diverged or
-            fell off the table.
-        informations: (n, d, d) expected information of each push, in the unit cube of theta.
+        best: index of the push with the largest gain.
+        gains: (n,) expected decrease of the entropy of theta [nats]; 0 where the rollout diverges or the object
+            falls.
+        informations: (n, d, d) expected information matrix of each push, for theta in the unit cube.
         stds: (n, d) posterior standard deviations after each push, in the unit cube.
     """
 
@@ -57,34 +59,27 @@ def most_informative_push(
     start: Pose,
     thetas: Array,
     information: Array | None = None,
-    scatter: float = 1.0,
-    noise_scale: float = 1.0,
-    order: int = 0,
-    hand_height: float | None = None,
 ) -> Lesson:
-    """Of planned pushes, the one that is expected to teach most about theta.
+    """The planned push that is expected to be most informative about theta.
 
-    A push's information is that of a recording at 100 Hz with the recording's noise, its nuisance parameters
-    marginalised as in the fit: simulated Jacobians, no approximation of the mechanics. But the hand's path is taken
-    for exact: a noisy hand teaches less than is expected. The gain is half the rise of the log-determinant of the
-    Gaussian information, averaged over ``thetas``: what a Gaussian belief is expected to lose in entropy.
+    A push's information matrix is that of a recording at 100 Hz with the recording's noise, its nuisance parameters
+    marginalised as in the fit, with derivatives by differences of rollouts. The hand's path is taken as exact; with a
+    noisy hand the information is smaller. The gain is half the increase of the log-determinant of the information,
+    averaged over ``thetas``: the expected decrease of a Gaussian's entropy.
 
     Args:
-        pushes: to choose from, for instance ``policy.pushes(settings)[0]`` of drawn settings.
-        case: a recording with the same object, hand and sensors.
+        pushes: to choose from, for instance ``policy.pushes(settings)[0]`` of sampled settings.
+        case: a recording with the same object, hand and sensors, made ready.
         start: of the object, x, y [m], yaw [rad].
-        thetas: (d,) the estimate, or (k, d) draws from the belief, each entry in its unit; each costs
-            2 + nuisance parameters + d rollouts a push.
-        information: (d, d) what is known, in the unit cube, such as ``OnlineBelief.information``; None is the prior.
-        scatter: of friction from push to push, in units of ``UNIT_SCATTER``.
-        noise_scale: times the noise, where the cell does not explain the pushes.
-        order: number of the push in the recording.
-        hand_height: of the tip's contact above the table [m]; None for half the object's height.
+        thetas: (d,) the estimate, or (k, d) posterior samples, each entry in its unit. Each takes 2 + d + number of
+            nuisance parameters rollouts a push.
+        information: (d, d) current information in the unit cube, such as ``OnlineBelief.information``; None is the
+            prior's.
 
     Raises:
-        ConfigError: if there is no push, the cell has no hand, or a push cannot be made.
+        ConfigError: if there is no push, the cell has no hand, or the hand would miss the object.
 
-    Source: V. Fedorov, Theory of Optimal Experiments, 1972 (D-optimality); D. Lindley, Ann. Math. Stat. 27, 1956.
+    Source: V. Fedorov, Theory of Optimal Experiments, 1972, for D-optimality; D. Lindley, Ann. Math. Stat. 27, 1956.
     """
     if not pushes:
         raise ConfigError("next push: at least one push is needed to choose from.")
@@ -92,12 +87,10 @@ def most_informative_push(
         raise ConfigError("next push: the cell has no hand.")
     known = baseline_hypothesis(case).precision if information is None else information
     points = np.atleast_2d(np.asarray(thetas, dtype=np.float64))
-    problems = [
-        dc.replace(_problem(push, case, start, order, hand_height), name=f"next {k}") for k, push in enumerate(pushes)
-    ]
+    problems = [_problem(f"next {k}", push, case, start) for k, push in enumerate(pushes)]
     gains, expected = np.zeros(len(pushes)), np.zeros((len(pushes), *known.shape))
     for theta in points:
-        told = _informations(case, problems, theta, scatter, noise_scale)
+        told = _informations(case, problems, theta)
         expected += told / len(points)
         gains += 0.5 * (np.linalg.slogdet(known + told)[1] - np.linalg.slogdet(known)[1]) / len(points)
     covariances = np.linalg.inv(known + expected)
@@ -107,9 +100,7 @@ def most_informative_push(
     )  # fmt: skip
 
 
-def _informations(
-    case: Case, problems: Sequence[PushProblem], theta: Array, scatter: float, noise_scale: float
-) -> Array:
+def _informations(case: Case, problems: Sequence[PushProblem], theta: Array) -> Array:
     """Information (n, d, d) of each push at theta (d,); zero where the rollout diverged or fell."""
     d = case.thetas.space.dimension
     told = np.zeros((len(problems), d, d))
@@ -137,8 +128,8 @@ def _informations(
         point = fitter.points([h], [z], [fitter.at_rest()])[0]
     assert point is not None
     pushed = fitter.started([h], [point], [None])[0].pushes
-    for k, push, prior in zip(kept, pushed, fitter.priors(scatter), strict=True):
-        told[k] = weighed(push.residual, push.shared, push.nuisance, prior, noise_scale, NO_TAIL).precision
+    for k, push, prior in zip(kept, pushed, fitter.priors(SCATTER), strict=True):
+        told[k] = weighed(push.residual, push.shared, push.nuisance, prior, NOISE_SCALE, NO_TAIL).precision
     return told
 
 
@@ -153,7 +144,7 @@ def _push(problem: PushProblem, case: Case) -> Push:
     return Push(name=problem.name, object=planar_poses(problem.times, problem.poses, height), hand=None, force=None)
 
 
-def _problem(push: PlannedPush, case: Case, start: Pose, order: int, hand_height: float | None) -> PushProblem:
+def _problem(name: str, push: PlannedPush, case: Case, start: Pose) -> PushProblem:
     """The push as its recording would be fitted; its poses are still to be foreseen."""
     spec = case.pool.spec
     assert spec.hand_radius is not None
@@ -161,8 +152,8 @@ def _problem(push: PlannedPush, case: Case, start: Pose, order: int, hand_height
     path = push.path(start, solid.outline, spec.hand_radius)
     times = np.arange(math.ceil((float(path.times[-1]) + AFTER) * RATE)) / RATE
     return PushProblem(
-        name="next", order=order, begin=0.0, end=float(times[-1]), start=Start(pose=start),
+        name=name, order=0, begin=0.0, end=float(times[-1]), start=Start(pose=start),
         start_std=case.sensors.mean_std(LEAD * RATE), path=path,
-        hand_height=0.5 * solid.height if hand_height is None else hand_height, times=times,
+        hand_height=0.5 * solid.height, times=times,
         poses=np.zeros((len(times), 3)), force_times=np.zeros(0), forces=np.zeros((0, 2)), force_std=np.zeros(0),
     )  # fmt: skip

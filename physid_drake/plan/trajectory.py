@@ -1,4 +1,4 @@
-"""What a planned push is predicted to do: the object's trajectory, and how it ended."""
+"""Predicts what planned pushes do: the object's trajectory, and how it ends."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ class Ending(enum.Enum):
 
 @dc.dataclass(frozen=True, kw_only=True, eq=False)
 class Trajectory:
-    """An object's predicted way, as the recording's tracker would report it.
+    """The predicted motion of an object, as the recording's tracker would report it.
 
     Attributes:
-        times: (n,) s, from the start of the first push; later pushes follow on.
+        times: (n,) from the start of the first push [s]; later pushes follow on.
         poses: (n, 3) x, y [m], yaw [rad].
-        paths: the hand's, one for each push, each from its own time 0.
-        ending: how it ended.
+        paths: of the hand, one for each push, each from its own time 0.
+        ending: how it ends.
     """
 
     times: Array
@@ -60,7 +60,7 @@ class Trajectory:
 
     @property
     def end(self) -> Array:
-        """The last pose (3,)."""
+        """The last pose (3,), x, y [m], yaw [rad]."""
         return np.asarray(self.poses[-1])
 
     @property
@@ -74,10 +74,10 @@ class Situation:
     """Where a push begins.
 
     Attributes:
-        start: x, y [m], yaw [rad] of the object, as the tracker reports it.
-        order: number of the next push since the recording began, for physics that changes from push to push.
+        start: of the object, as the tracker reports it, x, y [m], yaw [rad].
+        order: number of the push since the recording began, for effects that depend on it.
         hand_height: of the tip's contact above the table [m]; None for the model's, or half the object's height.
-        start_std: standard deviation of where the object stands about ``start`` [m, m, rad].
+        start_std: standard deviations of the object's pose about ``start`` [m, m, rad].
     """
 
     start: Pose
@@ -92,7 +92,7 @@ def _solid(shape: Shape) -> Solid:
 
 
 def true_solid(model: Model) -> Solid:
-    """Of the object as it is: a model may know that it is larger than was said."""
+    """The object's solid, with the effects of the model that change its size."""
     return _solid(geometry_with(model.effects, Geometry(shape=model.shape)).shape)
 
 
@@ -105,13 +105,13 @@ def contact_height_of(model: Model, situation: Situation) -> float:
 def tip_height_of(model: Model, situation: Situation) -> float:
     """Height of the tip's centre above the table, for a robot [m].
 
-    Where nobody knows, the contact's, which is right for a sphere: half of an upright tip would be in the table.
+    Where the model does not know it, the height of the contact is taken, which is correct for a sphere.
     """
     return contact_height_of(model, situation) if model.tip_height is None else model.tip_height
 
 
 def hand_radius_of(model: Model) -> float:
-    """The tip's radius [m].
+    """Radius of the tip [m].
 
     Raises:
         ConfigError: if the model has no hand.
@@ -122,13 +122,17 @@ def hand_radius_of(model: Model) -> float:
 
 
 def path_of(model: Model, push: PlannedPush, pose: Pose) -> HandPath:
-    """The path to command for a planned push on an object that the tracker reports at a pose.
+    """The path to command for a planned push.
 
-    What the model knows of where object and tip really are is in it: else the tip would begin inside the object, or
-    far away.
+    The model's effects on tracker and hand are taken into account, so that the true tip meets the true object.
+
+    Args:
+        model: with its effects.
+        push: the plan.
+        pose: of the object, as the tracker reports it, x, y [m], yaw [rad].
 
     Raises:
-        ConfigError: if the model has no hand, or the hand would pass the object.
+        ConfigError: if the model has no hand, or the hand would miss the object.
     """
     path = push.path(true_pose(model.effects, pose), true_solid(model).outline, hand_radius_of(model))
     facts = PushFacts(order=0, mass=model.body.mass, polar=0.0, hand_axes=model.axes_on(path))
@@ -148,11 +152,14 @@ def trajectory_of(
 
     Args:
         model: the object, with its effects.
-        pushes: at least one; a push after a loss is not made.
+        pushes: at least one; none is made after the object is lost or does not stop.
         situation: where the object starts.
-        path: of the first push, where the hand aims at another place than where the object is.
-        believed: the model by which the hand aims at where the tracker sees the object; None for ``model``.
-        rate: samples a second of what is returned [Hz]; None for a few hundred in all.
+        path: of the hand in the first push; None makes it from the push.
+        believed: the model with which the hand's paths are made; None for ``model``.
+        rate: of the samples that are returned [Hz]; None for ``MOST_SAMPLES`` of each push.
+
+    Raises:
+        ConfigError: if the model has no hand, or the hand would miss the object.
     """
     pose, clock = situation.start, 0.0
     times, poses, paths, ending = [], [], [], Ending.AT_REST
@@ -160,7 +167,7 @@ def trajectory_of(
         paths.append(path_of(believed or model, push, pose) if number or path is None else path)
         try:
             motion = _roll(model, push, paths[-1], dc.replace(situation, start=pose, order=situation.order + number))
-        except ParameterError:  # a draw may be of an object that cannot be, or cannot stand
+        except ParameterError:  # a sample may be an impossible object, or one that cannot stand
             times.append(np.array([clock]))
             poses.append(np.array([pose]))
             ending = Ending.DIVERGED

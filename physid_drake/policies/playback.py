@@ -37,8 +37,8 @@ def hand_samples(path: HandPath, hand_height: float, *, rate: float = RATE) -> H
     return HandSamples(times=times, positions=positions)
 
 
-def push_csv(path: HandPath, hand_height: float, *, rate: float = RATE) -> str:
+def push_csv(path: HandPath, hand_height: float) -> str:
     """The samples as CSV with the columns ``time_s, hand_x_m, hand_y_m, hand_z_m``; arguments as above."""
-    samples = hand_samples(path, hand_height, rate=rate)
+    samples = hand_samples(path, hand_height)
     rows = [f"{t:.6f},{x:.7f},{y:.7f},{z:.7f}" for t, (x, y, z) in zip(samples.times, samples.positions, strict=True)]
     return "\n".join([",".join(COLUMNS), *rows]) + "\n"

@@ -19,13 +19,13 @@ from physid_drake.pushes.frame_checks import unseen_motion
 from physid_drake.pushes.noise import Noise
 from physid_drake.pushes.nuisance import Nuisance, nuisance_of
 from physid_drake.pushes.problem import PushProblem, problems_of, spec_of
-from physid_drake.pushes.push_checks import refuse
+from physid_drake.pushes.push_checks import check_motion, refuse
 from physid_drake.pushes.push_warnings import doubts
 from physid_drake.pushes.rollouts import RolloutPool
 from physid_drake.pushes.theta import ThetaMap, friction_names, theta_map
 from physid_drake.pushes.tied_cells import tied_cells
 from physid_drake.pushes.tracker_noise import ForceNoise, TrackerNoise, tracker_noise
-from physid_drake.recording import ObjectModel, Push, Recording, rest_segments, thinned
+from physid_drake.recording import ObjectModel, Recording, thinned
 
 T = TypeVar("T")
 
@@ -40,7 +40,6 @@ LONGEST_TIME_STEP = (
 MOST_SLIDE_TIME_STEP = 0.05  # s
 MOST_PUSHES = 24  # more take longer and tell little more
 UNIT_SCATTER = 0.025  # of friction, push to push: the columns' unit and the median of its prior
-LEAST_MOTION = 6.0  # standard deviations: an object that moves less in every push does not move
 WHY_LOST = "with any parameters: the solver diverges, or no object stands like this"
 # A rollout's own error acts like a start that is known no better than this [m, m, rad].
 START_FLOOR = np.array([3e-5, 3e-5, 3e-4])
@@ -157,7 +156,7 @@ def case_of(
     )
     count = len(recording.pushes)
     recording = recording.subset(orders.tolist())
-    _refuse_still(recording, noise)
+    check_motion(recording, noise)
     solid = solid_of(recording.object.shape)
     problems = tuple(
         dc.replace(_paced(_floored(p), config), order=int(order))
@@ -227,22 +226,6 @@ def _paced(problem: PushProblem, config: CellConfig) -> PushProblem:
     longest = TRAVEL_PER_TIME_STEP / max(speed, 1e-6) / config.solver.time_step_s
     limit = PACES[-1] * 1e-3 / config.solver.time_step_s
     return dc.replace(problem, pace=max(p for p in PACES if p <= max(1.0, min(longest, limit))))
-
-
-def _refuse_still(recording: Recording, noise: TrackerNoise) -> None:
-    moved = max(_way(push, noise) for push in recording.pushes)
-    if moved < LEAST_MOTION:
-        raise RecordingError(
-            f"recording '{recording.name}': the object never moves by more than the tracker's noise"
-            f" ({1e3 * noise.position:.2g} mm); there is nothing to diagnose."
-        )
-
-
-def _way(push: Push, noise: TrackerNoise) -> float:
-    """How far an object comes from where it rests at first, at most, in standard deviations of the tracker."""
-    planar, rests = push.object.planar, rest_segments(push)
-    start = planar[rests[0]].mean(axis=0) if rests and rests[0].start == 0 else planar[0]
-    return float((np.abs(planar - start) / noise.sigmas).max())
 
 
 def _surroundings(recording: Recording, problems: Sequence[PushProblem], thetas: ThetaMap) -> Surroundings:

@@ -81,11 +81,6 @@ class PushFeatures:
         forces: Array = vector[self.pose_numbers :].reshape(2, -1).T * self.force_std[:, None]
         return forces
 
-    @property
-    def force_sigmas(self) -> Array:
-        """Standard deviations (k, 2) [N] of force components: white, wandering, off as a whole."""
-        return self.forces(np.sqrt(np.diag(self.noise)))
-
 
 def features_of(push: Push, problem: PushProblem, noise: TrackerNoise) -> PushFeatures:
     """The features of a recorded push."""

@@ -158,7 +158,7 @@ def check_hand_near(recording: Recording) -> None:
     """Refuses hands that never come near objects that move; a push without a touch may be among others."""
     if recording.hand is None:
         return
-    gaps = [_least_gap(recording, push) for push in recording.pushes if _moves(push) and push.hand is not None]
+    gaps = [_least_gap(recording, push) for push in recording.pushes if moves(push) and push.hand is not None]
     if gaps and min(gaps) > BESIDE:
         raise RecordingError(
             f"recording '{recording.name}': the object moves, but the hand stays {1e3 * min(gaps):.0f} mm or more"
@@ -188,7 +188,7 @@ def depths_at_touch(recording: Recording) -> list[float]:
 
 def check_force_direction(recording: Recording) -> None:
     """Refuses forces that brake the objects which the hand sets moving: those of the object on the hand."""
-    works = [_work(push) for push in recording.pushes if push.force is not None and _moves(push)]
+    works = [_work(push) for push in recording.pushes if push.force is not None and moves(push)]
     if len(works) >= FEWEST_FORCES and sum(work < 0.0 for work in works) > 0.5 * len(works):
         raise RecordingError(
             f"recording '{recording.name}': the hand's force points against the object's motion in most pushes; it"
@@ -222,7 +222,8 @@ def _depth_at_touch(recording: Recording, push: Push) -> float | None:
     return float(median_filter(depths, AT_A_TIME, mode="reflect").max())
 
 
-def _moves(push: Push) -> bool:
+def moves(push: Push) -> bool:
+    """Whether the object is pushed by more than a centimetre."""
     return float(np.linalg.norm(np.ptp(push.object.positions[:, :2], axis=0))) > MOVED
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from physid_drake.effects.catalogue import sources_of_effects
 from physid_drake.files import MissingFileError, read_bytes
 from physid_drake.pushes.prediction import Prediction
+from physid_drake.wording import cause_of
 
 KEY = 16  # bytes
 MOST_BYTES = 400_000_000  # in memory and in the file; what is beyond is made again
@@ -94,7 +95,7 @@ class KeptRollouts:
         """Without the file: it spares time where a run is interrupted, and no result depends on it."""
         warnings.warn(
             f"'{self._path}': rollouts are no longer kept, so that an interrupted run makes them again:"
-            f" {error.strerror or error}",
+            f" {cause_of(error)}",
             stacklevel=3,
         )
         self._path = None

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from physid_drake.cell.solid import Solid, solid_of
 from physid_drake.cell.touch import Tip
 from physid_drake.pushes.force_windows import windows_of
-from physid_drake.pushes.frame_checks import HEAVIEST, LIGHTEST, MOVED
+from physid_drake.pushes.frame_checks import HEAVIEST, LIGHTEST, moves
 from physid_drake.recording import Push, Recording
 from physid_drake.recording.clocks import FEWEST
 
@@ -83,7 +83,7 @@ def _volume(solid: Solid) -> float:
 
 def _forces(recording: Recording, solid: Solid) -> tuple[str, ...]:
     """Forces that hardly any friction takes, by the mass that was weighed, or by any that such an object has."""
-    usual = [_pushing_force(push) for push in recording.pushes if push.force is not None and _moves(push)]
+    usual = [_pushing_force(push) for push in recording.pushes if push.force is not None and moves(push)]
     if not usual or not max(usual) > 0.0:
         return ()
     force, mass = float(np.median(usual)), recording.object.mass
@@ -108,7 +108,7 @@ def _forces_untouched(recording: Recording, solid: Solid) -> tuple[str, ...]:
         return ("the force is the same in all samples of a push; is it the right column or topic?",)
     tip = Tip(solid.outline, recording.hand.radius)
     means = [mean for push in forced if (mean := _mean_untouched(push, tip)) is not None]
-    pushing = [_pushing_force(push) for push in forced if _moves(push)]
+    pushing = [_pushing_force(push) for push in forced if moves(push)]
     if not means or not pushing:
         return ()
     offset = float(np.linalg.norm(np.median(means, axis=0)))
@@ -139,10 +139,6 @@ def _pushing_force(push: Push) -> float:
     forces = push.force.forces[:, :2]
     means = [np.linalg.norm(forces[window].mean(axis=0)) for window in windows_of(push.force.times)]
     return float(max(means, default=0.0))
-
-
-def _moves(push: Push) -> bool:
-    return float(np.linalg.norm(np.ptp(push.object.positions[:, :2], axis=0))) > MOVED
 
 
 def _hasty(recording: Recording) -> tuple[str, ...]:
@@ -181,7 +177,7 @@ def _last_height(push: Push) -> float:
 
 def _never_turning(recording: Recording) -> tuple[str, ...]:
     """A rotation that is filled in, and was not measured."""
-    turns = [push.object.quaternions for push in recording.pushes if _moves(push) and push.object.rotation != "none"]
+    turns = [push.object.quaternions for push in recording.pushes if moves(push) and push.object.rotation != "none"]
     if not turns or any((turn != turns[0][0]).any() for turn in turns):
         return ()
     return (

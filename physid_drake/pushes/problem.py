@@ -108,20 +108,19 @@ def spec_of(recording: Recording, config: CellConfig) -> CellSpec:
     )
 
 
-def problems_of(recording: Recording, noise: Noise, height: float, *, whole: bool = True) -> tuple[PushProblem, ...]:
+def problems_of(recording: Recording, noise: Noise, height: float) -> tuple[PushProblem, ...]:
     """All pushes of a recording.
 
     Args:
         recording: the recording.
         noise: its noise.
         height: of the object [m].
-        whole: whether these are all its pushes, so that in one of them hand and object must meet.
 
     Raises:
         RecordingError: if the hand passes above the object, never comes near it or is far inside it, or if an object
             stands beside the table, tips, has an impossible mass, or cannot be compared.
     """
-    checks = list(checks_of(recording)) if whole else []
+    checks = list(checks_of(recording))
     for push in recording.pushes:
         checks += [partial(check_clocks, push), *push_checks_of(recording, push)]
     for check in checks:

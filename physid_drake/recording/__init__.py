@@ -2,6 +2,7 @@
 
 from physid_drake.recording.digest import digest_of
 from physid_drake.recording.naming import recording_folder
+from physid_drake.recording.object_model import Box, Cylinder, MeshShape, ObjectModel, Prism, Shape
 from physid_drake.recording.outlines import convex_pieces, is_convex, outline_distance, polygon_centroid
 from physid_drake.recording.planar import planar_poses
 from physid_drake.recording.reading import read_recording
@@ -14,22 +15,7 @@ from physid_drake.recording.statistics import (
     summarise,
 )
 from physid_drake.recording.thinning import thinned
-from physid_drake.recording.values import (
-    Box,
-    Conversion,
-    Cylinder,
-    ForceStream,
-    Hand,
-    MeshShape,
-    ObjectModel,
-    PoseStream,
-    Prism,
-    Push,
-    Recording,
-    Sensors,
-    Shape,
-    Table,
-)
+from physid_drake.recording.values import Conversion, ForceStream, Hand, PoseStream, Push, Recording, Sensors, Table
 from physid_drake.recording.writing import write_recording
 
 __all__ = [

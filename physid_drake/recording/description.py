@@ -4,37 +4,21 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeVar, cast
 
-import yaml
-
 from physid_drake import files
 from physid_drake.errors import RecordingError
 from physid_drake.recording.limits import check_text
 from physid_drake.recording.obj import check_solid, read_obj
-from physid_drake.recording.values import (
-    REFLEX_SF_TIP_RADIUS,
-    Box,
-    Conversion,
-    Cylinder,
-    CylinderAxis,
-    Hand,
-    HandStream,
-    MeshShape,
-    ObjectModel,
-    Prism,
-    Sensors,
-    Shape,
-    Table,
-    TipShape,
-)
+from physid_drake.recording.object_model import Box, Cylinder, CylinderAxis, MeshShape, ObjectModel, Prism, Shape
+from physid_drake.recording.values import REFLEX_SF_TIP_RADIUS, Conversion, Hand, HandStream, Sensors, Table, TipShape
+from physid_drake.recording.yaml_lines import values_and_lines
 from physid_drake.wording import named, shown
-from physid_drake.yaml_text import MOST_BYTES, NO_YAML, PlainLoader, cause
+from physid_drake.yaml_text import MOST_BYTES
 
 FORMAT: Final = "physid-recording/1"
 DESCRIPTION_FILE: Final = "recording.yaml"
@@ -46,29 +30,11 @@ _SHAPE_KEYS: Final[Mapping[str, tuple[str, ...]]] = {
     "mesh": ("file", "scale"),
 }
 _TOP_KEYS: Final = ("format", "name", "description", "object", "table", "hand", "sensors", "pushes", "converted")
-_TEXT_KEYS: Final = ("name", "description", "file", "note", "source", "source_sha256", "map", "map_sha256")
 _LINES_KEYS: Final = ("description", "note", "map")
-_LOOKS: Final = tuple(f"tag:yaml.org,2002:{kind}" for kind in ("int", "float", "bool", "timestamp"))
 _SENSOR_KEYS: Final = ("object_position_std", "object_rotation_std", "hand_position_std", "force_std")
 _SENSOR_UNITS: Final = ("_m", "_rad", "_m", "_n")
 
 _T = TypeVar("_T")
-
-
-class _Loader(PlainLoader):
-    """Reads ``1e-3`` as a number, which YAML 1.1 takes for text."""
-
-
-class Dumper(yaml.SafeDumper):
-    """Quotes a text that other readers would take for a number: a name like ``66e70658``."""
-
-
-for _resolves in (_Loader, Dumper):
-    _resolves.add_implicit_resolver(
-        "tag:yaml.org,2002:float",
-        re.compile(r"^[-+]?[0-9][0-9]*(\.[0-9]*)?[eE][-+]?[0-9]+$"),
-        list("-+0123456789"),
-    )
 
 
 class _PlacedError(RecordingError):
@@ -188,24 +154,9 @@ def section_of(text: str, file: Path, known: str, keys: Sequence[str]) -> Sectio
     Raises:
         RecordingError: if it is not YAML, or of another format.
     """
-    place = named(file)
-    try:
-        loader = _Loader(text)
-        node = loader.get_single_node()
-        lines: dict[str, int] = {}
-        _number_lines(file, node, "", lines)
-        _keep_texts(node)
-        values = None if node is None else loader.construct_document(node)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        line, problem = mark.line + 1 if mark is not None else 1, named(error.problem or error.context)
-        raise RecordingError(f"{place}: line {line}: not valid YAML: {problem}; correct it.") from error
-    except NO_YAML as error:
-        if isinstance(error, RecordingError):
-            raise
-        raise RecordingError(f"{place}: line 1: not valid YAML: {cause(error)}; correct it.") from error
+    values, lines = values_and_lines(text, file)
     if not isinstance(values, dict):
-        raise RecordingError(f"{place}: line 1: must be a mapping of keys to values, but got {shown(values)}.")
+        raise RecordingError(f"{named(file)}: line 1: must be a mapping of keys to values, but got {shown(values)}.")
     top = Section(file=file, path="", values=values, lines=lines)
     if top.values.get("format") != known:
         got = shown(top.values.get("format"))
@@ -321,7 +272,7 @@ def push_entries(top: Section, folder: Path) -> list[tuple[str, Path, str]]:
         path = inside(folder, name)
         if path is None:
             raise section.refuse("file", f"must lie inside the recording's folder, but got {shown(name)}; move it.")
-        if not _is_there(path):
+        if not files.is_there(path):
             raise section.refuse("file", f"missing file {shown(name)}; add it or remove this push.")
         if path in taken:
             raise section.refuse("file", f"{shown(name)} is listed twice; remove one.")
@@ -333,14 +284,6 @@ def push_entries(top: Section, folder: Path) -> list[tuple[str, Path, str]]:
 def _plain_name(name: str, path: Path, folder: Path) -> str:
     """A push's name as it is when the recording is written: within the folder, without ``./`` and ``//``."""
     return os.path.relpath(path, folder.resolve()) if os.path.isabs(name) else os.path.normpath(name)  # noqa: PTH117
-
-
-def _is_there(path: Path) -> bool:
-    """Whether it is there; a name that is too long for any file is not."""
-    try:
-        return path.exists()
-    except OSError:
-        return False
 
 
 def _shape_from(section: Section, kind: str, folder: Path) -> Shape:
@@ -355,47 +298,12 @@ def _shape_from(section: Section, kind: str, folder: Path) -> Shape:
         return Prism(polygon=polygon, height=section.number("height_m"))
     name = section.text("file")
     path = inside(folder, name)
-    if path is None or not _is_there(path):
+    if path is None or not files.is_there(path):
         problem = "must lie inside the recording's folder" if path is None else "is missing"
         raise RecordingError(f"the mesh {shown(name)} {problem}; put it into the folder.")
     shape = MeshShape(file=path, scale=section.number("scale") if section.has("scale") else 1.0)
     check_solid(read_obj(path), shape.scale, path)
     return shape
-
-
-def _number_lines(file: Path, node: yaml.Node | None, path: str, lines: dict[str, int]) -> None:
-    """Notes the line of every key, and refuses a key that stands twice."""
-    if node is None:
-        return
-    lines.setdefault(path, node.start_mark.line + 1)
-    if isinstance(node, yaml.SequenceNode):
-        for k, child in enumerate(node.value):
-            _number_lines(file, child, f"{path}[{k}]", lines)
-    elif isinstance(node, yaml.MappingNode):
-        seen = set()
-        for key, child in node.value:
-            inner = f"{path}.{key.value}".strip(".")
-            line = key.start_mark.line + 1
-            if not isinstance(key, yaml.ScalarNode):
-                place = f"{named(file)}: line {line}: {named(path) or 'the file'}"
-                raise RecordingError(f"{place}: a key must be one word; correct it.")
-            if key.value in seen:
-                raise RecordingError(f"{named(file)}: line {line}: {named(inner)}: the key stands twice; remove one.")
-            seen.add(key.value)
-            lines[inner] = line
-            _number_lines(file, child, inner, lines)
-
-
-def _keep_texts(node: yaml.Node | None) -> None:
-    """Keeps a name as it was written where it looks like a number, a date or a truth value: ``12345678``, ``3e8``."""
-    if isinstance(node, yaml.SequenceNode):
-        for child in node.value:
-            _keep_texts(child)
-    elif isinstance(node, yaml.MappingNode):
-        for key, child in node.value:
-            if key.value in _TEXT_KEYS and child.tag in _LOOKS:
-                child.tag = "tag:yaml.org,2002:str"
-            _keep_texts(child)
 
 
 def _as_text(value: object) -> str | None:

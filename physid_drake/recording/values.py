@@ -28,14 +28,13 @@ from physid_drake.recording.limits import (
     check_table,
     check_text,
 )
-from physid_drake.recording.outlines import check_polygon
+from physid_drake.recording.object_model import ObjectModel
 from physid_drake.recording.turns import unwrapped
 from physid_drake.wording import shown
 
 Array: TypeAlias = npt.NDArray[np.float64]
 TipShape = Literal["cylinder", "sphere", "capsule", "reflex_sf"]
 HandStream = Literal["measured", "commanded"]
-CylinderAxis = Literal["z", "y"]
 RotationKind = Literal["full", "yaw", "none"]
 
 QUATERNION_TOLERANCE: Final = 1e-3
@@ -43,9 +42,6 @@ QUATERNION_TOLERANCE: Final = 1e-3
 
 REFLEX_SF_TIP_RADIUS: Final = 0.010
 """Radius in m of the ReFlex SF fingertip's pad, used where a recording with that hand does not give one."""
-
-DEFAULT_MASS_STD_SHARE: Final = 0.01
-"""A mass given without a standard deviation is known to this share of itself."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -204,89 +200,6 @@ class Push:
     def endpoint_only(self) -> bool:
         """Whether only the object's first and last pose are known."""
         return len(self.object) == 2
-
-
-@dataclass(frozen=True, kw_only=True)
-class Box:
-    """A box; ``size`` along x, y, z of B, in m."""
-
-    size: tuple[float, float, float]
-
-    def __post_init__(self) -> None:
-        check_positive("size_m", "m", *self.size)
-        check_lengths("size_m", *self.size)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cylinder:
-    """A cylinder, standing (axis z of B) or lying (axis y, it rolls); radius and length in m."""
-
-    radius: float
-    length: float
-    axis: CylinderAxis
-
-    def __post_init__(self) -> None:
-        check_positive("radius_m", "m", self.radius)
-        check_positive("length_m", "m", self.length)
-        check_lengths("radius_m", self.radius)
-        check_lengths("length_m", self.length)
-        check_choice("axis", self.axis, get_args(CylinderAxis))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Prism:
-    """An upright prism: counter-clockwise ``polygon`` about its centroid, maybe with notches; ``height``; in m."""
-
-    polygon: tuple[tuple[float, float], ...]
-    height: float
-
-    def __post_init__(self) -> None:
-        check_positive("height_m", "m", self.height)
-        check_lengths("height_m", self.height)
-        check_polygon(self.polygon)
-
-
-@dataclass(frozen=True, kw_only=True)
-class MeshShape:
-    """A mesh: absolute path of its ``file``, and the ``scale`` that turns its numbers into m."""
-
-    file: Path
-    scale: float = 1.0
-
-    def __post_init__(self) -> None:
-        check_positive("scale", "", self.scale)
-        if not self.file.is_absolute():
-            raise RecordingError(
-                f"a mesh's file must be an absolute path, but is {shown(str(self.file))}; resolve it."
-            )
-
-
-Shape: TypeAlias = Box | Cylinder | Prism | MeshShape
-
-
-@dataclass(frozen=True, kw_only=True)
-class ObjectModel:
-    """The pushed object: its shape, and mass and standard deviation in kg where a scale said so.
-
-    A mass without a standard deviation is known to 1 %, and ``mass_std`` is filled in so.
-    """
-
-    shape: Shape
-    mass: float | None = None
-    mass_std: float | None = None
-
-    def __post_init__(self) -> None:
-        check_positive("mass_kg", "kg", self.mass)
-        check_not_negative("mass_std_kg", "kg", self.mass_std)
-        if self.mass is None and self.mass_std is not None:
-            raise RecordingError("mass_std_kg is given without mass_kg; give the mass too, or neither.")
-        if self.mass is not None and self.mass_std is not None and self.mass_std >= self.mass:
-            raise RecordingError(
-                f"mass_std_kg must be below mass_kg, {self.mass:g} kg, but is {self.mass_std:g} kg;"
-                " leave both out if nobody weighed the object."
-            )
-        if self.mass is not None and self.mass_std is None:
-            object.__setattr__(self, "mass_std", DEFAULT_MASS_STD_SHARE * self.mass)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,8 @@ import yaml
 
 from physid_drake.errors import OutputError
 from physid_drake.files import read_bytes
-from physid_drake.recording.description import DESCRIPTION_FILE, FORMAT, Dumper
+from physid_drake.recording.description import DESCRIPTION_FILE, FORMAT
+from physid_drake.recording.object_model import Box, Cylinder, MeshShape, ObjectModel, Prism
 from physid_drake.recording.reading import (
     FORCE,
     HAND_POSITION,
@@ -25,19 +26,9 @@ from physid_drake.recording.reading import (
     TIME,
     YAW_DIGITS,
 )
-from physid_drake.recording.values import (
-    Box,
-    Cylinder,
-    Hand,
-    MeshShape,
-    ObjectModel,
-    PoseStream,
-    Prism,
-    Push,
-    Recording,
-    Sensors,
-)
-from physid_drake.wording import shown
+from physid_drake.recording.values import Hand, PoseStream, Push, Recording, Sensors
+from physid_drake.recording.yaml_lines import Dumper
+from physid_drake.wording import cause_of, shown
 
 
 def write_recording(recording: Recording, folder: Path) -> None:
@@ -71,7 +62,7 @@ def write_recording(recording: Recording, folder: Path) -> None:
     except OutputError:
         raise
     except OSError as error:
-        raise OutputError(f"{folder}: cannot be written: {error.strerror or error}.") from error
+        raise OutputError(f"{folder}: cannot be written: {cause_of(error)}.") from error
 
 
 def _write_into(recording: Recording, files: list[str], staging: Path) -> None:

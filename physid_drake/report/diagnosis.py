@@ -18,6 +18,7 @@ from physid_drake.report.pages import sigma_means
 from physid_drake.report.terminal import narrow_table, numbers, words
 
 FORMAT = "physid-diagnosis/1"
+MOST_RANKED = 8  # rows of a terminal
 
 
 def diagnosis_json(diagnosis: Diagnosis) -> str:
@@ -178,14 +179,14 @@ def parameters_table(diagnosis: Diagnosis) -> Table:
     return table
 
 
-def ranking_table(diagnosis: Diagnosis, most: int = 8) -> Table:
+def ranking_table(diagnosis: Diagnosis) -> Table:
     """The effects of the catalogue, best first, and why others were rejected."""
     title = "why other effects were rejected" if diagnosis.effects else "effects of the catalogue, best first"
     table = narrow_table(
         title, words("effect"), numbers("linearised\ngain"), numbers("p"), numbers("held-out\ngain"), words("why"),
         caption="gain: in log-likelihood",
     )  # fmt: skip
-    for r in diagnosis.ranking[:most]:
+    for r in diagnosis.ranking[:MOST_RANKED]:
         unsure = "" if r.held_out_se is None else f" +- {r.held_out_se:.0f}"
         held_out = "-" if r.held_out_gain is None else f"{r.held_out_gain:.0f}{unsure}"
         table.add_row(r.name, f"{r.gain:.1f}", f"{r.p_value:.2g}", held_out, r.why)

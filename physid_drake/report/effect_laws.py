@@ -1,9 +1,14 @@
-"""The law of an effect, drawn: friction over slip, its limit curve, a field of forces, the pressure underneath."""
+"""The law of an effect, drawn: friction over slip, its limit curve, a field of forces, the pressure underneath.
+
+What is drawn are values of the effect's own laws (`physid_drake.effects.law_values`).
+"""
 
 from __future__ import annotations
 
+import cmath
+import dataclasses as dc
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,31 +18,40 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
 from matplotlib.path import Path
 
+from physid_drake.cell.object_state import Complex
 from physid_drake.diagnose.values import EffectFinding
+from physid_drake.effects import Effect, PushFacts, effect_named
+from physid_drake.effects.law_values import force_on, friction_factors, object_at
 from physid_drake.report.numbers import number
 from physid_drake.report.svg import AFTER, BEFORE, CONTACT, INK, svg_of
 from physid_drake.report.table_view import MM, Array, TableView, box_of, draw_ground, draw_recorded, map_axes
 
-_Law = Callable[[Mapping[str, Any], TableView], "tuple[Figure, str] | None"]
+_Law = Callable[[Any, TableView], "tuple[Figure, str]"]
 _TICKS = " Marks on the axis: speeds of the object in these pushes."
+_FACTS = PushFacts(order=0, mass=1.0, polar=0.0)  # that no law drawn here depends on: of tilt, only the direction is
+_DIRECTIONS = np.exp(1j * np.linspace(0.0, 2.0 * math.pi, 361))
 
 
 def law_figure(effect: EffectFinding, k: int, view: TableView) -> tuple[Markup, str] | None:
     """The drawing of an effect's law and what it shows; None for effects that are just a number."""
-    values = {name: p.value for name, p in effect.parameters.items()}
     wanted = _LAWS.get(effect.name)
-    if wanted is None or not set(wanted[1]) <= set(values):
-        return None
     if effect.name == "uneven_support":
-        values["ci90"] = effect.parameters["weights"].ci90
-    drawn = wanted[0](values, view)
-    if drawn is None:
+        drawn = _support(effect, view)
+    elif wanted is None:
         return None
-    return svg_of(drawn[0], f"law {k}", f"Law of {effect.name}"), drawn[1]
+    else:
+        values = {name: p.value for name, p in effect.parameters.items()}
+        drawn = wanted(effect_named(effect.name)(**values), view)
+    return None if drawn is None else (svg_of(drawn[0], f"law {k}", f"Law of {effect.name}"), drawn[1])
+
+
+def _factors(effect: Effect, slips: Complex) -> Complex:
+    """Friction (n,) over that of the baseline model at slips (n,), x + iy [m/s]."""
+    return np.concatenate([friction_factors(object_at(velocity=v), effect, _FACTS) for v in slips.tolist()])
 
 
 def _curve(view: TableView, fastest: float, across: str, up: str) -> tuple[Figure, Axes, Array]:
-    """Axes over speed, with a time step at each speed that these pushes had; speeds (n,) [m/s]."""
+    """Axes over speed, with a mark at each speed that these pushes had; speeds (n,) [m/s]."""
     seen = [w.speed for w in view.wrenches if math.isfinite(w.speed)]
     top = 1.05 * max([fastest, *seen])
     figure = Figure(figsize=(3.5, 2.4))
@@ -53,43 +67,40 @@ def _ticks(view: TableView) -> str:
     return _TICKS if view.wrenches else ""
 
 
-def _stribeck(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
+def _stribeck(effect: Any, view: TableView) -> tuple[Figure, str]:
     mu = view.friction or 1.0
     up = "friction with the table" if view.friction else "friction relative to the baseline model"
-    figure, axes, speeds = _curve(view, 3.0 * p["speed"], "slip speed [m/s]", up)
-    axes.plot(speeds, mu * (1.0 + p["excess"] * np.exp(-((speeds / p["speed"]) ** 2))), color=AFTER, linewidth=1.8)
+    figure, axes, speeds = _curve(view, 3.0 * effect.speed, "slip speed [m/s]", up)
+    friction = mu * _factors(effect, speeds.astype(np.complex128)).real
+    axes.plot(speeds, friction, color=AFTER, linewidth=1.8)
     axes.axhline(mu, color=BEFORE, linewidth=1.0, linestyle="--")
-    axes.set_ylim(0.0, 1.15 * mu * (1.0 + max(0.0, p["excess"])))
+    axes.set_ylim(0.0, 1.15 * max(mu, float(friction.max())))
     return figure, "Friction over slip speed; dashed: its value at high speed." + _ticks(view)
 
 
-def _drag(power: int) -> _Law:
-    """Drag in proportion to a power of speed."""
-
-    def draw(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
-        figure, axes, speeds = _curve(view, 0.1, "speed [m/s]", "drag [N]")
-        axes.plot(speeds, p["coefficient"] * speeds**power, color=AFTER, linewidth=1.8)
-        axes.set_ylim(bottom=0.0)
-        return figure, "Drag over the object's speed." + _ticks(view)
-
-    return draw
+def _drag(effect: Any, view: TableView) -> tuple[Figure, str]:
+    figure, axes, speeds = _curve(view, 0.1, "speed [m/s]", "drag [N]")
+    drag = [-force_on(object_at(velocity=complex(v)), effect, _FACTS).real for v in speeds.tolist()]
+    axes.plot(speeds, drag, color=AFTER, linewidth=1.8)
+    axes.set_ylim(bottom=0.0)
+    return figure, "Drag over the object's speed." + _ticks(view)
 
 
 def _ellipse(frame: str) -> _Law:
     """The limit curve of friction: an ellipse about that of the baseline model, a circle."""
 
-    def draw(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
+    def draw(effect: Any, view: TableView) -> tuple[Figure, str]:
         mu = view.friction or 1.0
-        turn = np.linspace(0.0, 2.0 * math.pi, 121)
-        low, high = mu / math.sqrt(p["ratio"]), mu * math.sqrt(p["ratio"])
-        c, s = math.cos(p["angle"]), math.sin(p["angle"])
-        x, y = low * np.cos(turn), high * np.sin(turn)
+        forces = mu * _factors(effect, _DIRECTIONS) * _DIRECTIONS
+        along = cmath.exp(1j * effect.angle)
+        least = mu * abs(_factors(effect, np.array([along]))[0])
         figure = Figure(figsize=(3.5, 3.0))
         axes = figure.add_axes((0.17, 0.15, 0.79, 0.82))
-        axes.plot(mu * np.cos(turn), mu * np.sin(turn), color=BEFORE, linewidth=1.0, linestyle="--")
-        axes.plot(c * x - s * y, s * x + c * y, color=AFTER, linewidth=1.8)
-        axes.plot([-c * low, c * low], [-s * low, s * low], color=AFTER, linewidth=0.8, linestyle=":")
-        reach = 1.1 * max(low, high)
+        axes.plot(mu * _DIRECTIONS.real, mu * _DIRECTIONS.imag, color=BEFORE, linewidth=1.0, linestyle="--")
+        axes.plot(forces.real, forces.imag, color=AFTER, linewidth=1.8)
+        ends = least * np.array([-along, along])
+        axes.plot(ends.real, ends.imag, color=AFTER, linewidth=0.8, linestyle=":")
+        reach = 1.1 * max(mu, float(np.abs(forces).max()))
         draw_ground(axes, (-reach, -reach, reach, reach), 0.79 * 3.5 / (0.82 * 3.0))
         axes.set(xlabel=f"along x of the {frame}", ylabel=f"along y of the {frame}")
         return figure, "Friction by the direction of its force; dashed: isotropic; dotted: the low-friction axis."
@@ -97,100 +108,86 @@ def _ellipse(frame: str) -> _Law:
     return draw
 
 
-def _patch(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
-    box, x, y, r = box_of(view, view.shown), MM * p["x"], MM * p["y"], MM * p["radius"]
+def _patch(effect: Any, view: TableView) -> tuple[Figure, str]:
+    box, x, y, r = box_of(view, view.shown), MM * effect.x, MM * effect.y, MM * effect.radius
     wide = (min(box[0], x - 0.5 * r), min(box[1], y - 0.5 * r), max(box[2], x + 0.5 * r), max(box[3], y + 0.5 * r))
     figure, axes = map_axes(wide, 3.5, 3.5)
     draw_recorded(axes, view, 0.12)
-    colour = CONTACT if p["ratio"] > 1.0 else AFTER
+    colour = CONTACT if effect.ratio > 1.0 else AFTER
     axes.add_patch(Circle((x, y), r, facecolor=colour, alpha=0.18, linewidth=0))
     axes.add_patch(Circle((x, y), r, facecolor="none", edgecolor=colour, linewidth=1.4))
-    return figure, f"In the circle, friction is {number(p['ratio'])} times that of the rest of the table."
+    return figure, f"In the circle, friction is {number(effect.ratio)} times that of the rest of the table."
 
 
-def _gradient(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
+def _gradient(effect: Any, view: TableView) -> tuple[Figure, str]:
     box = box_of(view, view.shown)
     figure, axes = map_axes(box, 3.5, 3.5)
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     x, y = np.meshgrid(np.linspace(left, right, 9), np.linspace(low, high, 9))
-    factor = 1.0 + (p["slope_x"] * x + p["slope_y"] * y) / MM
+    facts = dc.replace(_FACTS, region=np.array([[left, low], [right, high]]) / MM)  # within which the law is said
+
+    def factors(places: Complex) -> Array:
+        return friction_factors(object_at(points=places / MM), effect, facts).real
+
+    factor = factors((x + 1j * y).ravel()).reshape(x.shape)
     if np.ptp(factor) > 0.0:
         axes.contourf(x, y, factor, levels=10, cmap="PuOr_r", alpha=0.5, zorder=0)
     draw_recorded(axes, view, 0.1)
-    slope = np.array([p["slope_x"], p["slope_y"]])
-    along = slope / max(float(np.hypot(*slope)), 1e-12)
-    reach = 0.38 * min(right - left, high - low)
-    for step in (-1.0, 0.0, 1.0):
-        at = np.array([0.5 * (left + right), 0.5 * (low + high)]) + step * reach * along
-        text = f"× {1.0 + float(slope @ at) / MM:.2f}"
-        axes.text(at[0], at[1], text, ha="center", va="center", fontweight="bold", zorder=5)
+    slope = complex(effect.slope_x, effect.slope_y)
+    middle, along = complex(left + right, low + high) / 2.0, slope / max(abs(slope), 1e-12)
+    labelled = middle + 0.38 * min(right - left, high - low) * along * np.array([-1.0, 0.0, 1.0])
+    for at, value in zip(labelled.tolist(), factors(labelled).tolist(), strict=True):
+        axes.text(at.real, at.imag, f"× {value:.2f}", ha="center", va="center", fontweight="bold", zorder=5)
     axes.set(xlim=(left, right), ylim=(low, high))
     return figure, "Friction relative to the table's origin."
 
 
-def _field(axes: Axes, force: Callable[[Array], Array]) -> bool:
-    """Arrows of a force on a grid; ``force`` takes places (n, 2) [m]. False where there is none."""
+def _field(axes: Axes, effect: Effect) -> None:
+    """Arrows of an effect's force at places of a grid, the strongest as long as the grid is wide."""
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     x, y = (np.linspace(a, b, 8)[:-1] + (b - a) / 14.0 for a, b in ((left, right), (low, high)))
     at = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    forces = force(at / MM)
-    largest = float(np.hypot(*forces.T).max())
-    if not largest > 0.0 or not math.isfinite(largest):
-        return False
-    axes.quiver(at[:, 0], at[:, 1], forces[:, 0], forces[:, 1], angles="xy", scale_units="xy",
-                scale=largest / ((right - left) / 8.0), width=0.008, color=AFTER, pivot="middle")  # fmt: skip
-    return True
+    forces = np.array([force_on(object_at(place=complex(*p)), effect, _FACTS) for p in (at / MM).tolist()])
+    largest = float(np.abs(forces).max())
+    if largest > 0.0 and math.isfinite(largest):
+        axes.quiver(
+            at[:, 0], at[:, 1], forces.real, forces.imag, angles="xy", scale_units="xy",
+            scale=largest / ((right - left) / 8.0), width=0.008, color=AFTER, pivot="middle",
+        )  # fmt: skip
 
 
-def _tilt(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
+def _tilt(effect: Any, view: TableView) -> tuple[Figure, str]:
     figure, axes = map_axes(box_of(view, view.shown), 3.5, 3.5)
     draw_recorded(axes, view, 0.12)
-    slope = np.array([math.sin(p["x"]), math.sin(p["y"])])
-    _field(axes, lambda at: np.tile(slope, (len(at), 1)))
-    steep, towards = math.degrees(math.hypot(p["x"], p["y"])), math.degrees(math.atan2(p["y"], p["x"]))
+    _field(axes, effect)
+    steep, towards = math.degrees(math.hypot(effect.x, effect.y)), math.degrees(math.atan2(effect.y, effect.x))
     return figure, f"Arrows: downhill. Slope {number(steep)}°, towards {number(towards)}° from x."
 
 
-def _spring(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
-    rest = p.get("rest_length", 0.0)
-
-    def force(at: Array) -> Array:
-        away = np.array([p["x"], p["y"]]) - at
-        distance = np.maximum(np.hypot(*away.T), 1e-9)
-        return np.asarray((np.maximum(0.0, distance - rest) / distance)[:, None] * away)
-
-    return _pull(p, view, force, "Force of the spring; the longest arrow is the strongest.")
-
-
-def _magnet(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str]:
-    def force(at: Array) -> Array:
-        away = np.array([p["x"], p["y"]]) - at
-        square = (away**2).sum(axis=1)
-        return np.asarray((1.0 / (square + p["core"] ** 2) / np.sqrt(np.maximum(square, 1e-12)))[:, None] * away)
-
-    return _pull(p, view, force, "Force towards the point; the longest arrow is the strongest.")
-
-
-def _pull(p: Mapping[str, Any], view: TableView, force: Callable[[Array], Array], caption: str) -> tuple[Figure, str]:
+def _pull(caption: str) -> _Law:
     """A pull towards a point, which is shown where it is not far off."""
-    box, x, y = box_of(view, view.shown), MM * p["x"], MM * p["y"]
-    reach = max(box[2] - box[0], box[3] - box[1])
-    near = box[0] - reach < x < box[2] + reach and box[1] - reach < y < box[3] + reach
-    pad = 0.06 * reach
-    if near:
-        box = (min(box[0], x - pad), min(box[1], y - pad), max(box[2], x + pad), max(box[3], y + pad))
-    figure, axes = map_axes(box, 3.5, 3.5)
-    draw_recorded(axes, view, 0.12)
-    _field(axes, force)
-    if near:
-        axes.plot(x, y, "o", color=CONTACT, markersize=6, zorder=4)
-        return figure, caption + " Dot: anchor."
-    return figure, caption + f" Its anchor is outside the view, at ({number(p['x'])}, {number(p['y'])}) m."
+
+    def draw(effect: Any, view: TableView) -> tuple[Figure, str]:
+        box, x, y = box_of(view, view.shown), MM * effect.x, MM * effect.y
+        reach = max(box[2] - box[0], box[3] - box[1])
+        near = box[0] - reach < x < box[2] + reach and box[1] - reach < y < box[3] + reach
+        pad = 0.06 * reach
+        if near:
+            box = (min(box[0], x - pad), min(box[1], y - pad), max(box[2], x + pad), max(box[3], y + pad))
+        figure, axes = map_axes(box, 3.5, 3.5)
+        draw_recorded(axes, view, 0.12)
+        _field(axes, effect)
+        if near:
+            axes.plot(x, y, "o", color=CONTACT, markersize=6, zorder=4)
+            return figure, caption + " Dot: anchor."
+        return figure, caption + f" Its anchor is outside the view, at ({number(effect.x)}, {number(effect.y)}) m."
+
+    return draw
 
 
-def _support(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str] | None:
+def _support(finding: EffectFinding, view: TableView) -> tuple[Figure, str] | None:
     """The grid of weights under the object: rows along x of B, columns along y."""
-    weights = np.asarray(p["weights"], dtype=np.float64)
+    weights = np.asarray(finding.parameters["weights"].value, dtype=np.float64)
     if weights.ndim != 2 or weights.size < 2:
         return None
     outline = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -202,7 +199,7 @@ def _support(p: Mapping[str, Any], view: TableView) -> tuple[Figure, str] | None
     figure, axes = map_axes((*(low - pad), *(high + pad)), 3.8, 3.6)
     axes.grid(visible=False)
     middles = _middles(outline, x, y)
-    ends = np.asarray(p["ci90"], dtype=np.float64)
+    ends = np.asarray(finding.parameters["weights"].ci90, dtype=np.float64)
     # Over the mean of what lies under the object: pushes say nothing of the other cells.
     under = float(weights[np.isfinite(middles[..., 0])].mean())
     weights, ends = weights / under, ends / under
@@ -237,16 +234,15 @@ def _middles(outline: Array, x: Array, y: Array) -> Array:
     return middles
 
 
-_LAWS: dict[str, tuple[_Law, tuple[str, ...]]] = {
-    "stribeck_friction": (_stribeck, ("excess", "speed")),
-    "viscous_drag": (_drag(1), ("coefficient",)),
-    "quadratic_drag": (_drag(2), ("coefficient",)),
-    "anisotropic_table": (_ellipse("table"), ("ratio", "angle")),
-    "anisotropic_object": (_ellipse("object"), ("ratio", "angle")),
-    "friction_patch": (_patch, ("ratio", "x", "y", "radius")),
-    "friction_gradient": (_gradient, ("slope_x", "slope_y")),
-    "table_tilt": (_tilt, ("x", "y")),
-    "tether": (_spring, ("stiffness", "x", "y")),
-    "magnet": (_magnet, ("strength", "x", "y", "core")),
-    "uneven_support": (_support, ("weights",)),
+_LAWS: dict[str, _Law] = {
+    "stribeck_friction": _stribeck,
+    "viscous_drag": _drag,
+    "quadratic_drag": _drag,
+    "anisotropic_table": _ellipse("table"),
+    "anisotropic_object": _ellipse("object"),
+    "friction_patch": _patch,
+    "friction_gradient": _gradient,
+    "table_tilt": _tilt,
+    "tether": _pull("Force of the spring; the longest arrow is the strongest."),
+    "magnet": _pull("Force towards the point; the longest arrow is the strongest."),
 }

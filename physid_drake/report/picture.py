@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from physid_drake.errors import ConfigError
 from physid_drake.files import FileError, MissingFileError, read_bytes
-from physid_drake.run_folder import write_whole
+from physid_drake.whole_files import write_whole
 
 MARK: Final = "physid_drake inspect"
 _KEYS: Final = {".png": "Software", ".svg": "Creator", ".pdf": "Creator"}

@@ -28,10 +28,10 @@ OBJECT, HAND, GOAL, LOST = "#2563c9", "#b4540a", "#1d7a46", "#b42318"
 FLATTEST = 0.6  # of the longer side of a view from above
 
 
-def curve_svg(plan: Plan, *, size: tuple[float, float] = (5.2, 3.4)) -> Markup:
-    """Cost against the swept setting, with its spread, as inline SVG; ``size`` in inches."""
+def curve_svg(plan: Plan) -> Markup:
+    """Cost against the swept setting, with its spread, as inline SVG."""
     with drawn():
-        figure = Figure(figsize=size, layout="constrained")
+        figure = Figure(figsize=(5.2, 3.4), layout="constrained")
         _draw_curve(figure.add_subplot(), plan)
         return svg_of(figure, "plan curve", f"Miss against {plan.policy.swept}")
 

@@ -38,9 +38,7 @@ STATE = np.dtype([(name, np.float64) for name in (
     "dx", "dy", "wx", "wy",                    # what swings inside: its place less that of Bcm [m], its velocity
     "ex", "ey", "ux", "uy",                    # a tip that gives way: the hand's place less its own [m], its velocity
 )])  # fmt: skip
-COUNTS = np.dtype([(name, np.int64) for name in (
-    "outcome", "steps", "stages", "rounds", "unconverged", "lifted", "tipped", "blows",
-)])  # fmt: skip
+COUNTS = np.dtype([(name, np.int64) for name in ("outcome", "lifted", "tipped")])
 
 
 @compiled
@@ -80,7 +78,7 @@ def roll(body, object_, hand, start, laws, tables, times, poses, forces, counts,
                 state.t, state.touching = until, 0.0
                 continue
             if rest == 0.0 and state.touching == 0.0:
-                strike(body, object_, hand, state, counts)
+                strike(body, object_, hand, state)
         elif at_knot and state.touching > 0.0 and body.tip_stiffness == 0.0:
             jerk(body, object_, hand, state)
         done = _step(
@@ -114,8 +112,7 @@ def _begin(body, object_, hand, start, room, state, solved, counts):
     state.next = 1e-3
     solved.partly = 0.0
     counts.outcome = COMPLETED
-    counts.steps = counts.stages = counts.rounds = counts.unconverged = counts.lifted = counts.tipped = 0
-    counts.blows = 0
+    counts.lifted = counts.tipped = 0
     state.ex = state.ey = state.ux = state.uy = state.dx = state.dy = 0.0
     state.wx, state.wy = state.vx, state.vy
     if len(hand[0]) > 0:
@@ -190,7 +187,6 @@ def _step(body, object_, hand, laws, tables, times, done, poses, forces, counts,
             break
         h, cut = into * h, True
     if h > 0.0:
-        counts.steps += 1
         nvx, nvy, nspin = solved.vx, solved.vy, solved.spin
         fx = (1.0 - GAMMA) * a[3] + GAMMA * solved.fx
         fy = (1.0 - GAMMA) * a[4] + GAMMA * solved.fy
@@ -210,7 +206,7 @@ def _step(body, object_, hand, laws, tables, times, done, poses, forces, counts,
         state.dx, state.dy, state.wx, state.wy = swing
         state.t = t + h
     if struck:
-        strike(body, object_, hand, state, counts)
+        strike(body, object_, hand, state)
     elif state.touching > 0.0:
         keep_touching(body, edges, hand, solved, state)
     return done
@@ -315,9 +311,6 @@ def _wander(body, t):
 
 @compiled
 def _count(counts, solved):
-    counts.stages += 1
-    counts.rounds += int(solved.rounds)
-    counts.unconverged += 0 if solved.converged > 0.0 else 1
     counts.lifted += 1 if solved.partly > 0.0 else 0
     counts.tipped += 1 if solved.tipped > 0.0 else 0
 

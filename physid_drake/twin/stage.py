@@ -53,7 +53,7 @@ CONTACT = np.dtype([(name, np.float64) for name in (
 SOLVED = np.dtype([(name, np.float64) for name in (
     "vx", "vy", "spin",       # of Bcm in W
     "fx", "fy", "normal",     # of the tip on the object in W [N], and the impulse along the normal [N s]
-    "converged", "tipped", "rounds",
+    "tipped",
     "partly",                 # whether some points carry nothing
     "p0", "px", "py",         # the plane of loads in B [N, N/m]
 )])  # fmt: skip
@@ -101,7 +101,6 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
     hx, hy = turned_back(c, s, solved.fx, solved.fy) if touching else (0.0, 0.0)
     size = math.sqrt(body.inertia / body.mass)
     full, before, pn, again, rounds = 1.0, np.inf, 0.0, False, 0
-    solved.converged = 0.0
     for rounds in range(1, MOST_ROUNDS + 1):
         fx, fy, torque, xx, xy, yy, xw, yw, ww = _friction(
             body, object_, laws, tables, room, headed, yaw, vx, vy, spin, oval, hx, hy, arms, solved, full
@@ -129,7 +128,6 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
         pressed = length(fhx - hx, fhy - hy) * h / body.mass
         vx, vy, spin, hx, hy = vx + d0, vy + d1, spin + d2, fhx, fhy
         if moved + 0.1 * pressed < CONVERGED:
-            solved.converged = 1.0
             break
         to_and_fro = moved > 0.5 * before
         # Where it jumps to and fro, the slope without its soft part helps, and the whole one again.
@@ -139,7 +137,6 @@ def solve_stage(body, object_, laws, tables, room, h, x, y, yaw, ax, ay, spin0, 
         before = moved
     solved.vx, solved.vy, solved.spin = c * vx - s * vy, s * vx + c * vy, spin
     solved.fx, solved.fy, solved.normal = c * hx - s * hy, s * hx + c * hy, pn
-    solved.rounds = float(rounds)
 
 
 @compiled_inside

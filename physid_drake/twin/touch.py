@@ -13,7 +13,7 @@ CORRECTED = 5e-4  # m of a gap that a step leaves
 
 
 @compiled
-def strike(body, object_, hand, state, counts):
+def strike(body, object_, hand, state):
     """The tip meets the object: a blow, or a touch that stays where it is gentle or does not rebound."""
     hx, hy, hvx, hvy = tip_at(body, hand, state, state.t, False)
     gap, nx, ny, rx, ry = gap_between(state.x, state.y, state.yaw, hx, hy, body, object_[6])
@@ -27,7 +27,6 @@ def strike(body, object_, hand, state, counts):
         return
     restitution = body.restitution if un < -GENTLE else 0.0
     _kick(body, state, nx, ny, rx, ry, un, uy * nx - ux * ny, restitution)
-    counts.blows += 1 if un < -GENTLE else 0
     state.next = AFTER_BLOW
     state.touching = 1.0 if restitution == 0.0 else 0.0
 

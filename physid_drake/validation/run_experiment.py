@@ -13,7 +13,7 @@ from physid_drake.errors import ConfigError
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.svg import drawn
 from physid_drake.report.terminal import terminal
-from physid_drake.run_folder import RunFolder, versions
+from physid_drake.run_folder import RunFolder
 from physid_drake.validation.experiments.catalogue import Wish, experiment_named
 from physid_drake.validation.experiments.repetitions import claim, run_all
 from physid_drake.validation.experiments.values import Result
@@ -25,6 +25,7 @@ from physid_drake.validation.report.experiment import (
     table_csv,
 )
 from physid_drake.validation.run_prove import ended_softly
+from physid_drake.versions import versions
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -21,7 +21,7 @@ from physid_drake.errors import ConfigError, ProofError
 from physid_drake.report.progress import progress_bar
 from physid_drake.report.svg import drawn, png_of
 from physid_drake.report.terminal import terminal
-from physid_drake.run_folder import SETTINGS, RunFolder, settings_text, versions
+from physid_drake.run_folder import SETTINGS, RunFolder, settings_text
 from physid_drake.validation.report.proof import Proof, proof_json, proof_markdown, proof_tables
 from physid_drake.validation.report.proof_page import proof_page
 from physid_drake.validation.report.proof_pictures import confusion_picture
@@ -49,6 +49,7 @@ from physid_drake.validation.sealing.seal import (
     unlock,
 )
 from physid_drake.validation.sealing.secret import Secret, keep_secret, settled_secret
+from physid_drake.versions import versions
 
 WORLDS, QUICK, MOST_WORLDS = 200, 10, 100_000
 COMMAND = "prove"

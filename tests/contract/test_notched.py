@@ -112,7 +112,7 @@ def test_the_feet_of_a_drawn_world_have_its_undersides_moments(seed):
 def test_another_simulator_pushes_it_alike(seed):
     """MuJoCo's world of the proof, with two contacts where the tip has two, beside the twin's one."""
     pytest.importorskip("mujoco")
-    from physid_drake.validation.worlds.make import simulate
+    from physid_drake.validation.worlds.strengths import simulate
 
     scene = drawn(seed)
     scene = dc.replace(scene, pushes=tuple(dc.replace(push, friction_factor=1.0) for push in scene.pushes[:8]))

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from physid_drake.inference.bounded import bounded
-from physid_drake.inference.fit import normal_equations
 from physid_drake.inference.push import (
     NO_TAIL,
     TAIL,
@@ -19,6 +18,7 @@ from physid_drake.inference.push import (
     cost_of,
     held_out,
     noise_scale_of,
+    normal_equations,
     weighed,
     weight_of,
     without,
@@ -254,6 +254,17 @@ def test_what_pushes_share_is_where_their_equations_have_it_and_as_sure(drawn, r
     dz, root = without([], mean, np.diag(std**-2.0), found)
     assert dz == pytest.approx(np.linalg.solve(precision, right), rel=1e-7, abs=1e-7)
     assert root @ root.T == pytest.approx(np.linalg.inv(precision), rel=1e-7, abs=1e-9)
+
+
+@given(several(), generators())
+def test_what_pushes_share_is_in_other_units_the_same(drawn, rng):
+    n, some = drawn
+    mean, std, units = rng.normal(size=n), rng.uniform(0.3, 3.0, n), 10.0 ** rng.uniform(-8.0, 8.0, n)
+    precision, right = normal_equations([as_weighed(one) for one in some], mean, np.diag(std**-2.0))
+    other = [Made(dc.replace(push, shared=push.shared * units), prior) for push, prior in some]
+    there, way = normal_equations([as_weighed(one) for one in other], mean / units, np.diag((std / units) ** -2.0))
+    assert there == pytest.approx(precision * np.outer(units, units), rel=1e-9)
+    assert way == pytest.approx(right * units, rel=1e-7, abs=1e-9 * np.abs(right * units).max())
 
 
 # ------------------------------------------------------------------------------------------------------------ bounds

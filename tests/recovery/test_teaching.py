@@ -108,7 +108,7 @@ def test_the_chosen_push_leaves_less_open_than_random_ones_when_they_are_made(ta
 def test_the_rest_before_a_push_is_no_motion(taught):
     """Else the cell's own error would be known from it, as if it were the same at rest and in motion."""
     _, case, pushes, _ = taught
-    problem = teaching._problem(pushes[1], case, START, 0, None)
+    problem = teaching._problem("next", pushes[1], case, START)
     poses = np.column_stack([0.05 * np.clip(problem.times - 0.3, 0.0, None), *np.zeros((2, len(problem.times)))])
     begin, end = teaching._foreseen(problem, poses, case).moving
     assert 0.28 <= begin <= 0.4 and end == np.inf

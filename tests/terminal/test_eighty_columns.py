@@ -105,7 +105,9 @@ def test_inspect_shows_its_numbers_whole(terminal):
 
 
 def test_a_diagnosis_moves_one_line_and_says_which_file_to_open(terminal):
-    shown, status, progress = terminal.seen("diagnose", "sealed_01", "--out", "found")
+    shown, status, progress = terminal.seen(
+        "diagnose", "sealed_01", "--out", "found", "--effects", "anisotropic_table", "table_tilt", "viscous_drag"
+    )
     assert status == 0
     assert_nothing_is_cut(shown)
     words = " ".join(shown.split())

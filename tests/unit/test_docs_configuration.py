@@ -1,4 +1,4 @@
-"""The table of docs/configuration.md has every key of a scenario, with its default."""
+"""The table of docs/configuration.md has every key of a scenario, with its default, and every search."""
 
 import dataclasses as dc
 import re
@@ -7,9 +7,11 @@ from pathlib import Path
 import yaml
 
 from physid_drake.scenario_schema import Scenario
+from physid_drake.search import SEARCHES
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "configuration.md"
-ROWS = re.findall(r"^\| `([\w.]+)` \| `([^`]+)` \|", PAGE.read_text(encoding="utf-8"), re.MULTILINE)
+TEXT = PAGE.read_text(encoding="utf-8")
+ROWS = re.findall(r"^\| `([\w.]+)` \| `([^`]+)` \|", TEXT, re.MULTILINE)
 
 
 def leaves(value, key=""):
@@ -23,3 +25,8 @@ def leaves(value, key=""):
 
 def test_every_key_and_default_is_the_schemas():
     assert {key: yaml.safe_load(default) for key, default in ROWS} == leaves(Scenario())
+
+
+def test_every_search_is_listed():
+    row = re.search(r"^\| `search\.method` \|(.*)\|$", TEXT, re.MULTILINE)[1]
+    assert re.findall(r"`(\w+)`", row) == list(SEARCHES)

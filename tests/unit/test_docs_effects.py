@@ -1,8 +1,7 @@
 """The catalogue in docs/effects.md is the code's, and its pictures are those of the script."""
 
-import importlib.util
+import importlib
 import re
-import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -42,12 +41,9 @@ def symbols(kind):
 
 @pytest.fixture(scope="module")
 def script():
-    spec = importlib.util.spec_from_file_location("catalogue_pictures", DOCS / "catalogue_pictures.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    yield module
-    del sys.modules[spec.name]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(DOCS)
+        yield importlib.import_module("catalogue_pictures")
 
 
 def test_every_effect_is_listed_with_its_element_and_parameters():
@@ -89,8 +85,8 @@ def test_the_page_mentions_each_picture_once_and_there_are_no_others():
 
 @every_effect
 def test_a_section_says_the_values_of_its_picture_and_the_picture_does(kind, script):
-    values = script.pictures()[kind.name].values
-    assert type(script.pictures()[kind.name].effect) is kind
+    values = script.PICTURES[kind.name].values
+    assert type(script.PICTURES[kind.name].effect) is kind
     said = "With the weights as drawn." if kind.name == "uneven_support" else f"With {values}."
     assert said in " ".join(section(kind).split())
     assert values in texts(PICTURES / f"{kind.name}.svg")

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from hand_paths import fit_hand_path, fit_hand_paths
 from reference.planar import HandPath as ReferencePath
 from scipy.integrate import quad
 
 from physid_drake.cell import HandPath
-from physid_drake.cell.hand_fit import fit_hand_path, fit_hand_paths, stream_std
+from physid_drake.cell.hand_fit import stream_std
 from physid_drake.cell.hand_path import straight_path, subdivided
 
 

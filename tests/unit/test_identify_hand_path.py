@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from hand_paths import fit_hand_path, fit_hand_paths
 
 from physid_drake.cell import HandPath, hand_fit
 from physid_drake.cell.hand_curves import MOST_KNOTS, STRAIGHT
-from physid_drake.cell.hand_fit import SMOOTH_RAMPS, fit_hand_path, fit_hand_paths, stream_std
+from physid_drake.cell.hand_fit import SMOOTH_RAMPS, stream_std
 
 STD = 5e-5  # m, of a good tracker of the hand
 
@@ -279,7 +280,7 @@ def test_stamps_that_are_late_or_early_are_no_change_of_speed(monkeypatch):
 @pytest.mark.parametrize("jitter", [0.0, 3e-4, 1e-3])
 def test_the_jitter_of_stamps_is_seen(jitter):
     _, streams = late_or_early(jitter)
-    seen = hand_fit._jitter_of([hand_fit._fit_of(*stream, STD) for stream in streams])
+    seen = hand_fit._jitter_of([hand_fit._fit_of(*stream, STD, 0.0) for stream in streams])
     assert seen == pytest.approx(jitter / np.sqrt(3.0), rel=0.3, abs=2e-5)
 
 

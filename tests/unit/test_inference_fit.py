@@ -10,9 +10,10 @@ from physid_drake.effects.drag import ViscousDrag
 from physid_drake.effects.fields import TableTilt
 from physid_drake.effects.friction import AnisotropicTable
 from physid_drake.identify.baseline import baseline, settled, with_tolerances
-from physid_drake.inference.fit import Fitter, normal_equations
+from physid_drake.inference.fit import Fitter
 from physid_drake.inference.multistart import reseated
 from physid_drake.inference.predictions import Predictor
+from physid_drake.inference.push import normal_equations
 from physid_drake.inference.rollouts import Ask, Physics
 from physid_drake.inference.scores import columns, scores
 from physid_drake.pushes.case import case_of, cell_config

@@ -59,7 +59,7 @@ WRONG = (
     float("nan"), float("inf"), -float("inf"), [None], [[]], {"a": 1}, {3: 4}, [1.0, 2.0, 3.0], [[1.0, 2.0]] * 3,
     ["a", "b"], [[1e308] * 2] * 2, NESTED,
 )  # fmt: skip
-NO_ALIASES = type("Dumper", (yaml.SafeDumper,), {"ignore_aliases": lambda self, value: True})
+NO_ALIASES = type("Dumper", (yaml.CSafeDumper,), {"ignore_aliases": lambda self, value: True})
 
 
 def paths(value, path=()):

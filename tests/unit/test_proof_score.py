@@ -6,8 +6,9 @@ import json
 import pytest
 
 from physid_drake.errors import ProofError
-from physid_drake.validation.scoring.figures import figures_of, table
+from physid_drake.validation.scoring.figures import figures_of
 from physid_drake.validation.scoring.score import Outcome, _holds, outcome, read_outcomes
+from physid_drake.validation.scoring.tables import table
 
 
 def truth(kind="effect", names=("viscous_drag",), size=8.0, value=0.4):

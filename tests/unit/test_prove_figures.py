@@ -11,8 +11,9 @@ from physid_drake.report.svg import drawn
 from physid_drake.validation.report.proof import Proof, outcomes_in, proof_json, proof_markdown, proof_tables
 from physid_drake.validation.report.proof_page import proof_page
 from physid_drake.validation.report.proof_pictures import confusion_picture
-from physid_drake.validation.scoring.figures import NOT_CATALOGUED, NOTHING, figures_of, json_of, table
+from physid_drake.validation.scoring.figures import NOT_CATALOGUED, NOTHING, figures_of, json_of
 from physid_drake.validation.scoring.score import HeldOut, Outcome, failed_outcome, outcome
+from physid_drake.validation.scoring.tables import table
 from physid_drake.validation.sealing.diagnosing import Attempt
 
 DRAG, TILT, SWIRL = ("viscous_drag",), ("table_tilt",), ("other_swirl",)

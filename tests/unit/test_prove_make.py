@@ -14,7 +14,7 @@ pytest.importorskip("mujoco")
 from physid_drake.errors import ParameterError, ProofError
 from physid_drake.recording import Box, read_recording
 from physid_drake.validation.sealing.secret import name_by_seed, read_secret
-from physid_drake.validation.worlds import make, mujoco_world
+from physid_drake.validation.worlds import make, mix, mujoco_world, strengths
 from physid_drake.validation.worlds.effects import catalogue as fx
 from physid_drake.validation.worlds.effects.effect import parameters_of
 from physid_drake.validation.worlds.knobs import draw_knob
@@ -52,8 +52,8 @@ def test_missing_mujoco_says_what_to_install(monkeypatch):
 
 
 def test_the_mix_is_a_quarter_nothing_and_every_effect_has_its_turn():
-    drawn = [make.assign(index, 7) for index in range(200)]
-    assert {kind: sum(d.kind == kind for d in drawn) for kind in make.KINDS} == {
+    drawn = [mix.assign(index, 7) for index in range(200)]
+    assert {kind: sum(d.kind == kind for d in drawn) for kind in mix.KINDS} == {
         "none": 50,
         "effect": 100,
         "other": 30,
@@ -185,16 +185,17 @@ def test_two_effects_may_not_lift_an_edge_together():
         knobs = [draw_knob(name, rng, scene) for name in ("uneven_support", "com_offset")]
         effects = [knob.at(knob.limit) for knob in knobs]
         assert all(
-            make._loaded(scene, [effect, other.at(0.0)]) for effect, other in zip(effects, knobs[::-1], strict=True)
+            strengths.loaded(scene, [effect, other.at(0.0)])
+            for effect, other in zip(effects, knobs[::-1], strict=True)
         )
-        lifted.append(not make._loaded(scene, effects))
+        lifted.append(not strengths.loaded(scene, effects))
     assert any(lifted) and not all(lifted)
 
 
 def test_a_world_has_one_grain():
-    drawn = {frozenset(make.assign(index, 7, "pair", "anisotropic_table").effects) for index in range(300)}
-    assert frozenset(make.GRAINS) not in drawn and len(drawn) == len(fx.CATALOGUED) - 2
-    grains = [draw_knob(name, np.random.default_rng(0), SimpleNamespace(plan=PLAN)).at(0.3) for name in make.GRAINS]
+    drawn = {frozenset(mix.assign(index, 7, "pair", "anisotropic_table").effects) for index in range(300)}
+    assert frozenset(mix.GRAINS) not in drawn and len(drawn) == len(fx.CATALOGUED) - 2
+    grains = [draw_knob(name, np.random.default_rng(0), SimpleNamespace(plan=PLAN)).at(0.3) for name in mix.GRAINS]
     with pytest.raises(ParameterError, match="one grain"):
         PushWorld(PLAN, grains, pushes=1).run((0.0, 0.0, 0.0), None, push=0, duration=0.01)
 
@@ -203,11 +204,11 @@ def test_a_world_has_one_grain():
 def test_two_effects_that_set_an_object_going_before_the_hand_comes_make_no_world(tilt, ratio, rests):
     push = SimpleNamespace(pose=(0.0, 0.0, 0.0), friction_factor=1.0)
     effects = [fx.CATALOGUED["table_tilt"](x=tilt, y=0.0), fx.CATALOGUED["friction_patch"](ratio=ratio, radius=1.0)]
-    assert make.stands(SimpleNamespace(plan=PLAN, pushes=[push]), effects) is rests
+    assert strengths.stands(SimpleNamespace(plan=PLAN, pushes=[push]), effects) is rests
 
 
 def test_worlds_with_notches_have_one_effect_or_none():
-    kinds = [make.assign(index, 5, "notched") for index in range(8)]
+    kinds = [mix.assign(index, 5, "notched") for index in range(8)]
     assert [one.kind for one in kinds] == ["effect", "effect", "effect", "none"] * 2
     assert all(one.notched and len(one.effects) == (one.kind == "effect") for one in kinds)
-    assert not make.assign(0, 5, "effect").notched
+    assert not mix.assign(0, 5, "effect").notched

@@ -14,7 +14,6 @@ import pytest
 
 from physid_drake.errors import ConfigError, ProofError
 from physid_drake.resources import shipped
-from physid_drake.run_folder import write_whole
 from physid_drake.validation.sealing import hiding, seal
 from physid_drake.validation.sealing.blindfold import HIDDEN_BY
 from physid_drake.validation.sealing.diagnosing import diagnose_command
@@ -28,6 +27,7 @@ from physid_drake.validation.sealing.seal import (
     write_seal,
 )
 from physid_drake.validation.sealing.secret import keep_secret, name_by_seed, settled_secret
+from physid_drake.whole_files import write_whole
 
 
 @pytest.fixture

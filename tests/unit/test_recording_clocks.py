@@ -191,3 +191,4 @@ def test_an_object_that_never_moves_is_refused_before_a_path_is_fitted(recording
     quiet = replace(recording, pushes=tuple(still(push) for push in recording.pushes))
     with pytest.raises(RecordingError, match="never moves"):
         case_of(quiet, cell_config(quiet), ThetaConfig(), jobs=1)
+    assert any("never moves" in said for said in refusals(quiet))

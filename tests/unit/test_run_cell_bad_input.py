@@ -169,8 +169,8 @@ def test_a_hand_above_the_object(refused, tmp_path):
         ("{parameters: []}", "at least one"),
     ],
 )
-def test_theta_outside_its_bounds(refused, tmp_path, theta, said):
-    assert said in refused("--set", f"{{theta: {theta}}}", *out(tmp_path))
+def test_theta_outside_its_bounds(refused, recording, tmp_path, theta, said):
+    assert said in refused("--recording", recording, "--set", f"{{theta: {theta}}}", *out(tmp_path))
 
 
 def test_what_an_override_has_wrong_is_not_put_down_to_the_file(refused, tmp_path):

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from physid_drake.errors import ConfigError, OutputError
-from physid_drake.run_folder import LOCK, MANIFEST, RunFolder, named_after, write_whole
+from physid_drake.run_folder import LOCK, MANIFEST, RunFolder, named_after, named_after_model
+from physid_drake.whole_files import write_whole
 
 RUN = "run_cell"
 FILES = {"state": ("state.npz",), "results": ("result.json",)}
@@ -28,6 +29,17 @@ def opened(path, configuration="seed: 0", **files):
 )  # fmt: skip
 def test_a_recordings_name_is_one_folder_where_the_command_runs(name, folder):
     assert named_after(name) == folder
+
+
+def test_what_is_made_of_a_model_is_named_after_its_folder(tmp_path, monkeypatch):
+    run = tmp_path / "oak / eraser"
+    run.mkdir(parents=True)
+    (run / "model.yaml").touch()
+    (run / "mug.v2.yaml").touch()
+    assert named_after_model(run) == named_after_model(run / "model.yaml") == "eraser"
+    assert named_after_model(run / "mug.v2.yaml") == "mug.v2"
+    monkeypatch.chdir(run)
+    assert named_after_model(Path()) == named_after_model(Path("model.yaml")) == "eraser"
 
 
 def test_results_of_another_configuration_are_refused_and_its_state_is_dropped(tmp_path):

@@ -73,6 +73,16 @@ def test_the_command_writes_the_plan_and_the_same_seed_the_same_bytes(folder, tm
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
+def test_a_plan_goes_to_a_folder_named_after_the_runs(folder, tmp_path, monkeypatch, capsys, few_rows):
+    """Not after the recording's name, "eraser" here, which recordings of one data set may share."""
+    monkeypatch.chdir(tmp_path)
+    folder.rename(tmp_path / "monday")
+    assert main(["plan", "monday", *QUICK]) == 0
+    assert main(["plan", "--model", "monday/model.yaml", *QUICK]) == 0
+    assert "Replaces the earlier plan in plans/monday." in capsys.readouterr().out
+    assert [path.name for path in (tmp_path / "plans").iterdir()] == ["monday"]
+
+
 def test_plain_plans_without_the_effects_and_says_what_they_make_of_it(folder, tmp_path, capsys, few_rows):
     with_effects = json.loads(planned_files(folder, tmp_path / "one")["plan.json"])
     plain = json.loads(planned_files(folder, tmp_path / "two", "--baseline")["plan.json"])

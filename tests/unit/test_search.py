@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from physid_drake.belief import Belief, BeliefSettings
+from physid_drake.cli import main
 from physid_drake.errors import ParameterError
 from physid_drake.search import (
+    SEARCHES,
     GreedyEntropySearch,
     RandomSearch,
     initial_design,
@@ -44,6 +46,14 @@ def belief_with(p_min, tried=()):
     mask = np.zeros(n, dtype=np.bool_)
     mask[list(tried)] = True
     return replace(belief, p_min=np.array(p_min, dtype=float), tried=mask)
+
+
+def test_help_of_a_plan_lists_the_searches_of_the_registry(monkeypatch, capsys):
+    monkeypatch.setitem(SEARCHES, "most_likely", RandomSearch)
+    with pytest.raises(SystemExit):
+        main(["plan", "--help"])
+    shown = " ".join(capsys.readouterr().out.split())
+    assert ", ".join(SEARCHES).replace("greedy_entropy", "greedy_entropy (default)") in shown
 
 
 def test_greedy_pick_equals_the_hand_computation():

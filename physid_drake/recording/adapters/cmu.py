@@ -39,20 +39,11 @@ import numpy as np
 from physid_drake.errors import RecordingError
 from physid_drake.files import FileError, read_text
 from physid_drake.recording.adapters.sources import drawn, source_files
+from physid_drake.recording.object_model import ObjectModel, Prism
 from physid_drake.recording.outlines import outline_distance
 from physid_drake.recording.planar import planar_poses, turned
 from physid_drake.recording.reading import read_recording
-from physid_drake.recording.values import (
-    Array,
-    ForceStream,
-    Hand,
-    ObjectModel,
-    Prism,
-    Push,
-    Recording,
-    Sensors,
-    Table,
-)
+from physid_drake.recording.values import Array, ForceStream, Hand, Push, Recording, Sensors, Table
 from physid_drake.recording.writing import write_recording
 from physid_drake.wording import named
 

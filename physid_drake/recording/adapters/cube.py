@@ -28,10 +28,11 @@ from physid_drake.errors import RecordingError
 from physid_drake.files import FileError
 from physid_drake.npz import read_arrays
 from physid_drake.recording.adapters.sources import drawn
+from physid_drake.recording.object_model import Box, ObjectModel
 from physid_drake.recording.planar import planar_poses
 from physid_drake.recording.reading import read_recording
 from physid_drake.recording.statistics import estimate_noise
-from physid_drake.recording.values import Array, Box, ObjectModel, PoseStream, Push, Recording, Sensors, Table
+from physid_drake.recording.values import Array, PoseStream, Push, Recording, Sensors, Table
 from physid_drake.recording.writing import write_recording
 from physid_drake.wording import named
 

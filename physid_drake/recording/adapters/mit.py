@@ -31,9 +31,10 @@ from physid_drake.recording.adapters.mit_streams import read_push
 from physid_drake.recording.adapters.sources import drawn, source_files
 from physid_drake.recording.description import read_text
 from physid_drake.recording.limits import FURTHEST
+from physid_drake.recording.object_model import ObjectModel
 from physid_drake.recording.planar import planar_poses, turned
 from physid_drake.recording.reading import read_recording
-from physid_drake.recording.values import Hand, HandStream, ObjectModel, Push, Recording, Sensors, Table
+from physid_drake.recording.values import Hand, HandStream, Push, Recording, Sensors, Table
 from physid_drake.recording.writing import write_recording
 from physid_drake.wording import one_line, shown
 

@@ -15,8 +15,9 @@ from typing import Final
 import numpy as np
 
 from physid_drake.errors import RecordingError
+from physid_drake.recording.object_model import Box, Prism, Shape
 from physid_drake.recording.outlines import polygon_centroid
-from physid_drake.recording.values import Array, Box, Prism, Shape
+from physid_drake.recording.values import Array
 from physid_drake.wording import shown
 
 THICKNESS: Final = 0.013

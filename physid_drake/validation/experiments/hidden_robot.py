@@ -42,6 +42,7 @@ _MASSES = (0.1, 0.9)  # kg, as the paper bounds them
 _HAND_FRICTIONS = (0.15, 0.4)
 _HEADING = math.radians(25.0)  # of a random push against the face's normal
 _SPREAD = 0.15  # m about the origin
+_TRAVELS = (0.03, 0.08)  # m, of the hand from the touch to the brake
 
 
 class HiddenRobot:
@@ -121,11 +122,11 @@ class HiddenRobot:
         self._pushes += 1
         return self._recorded(motion.times, motion.poses, motion.tips)
 
-    def recording(self, pushes: tuple[Push, ...], name: str = "hidden") -> Recording:
+    def recording(self, pushes: tuple[Push, ...]) -> Recording:
         """Pushes as a recording that says neither mass nor friction."""
         (x0, y0), (x1, y1) = self._table
         return Recording(
-            name=name, description="", object=ObjectModel(shape=self.world.shape),
+            name="hidden", description="", object=ObjectModel(shape=self.world.shape),
             table=Table(size=(x1 - x0, y1 - y0), centre=(0.5 * (x0 + x1), 0.5 * (y0 + y1))),
             hand=Hand(tip="sphere", radius=self.world.tip_radius), sensors=self._sensors, pushes=pushes,
         )  # fmt: skip
@@ -178,7 +179,6 @@ def draw_push(
     yaw: float,
     *,
     speeds: tuple[float, float],
-    travels: tuple[float, float] = (0.03, 0.08),
     direction: float | None = None,
 ) -> PlannedPush:
     """A random push onto a face: heading within 25 degrees of its normal, contact within half of its length.
@@ -190,7 +190,6 @@ def draw_push(
         shape: of the object.
         yaw: of the object [rad].
         speeds: least and greatest [m/s]; uniform in the logarithm.
-        travels: least and greatest way of the hand from the touch to the brake [m].
         direction: of the motion in W [rad], only for a disc; None draws it.
     """
     if isinstance(shape, Cylinder):
@@ -202,7 +201,7 @@ def draw_push(
     return PlannedPush(
         direction=normal + float(rng.uniform(-_HEADING, _HEADING)),
         speed=float(np.exp(rng.uniform(*np.log(speeds)))),
-        travel=float(rng.uniform(*travels)),
+        travel=float(rng.uniform(*_TRAVELS)),
         contact_offset=0.5 * half * float(rng.uniform(-1.0, 1.0)),
     )
 

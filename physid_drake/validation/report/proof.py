@@ -11,8 +11,9 @@ from typing import Any
 from rich.table import Table
 
 from physid_drake.report.terminal import narrow_table, words
-from physid_drake.validation.scoring.figures import Figures, decimals, held_out_table, json_of, power_table, table
+from physid_drake.validation.scoring.figures import Figures, json_of
 from physid_drake.validation.scoring.score import HeldOut, Outcome, number
+from physid_drake.validation.scoring.tables import decimals, held_out_table, power_table, table
 
 FORMAT = "physid-proof/1"
 MAIN = ("", "result", "95 % interval", "target")

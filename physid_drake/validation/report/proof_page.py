@@ -16,7 +16,7 @@ from physid_drake.validation.report.proof_pictures import (
     confusion_picture,
     power_picture,
 )
-from physid_drake.validation.scoring.figures import held_out_table, power_table, table
+from physid_drake.validation.scoring.tables import held_out_table, power_table, table
 
 
 def proof_page(proof: Proof) -> str:

@@ -11,7 +11,8 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from physid_drake.report.svg import AFTER, BEFORE, INK, MUTED
-from physid_drake.validation.scoring.figures import NOT_CATALOGUED, NOTHING, Figures, Share, size_words
+from physid_drake.validation.scoring.figures import NOT_CATALOGUED, NOTHING, Figures, Share
+from physid_drake.validation.scoring.tables import size_words
 
 FOUND, NAMED = BEFORE, AFTER
 LAST = ("unexplained", "consistent", "underpowered", "failed")

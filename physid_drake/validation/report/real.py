@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from physid_drake.report.terminal import narrow_table, words
-from physid_drake.validation.scoring.figures import decimals
 from physid_drake.validation.scoring.real_score import NEAR, Pressure, RealOutcome
+from physid_drake.validation.scoring.tables import decimals
 
 FORMAT = "physid-proof-real/1"
 COLUMNS = ("case", "pushes", "chi2 baseline", "chi2 diagnosed", "verdict", "names", "held-out mm", "held-out deg",

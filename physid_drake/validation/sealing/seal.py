@@ -16,8 +16,8 @@ from typing import Final
 
 from physid_drake.errors import ProofError
 from physid_drake.files import FileError, MissingFileError, read_bytes, read_text
-from physid_drake.run_folder import write_whole
 from physid_drake.validation.sealing.written import broken, read_object
+from physid_drake.whole_files import write_whole
 from physid_drake.wording import shown
 
 SEALED: Final = "sealed"

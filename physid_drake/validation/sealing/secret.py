@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from physid_drake.errors import ConfigError, OutputError, ProofError
-from physid_drake.run_folder import write_whole
 from physid_drake.validation.sealing.seal import LINES, SEALED, shut_error
 from physid_drake.validation.sealing.written import broken, read_object
+from physid_drake.whole_files import write_whole
+from physid_drake.wording import cause_of
 
 SECRET: Final = "secret.json"
 _BITS: Final = 64  # of a seed that is drawn
@@ -102,7 +103,7 @@ def keep_secret(
         try:
             (out / SEALED).mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise OutputError(f"'{out / SEALED}': cannot be written: {error.strerror or error}.") from error
+            raise OutputError(f"'{out / SEALED}': cannot be written: {cause_of(error)}.") from error
         write_whole(out / SEALED / SECRET, (json.dumps(dc.asdict(kept), indent=2) + "\n").encode("utf-8"))
     if (kind, effect) != (kept.kind, kept.effect) or seed not in (None, kept.seed) or (by_seed and kept.salt):
         raise _other(out)

@@ -12,6 +12,7 @@ from physid_drake.recording import Box, Cylinder, Prism, is_convex, outline_dist
 from physid_drake.validation.worlds.shapes import Array, Solid, gyration_squared, height_of, outline_of
 from physid_drake.validation.worlds.world_plan import Plan
 
+RINGS: Final = 4
 _FOOT_APART: Final = 0.0075
 """m between feet under an outline with notches, about: as many feet as under others. Of fewer, the world's own torque
 is off by percents as it turns about a place beside one, which a diagnosis sees."""
@@ -76,8 +77,8 @@ def _grid_feet(shape: Box) -> tuple[Array, Array]:
     return np.column_stack([axis.ravel() for axis in grid]), np.full(nx * ny, 1.0 / (nx * ny))
 
 
-def _ring_feet(radius: float, rings: int = 4) -> tuple[Array, Array]:
-    counts = 6 * np.arange(1, rings + 1)
+def _ring_feet(radius: float) -> tuple[Array, Array]:
+    counts = 6 * np.arange(1, RINGS + 1)
     edges = np.sqrt(np.concatenate([[0], np.cumsum(counts)]) / counts.sum()) * radius
     places = []
     for ring, count in enumerate(counts.tolist()):

@@ -11,68 +11,40 @@ from __future__ import annotations
 import argparse
 import functools
 import json
-import math
 import shutil
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Final, Literal, TypeAlias, get_args
+from typing import Final
 
 import numpy as np
 
-from physid_drake.errors import ConfigError, ParameterError, PhysidError, ProofError
+from physid_drake.errors import ConfigError, PhysidError, ProofError
 from physid_drake.processes import in_processes
-from physid_drake.recording import (
-    Recording,
-    write_recording,
-)
-from physid_drake.run_folder import RunFolder, write_whole
+from physid_drake.recording import Recording, write_recording
+from physid_drake.run_folder import RunFolder
 from physid_drake.validation.sealing.seal import LINES, RECORDING, SEALED, TOTAL, files_digest, write_seal
 from physid_drake.validation.sealing.secret import Secret, keep_secret, name_by_seed
 from physid_drake.validation.worlds.contact import RESIDUAL_RESTITUTION
 from physid_drake.validation.worlds.effects.catalogue import CATALOGUED, OTHERS
 from physid_drake.validation.worlds.effects.effect import Effect, parameters_of
-from physid_drake.validation.worlds.feet import stays_loaded
 from physid_drake.validation.worlds.floor import floor_of
-from physid_drake.validation.worlds.knobs import Knob, draw_knob
-from physid_drake.validation.worlds.mujoco_world import PushWorld
+from physid_drake.validation.worlds.mix import KINDS, Assignment, Kind, assign
 from physid_drake.validation.worlds.scene import Rng, Scene, draw_scene
 from physid_drake.validation.worlds.sensing import record, recording_of
 from physid_drake.validation.worlds.shapes import Array
+from physid_drake.validation.worlds.strengths import difference, draw_effects, loaded, simulate, stands
 from physid_drake.validation.worlds.world_plan import Motion
+from physid_drake.whole_files import write_whole
 
 COMMAND: Final = "prove"
 """Whose the folder is, also one that is made by hand."""
 RECORDINGS: Final = "recordings"
-Kind: TypeAlias = Literal["none", "effect", "other", "pair", "notched"]
-KINDS: Final[tuple[Kind, ...]] = get_args(Kind)
-BLOCK: Final[tuple[Kind, ...]] = ("none",) * 5 + ("effect",) * 10 + ("other",) * 3 + ("pair",) * 2
-"""Each twenty worlds are these, shuffled."""
-SIZES: Final = (2.0, 30.0)
-"""Drawn sizes of effects, in standard deviations of the tracker."""
-GRAINS: Final = {"anisotropic_table", "anisotropic_object"}
-"""Never in one world: MuJoCo's contacts have one grain."""
 SMALLEST_SIZE: Final = 1.0
 """A world whose effect cannot reach this within its bounds is drawn anew, a few times."""
-
-STILL: Final = 1e-4
-"""What moves by more without a hand does not stand [m]: such a world is drawn anew, too."""
-
-_CALIBRATION_PUSHES: Final = 4
-_CALIBRATION_ROUNDS: Final = 3
 _ATTEMPTS: Final = 4
-
-
-@dataclass(frozen=True, kw_only=True)
-class Assignment:
-    """What world ``index`` shall be: its kind, the names of its effects, and whether its object has notches."""
-
-    index: int
-    kind: Kind
-    effects: tuple[str, ...]
-    notched: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,42 +55,6 @@ class DrawnWorld:
     scene: Scene
     effects: tuple[Effect, ...]
     sizes: tuple[float, ...]
-
-
-def assign(index: int, seed: int, kind: Kind | None = None, effect: str | None = None) -> Assignment:
-    """The mix: a quarter nothing, half one effect of the catalogue in turn, the rest others and pairs.
-
-    Args:
-        index: of the world.
-        seed: of the whole set.
-        kind: instead of the mix; of ``notched``, objects are a T, an L or a plus, and worlds have one effect or none.
-        effect: instead of taking effects in turn; for a pair, its first.
-    """
-    if kind == "notched":
-        # Every fourth without an effect: what the outline alone does must be no mismatch.
-        plain = index % 4 == 3
-        return replace(assign(index, seed, "none" if plain else "effect", None if plain else effect), notched=True)
-    block, within = divmod(index, len(BLOCK))
-    kinds = [BLOCK[k] for k in np.random.default_rng([seed, block, 1]).permutation(len(BLOCK)).tolist()]
-    if effect is not None and kind is None:
-        kind = "effect" if effect in CATALOGUED else "other"
-    chosen = kinds[within] if kind is None else kind
-    turn = index if kind is not None else block * BLOCK.count(chosen) + kinds[:within].count(chosen)
-    if chosen == "none":
-        return Assignment(index=index, kind=chosen, effects=())
-    pool = list(OTHERS if chosen == "other" else CATALOGUED)
-    order = np.random.default_rng([seed, 2, chosen == "other"]).permutation(len(pool)).tolist()
-    first = effect if effect is not None else pool[order[turn % len(pool)]]
-    if first not in pool:
-        raise ParameterError(f"no effect {first!r} of kind {chosen}; there are {', '.join(pool)}.")
-    if chosen != "pair":
-        return Assignment(index=index, kind=chosen, effects=(first,))
-    rest = [name for name in pool if name != first]
-    drawn = int(np.random.default_rng([seed, index, 3]).integers(len(rest)))
-    second = rest[drawn]
-    if {first, second} == GRAINS:
-        second = rest[(drawn + 1) % len(rest)]
-    return Assignment(index=index, kind=chosen, effects=(first, second))
 
 
 def make_world(
@@ -136,7 +72,7 @@ def make_world(
     drawn, rng = draw_world(index, seed, kind, effect)
     scene, effects = drawn.scene, drawn.effects
     motions = simulate(scene, effects)
-    size = _difference(scene, motions, simulate(scene, ())) if effects else 0.0
+    size = difference(scene, motions, simulate(scene, ())) if effects else 0.0
     name = name_by_seed(index, seed) if name is None else name
     pushes = [record(rng, scene, k, motion) for k, motion in enumerate(motions)]
     recording = recording_of(name, scene, [push for push, _ in pushes], _lags(effects))
@@ -150,8 +86,8 @@ def draw_world(index: int, seed: int, kind: Kind | None = None, effect: str | No
     for attempt in range(_ATTEMPTS):
         rng = np.random.default_rng([seed, index, 4, attempt])
         scene = draw_scene(rng, notched=chosen.notched)
-        effects, sizes = _draw_effects(rng, scene, chosen.effects)
-        if all(size >= SMALLEST_SIZE for size in sizes) and _loaded(scene, effects) and stands(scene, effects):
+        effects, sizes = draw_effects(rng, scene, chosen.effects)
+        if all(size >= SMALLEST_SIZE for size in sizes) and loaded(scene, effects) and stands(scene, effects):
             break
     return DrawnWorld(chosen=chosen, scene=scene, effects=tuple(effects), sizes=tuple(sizes)), rng
 
@@ -167,99 +103,6 @@ def _floor(scene: Scene, effects: Sequence[Effect], recording: Recording) -> dic
 
 def _lags(effects: Sequence[Effect]) -> bool:
     return any(effect.name == "actuator_lag" for effect in effects)
-
-
-# -------------------------------------------------------------------------------------------------- effects' strength
-
-
-def simulate(scene: Scene, effects: Sequence[Effect], which: Sequence[int] | None = None) -> list[Motion]:
-    """Noise-free motions of some pushes of a scene, or of all."""
-    world = PushWorld(scene.plan, effects, pushes=len(scene.pushes))
-    chosen = range(len(scene.pushes)) if which is None else which
-    return [
-        world.run(
-            scene.pushes[k].pose,
-            scene.pushes[k].path,
-            push=k,
-            friction_factor=scene.pushes[k].friction_factor,
-            sample_time=1.0 / scene.rate,
-            rest=scene.pushes[k].rest,
-        )
-        for k in chosen
-    ]
-
-
-def _loaded(scene: Scene, effects: Sequence[Effect]) -> bool:
-    """Whether every foot carries weight with both of two effects, each of which leaves it some."""
-    if len(effects) < 2:
-        return True
-    return stays_loaded(functools.reduce(lambda plan, effect: effect.build(plan), effects, scene.plan))
-
-
-def stands(scene: Scene, effects: Sequence[Effect], seconds: float = 0.2) -> bool:
-    """Whether the object rests where each push begins: effects may drag it away."""
-    world = PushWorld(scene.plan, effects, pushes=len(scene.pushes))
-    for k, push in enumerate(scene.pushes):
-        motion = world.run(push.pose, None, push=k, friction_factor=push.friction_factor, duration=seconds)
-        if float(np.linalg.norm(motion.true_poses[-1, :2] - np.array(push.pose[:2]))) > STILL:
-            return False
-    return True
-
-
-def _draw_effects(rng: Rng, scene: Scene, names: Sequence[str]) -> tuple[list[Effect], list[float]]:
-    effects, sizes = [], []
-    for name in names:
-        target = float(np.exp(rng.uniform(*np.log(SIZES))))
-        effect, size = _calibrate(scene, draw_knob(name, rng, scene), target)
-        effects.append(effect)
-        sizes.append(size)
-    return effects, sizes
-
-
-def _calibrate(scene: Scene, knob: Knob, target: float) -> tuple[Effect, float]:
-    """Sets a strength so that the effect moves the object by ``target`` standard deviations, within its bounds."""
-    count = len(scene.pushes)
-    # Drift grows with the order of pushes, and patches may lie beside some, so they are spread over the recording.
-    which = sorted(set(np.linspace(0, count - 1, _CALIBRATION_PUSHES).round().astype(int).tolist()))
-    plain = simulate(scene, (), which)
-    strength, known = 0.3 * knob.limit, [(0.0, 0.0)]
-    for _ in range(_CALIBRATION_ROUNDS):
-        size = _difference(scene, simulate(scene, (knob.at(strength),), which), plain)
-        known.append((strength, size))
-        if abs(math.log(max(size, 1e-9) / target)) < 0.1:
-            break
-        following = min(knob.limit, max(1e-4 * knob.limit, strength * _step(known, target)))
-        if following == strength:
-            break
-        strength = following
-    # The last step is not simulated again; the nearest that was is.
-    strength, size = min(known[1:], key=lambda pair: abs(math.log(max(pair[1], 1e-9) / target)))
-    return knob.at(strength), size
-
-
-def _step(known: Sequence[tuple[float, float]], target: float) -> float:
-    """Factor on the strength: a secant in logarithms, and at first proportional."""
-    strength, size = known[-1]
-    power = 1.0
-    if len(known) > 2 and min(size, known[-2][1]) > 1e-6 and known[-2][0] != strength:
-        power = math.log(size / known[-2][1]) / math.log(strength / known[-2][0])
-    return float(np.clip((target / max(size, 1e-6)) ** (1.0 / float(np.clip(power, 0.4, 3.0))), 0.02, 30.0))
-
-
-def _difference(scene: Scene, motions: Sequence[Motion], plain: Sequence[Motion]) -> float:
-    """Rms over samples, x, y and yaw, in the tracker's deviations, of motion since the start of each push."""
-    deviations = np.array([scene.noise.position, scene.noise.position, scene.noise.rotation])
-    squares = []
-    for one, other in zip(motions, plain, strict=True):
-        length = max(len(one.poses), len(other.poses))
-        moved, still = (_padded(motion.poses, length) - motion.poses[0] for motion in (one, other))
-        squares.append(((moved - still) / deviations) ** 2)
-    return float(np.sqrt(np.concatenate(squares).mean()))
-
-
-def _padded(poses: Array, length: int) -> Array:
-    """The poses, with the last one repeated: what rests stays."""
-    return np.concatenate([poses, np.repeat(poses[-1:], length - len(poses), axis=0)])
 
 
 def _truth(
@@ -287,9 +130,6 @@ def _truth(
         "rested": [motion.rested for motion in motions],
         "noise_free_poses": {f"pushes/{k + 1:03d}.csv": np.round(rows, 8).tolist() for k, rows in enumerate(poses)},
     }
-
-
-# -------------------------------------------------------------------------------------------------------- the folder
 
 
 def make(

@@ -61,19 +61,18 @@ class PushWorld:
         effects: Sequence[Effect] = (),
         *,
         pushes: int = 1,
-        time_step: float = TIME_STEP,
     ) -> None:
         """Build the world of ``plan`` with ``effects``; those whose parameters are null are left out."""
         self._effects = tuple(effect for effect in effects if not effect.is_null)
         for effect in self._effects:
             plan = effect.build(plan)
-        self.plan, self._pushes, self._dt = plan, pushes, time_step
+        self.plan, self._pushes, self._dt = plan, pushes, TIME_STEP
         self._friction_laws = [e.friction for e in self._effects if type(e).friction is not Effect.friction]
         self._wrenches = [e.wrench for e in self._effects if type(e).wrench is not Effect.wrench]
         self._turn = plan.table_grain.angle if plan.table_grain is not None else 0.0
         self._feet, self._weights = weighted_feet(plan)
         self._mujoco = load_mujoco()
-        self._model = self._mujoco.MjModel.from_xml_string(world_xml(plan, self._feet, self._weights, time_step))
+        self._model = self._mujoco.MjModel.from_xml_string(world_xml(plan, self._feet, self._weights, TIME_STEP))
         self._state = self._mujoco.MjData(self._model)
         self._adjust()
 

@@ -12,18 +12,19 @@ import pytest
 
 from physid_drake import run_cell
 from physid_drake.cli import main
-from physid_drake.door import NUMBER, enter
+from physid_drake.command import NUMBER, run_command
 from physid_drake.errors import ConfigError
+from physid_drake.process_start import is_interruption
 from physid_drake.resources import shipped
-from physid_drake.starting import is_interruption
 
 ERASER = str(shipped("recordings") / "eraser_reference")
 
 
 def ends(code, *, shell="", **words):
-    """A command that runs ``code`` and ends with ``enter``: the finished process."""
+    """A command that runs ``code`` and ends with ``run_command``: the finished process."""
     script = (
-        f"import sys; from physid_drake.door import enter\ndef run():\n    {code}\n    return 0\nsys.exit(enter(run))"
+        f"import sys; from physid_drake.command import run_command\ndef run():\n    {code}\n    return 0\n"
+        "sys.exit(run_command(run))"
     )
     argv = ["bash", "-c", f'exec "$0" -c "$1" {shell}', sys.executable, script]
     return subprocess.run(argv, check=False, capture_output=True, text=True, timeout=60, **words)
@@ -33,7 +34,7 @@ def test_a_refusal_is_one_line_of_a_length_that_can_be_read_without_control_char
     def refuse():
         raise ConfigError("the name \x1b[2J\x07\udc80 " + 70_000 * "x" + "\n is wrong")
 
-    assert enter(refuse) == 1
+    assert run_command(refuse) == 1
     said = capsys.readouterr().err
     assert said.startswith("error: the name \\x1b[2J") and said.endswith("is wrong\n")
     assert said.count("\n") == 1 and len(said) < 2000 and said[:-1].isprintable()
@@ -71,7 +72,10 @@ def test_a_terminal_that_knows_only_ascii_gets_all_that_it_can_show():
 
 def test_a_working_folder_that_is_gone_is_one_line(tmp_path):
     (tmp_path / "gone").mkdir()
-    script = "import os, sys; from physid_drake.door import enter; os.rmdir(os.getcwd()); sys.exit(enter(lambda: 0))"
+    script = (
+        "import os, sys; from physid_drake.command import run_command; "
+        "os.rmdir(os.getcwd()); sys.exit(run_command(lambda: 0))"
+    )
     done = subprocess.run(
         [sys.executable, "-c", script], check=False, capture_output=True, text=True, cwd=tmp_path / "gone"
     )
@@ -82,15 +86,15 @@ def test_too_little_memory_is_one_line(capsys):
     def run():
         raise MemoryError
 
-    assert enter(run) == 1
+    assert run_command(run) == 1
     assert capsys.readouterr().err == "error: there is not enough memory for this.\n"
 
 
 def test_an_error_that_nobody_foresaw_is_not_hidden():
     with pytest.raises(ZeroDivisionError):
-        enter(lambda: 1 // 0)
+        run_command(lambda: 1 // 0)
     with pytest.raises(ImportError):
-        enter(lambda: __import__("no_such_module"))
+        run_command(lambda: __import__("no_such_module"))
 
 
 def test_ctrl_c_is_behind_what_a_compiled_module_makes_of_it():
@@ -107,7 +111,7 @@ def test_ctrl_c_is_behind_what_a_compiled_module_makes_of_it():
 def test_ctrl_c_in_a_callback_of_an_import_is_not_lost_and_no_traceback():
     code = """
 import weakref
-from physid_drake.starting import begin
+from physid_drake.process_start import begin
 class Lock: pass
 def callback(_): raise KeyboardInterrupt
 begin()
@@ -195,8 +199,8 @@ def test_processes_that_work_for_a_command_run_nothing_of_the_working_folder(tmp
     for name in ("joblib", "contextlib", "threading", "random"):
         (tmp_path / f"{name}.py").write_text(f"open('ran_{name}', 'w')")
     script = (
-        "import sys; from joblib import Parallel, delayed; from physid_drake.door import enter\n"
-        "sys.exit(enter(lambda: len(Parallel(n_jobs=2)(delayed(abs)(k) for k in range(4))) - 4))"
+        "import sys; from joblib import Parallel, delayed; from physid_drake.command import run_command\n"
+        "sys.exit(run_command(lambda: len(Parallel(n_jobs=2)(delayed(abs)(k) for k in range(4))) - 4))"
     )
     done = subprocess.run([sys.executable, "-P", "-c", script], check=False, capture_output=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any, Final, NoReturn, TextIO
 
 from physid_drake.errors import ConfigError, PhysidError
-from physid_drake.starting import is_interruption
-from physid_drake.wording import in_one_line, shown
+from physid_drake.process_start import is_interruption
+from physid_drake.wording import cause_of, in_one_line, shown
 
-DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130  # exit status
+DONE, FAILED, INTERRUPTED = 0, 1, 130  # exit status; 2 is argparse's, of a wrong command line
 NUMBER: Final = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 """What begins with a dash and is no flag; argparse alone takes -1e-1 for one."""
 _GONE: Final = (errno.EBADF, errno.EPIPE)  # whoever read standard output
@@ -46,12 +46,11 @@ def path(text: str) -> Path:
     except (FileNotFoundError, NotADirectoryError, PermissionError):
         pass
     except (OSError, ValueError) as error:
-        cause = getattr(error, "strerror", None) or str(error)
-        raise argparse.ArgumentTypeError(f"{shown(text)} is no path: {cause}.") from error
+        raise argparse.ArgumentTypeError(f"{shown(text)} is no path: {cause_of(error)}.") from error
     return Path(text)
 
 
-def enter(run: Callable[[], int], *, interrupted: str = "interrupted") -> int:
+def run_command(run: Callable[[], int], *, interrupted: str = "interrupted") -> int:
     """Run a command to its end.
 
     Args:
@@ -75,7 +74,7 @@ def enter(run: Callable[[], int], *, interrupted: str = "interrupted") -> int:
         return _failed("there is not enough memory for this.")
     except OSError as error:
         if error.filename is not None:  # a folder that may not be looked into, say
-            return _failed(f"'{error.filename}': {error.strerror or error}.")
+            return _failed(f"'{error.filename}': {cause_of(error)}.")
         if not _is_of_output(error):
             raise
         return _without_output(error)
