@@ -120,6 +120,7 @@ def test_every_effect_is_here():
     assert set(SOME) == set(EVERY)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY)
 def test_a_world_turned_by_a_quarter_goes_the_same_way(name):
     x, y, yaw = POSE
@@ -143,6 +144,7 @@ def relabelled(name, parameters):
     return parameters
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*sorted(OF_OBJECT), "other_heading_friction", "size_error"])
 def test_axes_of_the_object_may_be_chosen_otherwise(name):
     x, y, yaw = POSE

@@ -141,6 +141,7 @@ def test_an_interrupted_experiment_keeps_what_is_done(counted, tmp_path):
     assert made(counted) == [0, 1, 2, 3]
 
 
+@pytest.mark.slow
 def test_records_do_not_depend_on_the_number_of_jobs(counted, tmp_path):
     one, two = run_in(tmp_path / "one", counted), run_in(tmp_path / "two", counted, jobs=2)
     assert [r["value"] for r in one] == [r["value"] for r in two]
@@ -182,6 +183,7 @@ def test_every_method_keeps_to_its_budget_and_repeats_itself(method):
     assert best[-1] == trials.misfits.min()
 
 
+@pytest.mark.slow
 def test_least_squares_and_greedy_entropy_search_find_what_random_search_does_not():
     def distance(method, seed):
         trials = search_trials(method, bowl, log_rms, SPACE, budget=20, rng=np.random.default_rng(seed))
