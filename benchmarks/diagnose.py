@@ -51,7 +51,7 @@ def main():
     console.print(shown(f"{len(outcomes)} worlds of {len(folders)} proofs", MAIN, table(figures)))
     console.print(shown("single effects by size", POWER, power_table(figures)))
     console.print(shown("answers that are not right", FAULTS, rows))
-    console.print(no_nearer(outcomes))
+    console.print(nearness(outcomes))
     told = {name: answer for folder in folders for name, answer in answers(folder).items()}
     chances = [told[o.id][0] for o in outcomes if o.kind == "none" and o.id in told]
     below = ", ".join(f"below {a:g}: {sum(p < a for p in chances)}" for a in LEVELS)
@@ -63,16 +63,15 @@ def main():
         )
 
 
-def no_nearer(outcomes):
-    """Of answers with a name, right or not: with how many held-out pushes are predicted no nearer than without it."""
-    named = [o for o in outcomes if o.classes and o.verdict in ("explained", "ambiguous")]
-    right = [o for o in named if o.fault is None]
-    away = [o for o in named if not o.held_out.rms[1] <= o.held_out.rms[0]]
-    wrong, wrongly = len(named) - len(right), sum(o.fault is not None for o in away)
-    return (
-        f"held-out pushes are predicted no nearer with what was named: {len(away) - wrongly} of {len(right)} right"
-        f" answers, {wrongly} of {wrong} others"
-    )
+def nearness(outcomes):
+    """Held-out error of answers with a name over that of the baseline model: of right ones, and of all others."""
+    ratios = {True: [], False: []}
+    for one in outcomes:
+        if one.classes and one.verdict in ("explained", "ambiguous"):
+            ratios[one.fault is None].append(one.held_out.rms[1] / one.held_out.rms[0])
+    said = [f"{name} {len(r)} at most {max(r):.2f}, above 1 in {sum(x > 1.0 for x in r)}" if r else f"{name} 0"
+            for name, r in zip(("right answers", "others"), (ratios[True], ratios[False]), strict=True)]  # fmt: skip
+    return f"held-out error with what was named, over the baseline's: {'; '.join(said)}"
 
 
 def made(worlds, seed):

@@ -129,11 +129,6 @@ def _nothing_claimed(found: Found, most: float) -> Decision:
     return Decision(verdict="underpowered" if found.rare else "consistent")
 
 
-def is_nearer(after: Accuracy, before: Accuracy) -> bool:
-    """Whether held-out pushes are predicted nearer: their poses, or the hand's force."""
-    return after.rms <= before.rms or after.force < before.force
-
-
 def is_own_error(left_out: Accuracy) -> bool:
     """Whether held-out errors are no larger than the difference between two simulators: no missing physics."""
     # A yaw that was not measured is left out of it.

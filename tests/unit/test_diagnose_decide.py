@@ -11,7 +11,6 @@ from physid_drake.diagnose.decide import (
     LITTLE,
     MOST_NOISE_SCALE,
     decided,
-    is_nearer,
     probability,
     refuted,
     surely_better,
@@ -148,14 +147,6 @@ def test_a_part_with_which_held_out_pushes_are_nearer_keeps_a_mismatch():
     assert (seen.verdict, seen.best) == ("unexplained", nameless)
     answer = refuted(everything, seen, most=MOST_NOISE_SCALE, partly=True)
     assert (answer.verdict, answer.best, answer.partly) == ("unexplained", None, seen.partly)
-
-
-@pytest.mark.parametrize(("poses", "force", "nearer"), [
-    (1.0, math.nan, False), (0.8, math.nan, True), (1.0, 0.2, False), (1.0, 0.1, True),
-])  # fmt: skip
-def test_nearer_is_said_of_poses_or_of_forces(poses, force, nearer):
-    before = SimpleNamespace(rms=0.9, force=0.15 if math.isfinite(force) else math.nan)
-    assert is_nearer(SimpleNamespace(rms=poses, force=force), before) == nearer
 
 
 def test_two_pushes_are_too_few():
