@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from physid_drake.diagnose.decide import FEWEST_PUSHES
 from physid_drake.diagnose.values import Diagnosis, NextPush
 from physid_drake.report.numbers import chance, fixed, number, tiny
 
@@ -18,12 +19,19 @@ def answers(diagnosis: Diagnosis) -> list[tuple[str, str]]:
     return [*found, ("What now?", _what_now(diagnosis)), ("May I trust it?", _trust(diagnosis))]
 
 
+def is_unconfirmed(d: Diagnosis) -> bool:
+    """Whether a verdict is not conclusive because the errors are rare by chance, and no effect is confirmed."""
+    return d.verdict == "underpowered" and d.p_value < d.alpha and d.pushes >= FEWEST_PUSHES
+
+
 def _how_sure(d: Diagnosis) -> str:
     p_value = f"p {'< 1e-300' if d.p_value <= 0.0 else '= ' + tiny(d.p_value)}"
     if d.verdict == "consistent":
         return (
             f"The errors of the baseline model are noise ({p_value}; a mismatch is claimed below {number(d.alpha)})."
         )
+    if is_unconfirmed(d):
+        return f"Not conclusive: chance hardly leaves such errors ({p_value}), but held-out pushes confirm no effect."
     if d.verdict == "underpowered":
         return f"Not conclusive: the pushes are too few, or move too little ({p_value})."
     said = f"Baseline model: {p_value} (a mismatch is claimed below {number(d.alpha)})."
@@ -45,6 +53,8 @@ def _what_now(d: Diagnosis) -> str:
             return f"{_next(d.next_push)} Until then, {use}"
         case "consistent":
             return "Use the baseline model in model.yaml. The smallest detectable effects are listed below."
+        case "underpowered" if is_unconfirmed(d):
+            return "Repeat the pushes with the largest errors, and record more, at other speeds and headings."
         case "underpowered":
             return "Record more pushes: faster, longer, with several headings, and repeat some."
     without = " model.yaml has an unnamed force instead." if d.with_it else ""

@@ -27,7 +27,7 @@ from physid_drake.diagnose.values import (
 from physid_drake.diagnose.wrench_patterns import SAID
 from physid_drake.effects import effect_named
 from physid_drake.recording import Recording
-from physid_drake.report.answers import answers
+from physid_drake.report.answers import answers, is_unconfirmed
 from physid_drake.report.diagnosis import held_out_figures, noise_known
 from physid_drake.report.diagnosis_figures import (
     arrow_figure,
@@ -71,6 +71,7 @@ MEANING = {
     "unexplained": "The mismatch is significant, and no effect of the catalogue reduces it to noise.",
     "underpowered": "These pushes are too few, or move too little, to show an effect of ordinary size.",
 }
+UNCONFIRMED = "The baseline model is unlikely, but no effect is confirmed by held-out pushes."
 DOFS = {"along_motion": "along the motion", "across_motion": "across the motion", "rotation": "in rotation"}
 MOST_ERRORS, MOST_STRIPS, MOST_RANKED = 4, 8, 8  # shown before the reader asks for more
 
@@ -141,7 +142,7 @@ def _content(diagnosis: Diagnosis, recording: Recording, view: TableView) -> dic
         "d": diagnosis,
         "colours": {"ink": INK, "before": BEFORE, "after": AFTER, "contact": CONTACT, "free": FREE},
         "badge": BADGES.get(diagnosis.verdict, MUTED),
-        "meaning": MEANING.get(diagnosis.verdict, ""),
+        "meaning": UNCONFIRMED if is_unconfirmed(diagnosis) else MEANING.get(diagnosis.verdict, ""),
         "pushes": _share(len(recording.pushes), diagnosis.pushes),
         "found": [_finding(e, k, view) for k, e in enumerate(diagnosis.effects)],
         "phases": [] if diagnosis.location is None else [SAID.get(p, p) for p in diagnosis.location.phase],

@@ -38,6 +38,12 @@ def test_what_to_do_follows_from_the_verdict(verdict, now):
     assert now in told["What now?"] and ("Where?" in told) == placed
 
 
+@pytest.mark.parametrize(("p_value", "pushes", "known"), [(1e-6, 8, True), (0.3, 8, False), (1e-6, 2, False)])
+def test_errors_that_chance_hardly_leaves_are_not_put_down_to_too_few_pushes(p_value, pushes, known):
+    told = said(verdict="underpowered", location=None, effects=(), p_value=p_value, pushes=pushes)
+    assert ("too few" in told["How sure is that?"]) != known and ("Repeat the pushes" in told["What now?"]) == known
+
+
 def test_rivals_without_a_push_that_tells_them_apart_ask_for_other_pushes():
     assert "Record other pushes" in said(verdict="ambiguous", next_push=None)["What now?"]
 
