@@ -76,7 +76,7 @@ class Body:
 
 
 def bodies_of(columns: Columns) -> list[Body]:
-    """Bodies that have a place, and sensors of a force, in the order of the columns."""
+    """Bodies that have a place, sensors of a force, and a rotation without a name, in the order of the columns."""
     bodies: dict[str, Body] = {}
     for (owner, quantity), axes in _groups(columns).items():
         body = bodies.setdefault(owner, Body(name=owner or "?"))
@@ -90,13 +90,15 @@ def bodies_of(columns: Columns) -> list[Body]:
     for body in bodies.values():
         if len(body.rotation) == 4:
             body.kind, body.sure = _order_of(body.rotation, body.position, columns)
-    return [body for body in bodies.values() if body.position or body.force]
+    nameless = bodies.get("")
+    return [body for body in bodies.values() if body.position or body.force or (body is nameless and body.rotation)]
 
 
 def up_of(place: Sequence[str], columns: Columns) -> int | None:
-    """The axis along which a body hardly moves; None where no height was measured."""
+    """The axis along which a body hardly moves, or that is missing between two; None if that is not known."""
     if len(place) < 3:
-        return None
+        letters = [match["axis"].lower()[-1] for name in place if (match := _AXIS.match(_unit_of(name, columns)[0]))]
+        return 1 if letters == ["x", "z"] else None
     values = _filled(place, columns)
     return int(np.argmin(_ways(values))) if len(values) else None
 
@@ -184,7 +186,7 @@ def _read_named(body: Body, quantity: str, axes: _Found, columns: Columns) -> No
     if quantity == "turn":
         body.rotation, body.kind, body.order = (letters if len(letters) == 3 else []), "euler", "XYZ"
         return
-    body.position = letters or _in_order(axes, ("tx", "ty", "tz"))
+    body.position = letters or _in_order(axes, ("tx", "ty", "tz")) or _in_order(axes, "xz")
     for kind, wanted in (
         ("wxyz", ("qx", "qy", "qz", "qw")),
         ("euler", ("yaw", "pitch", "roll")),

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from physid_drake.convert.units import UNITS
 from physid_drake.errors import RecordingError
 from physid_drake.wording import shown
 
 Array = NDArray[np.float64]
 
+_BRACKETED: Final = re.compile(r"[\[(]([^\[\]()]+)[\])]\s*$")
 MOST_NAMED = 3
 """Names offered where one is unknown."""
 
@@ -59,6 +63,13 @@ class Columns:
         if name in self.unread:
             raise RecordingError(f"column {shown(name)} cannot be read: {self.unread[name]}.")
         raise RecordingError(f"{self.source} has no column {shown(name)}; {self._offer(name)}")
+
+    def unit_of(self, name: str) -> str | None:
+        """The unit of a column that a map means: of a line of the header, or in brackets at the end of its name."""
+        found = self.find(name)
+        bracketed = _BRACKETED.search(found)
+        inside = bracketed[1].strip() if bracketed else None
+        return self.units.get(found) or (inside if inside in UNITS else None)
 
     def stack(self, names: Sequence[str]) -> Array:
         """Columns (n, k) side by side.

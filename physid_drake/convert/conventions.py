@@ -16,6 +16,9 @@ from physid_drake.errors import RecordingError
 
 Array = NDArray[np.float64]
 
+TILTED = 1e-9
+"""Cosine of an axis that is up, less than 1 by rounding alone."""
+
 
 def rotation_of(turn: Turn, values: Array, scale: float, world: World) -> Rotation:
     """Rotations R_SM (n) as matrices in the log's own coordinates.
@@ -64,6 +67,21 @@ def _of_matrices(matrices: Array) -> Rotation:
     if (np.linalg.det(matrices) < 0.0).any():
         raise RecordingError("its matrices mirror (determinant -1); are the axes of the source left-handed?")
     return Rotation.from_matrix(matrices)
+
+
+def in_space(values: Array, world: World) -> Array:
+    """Vectors (n, 3) of S of which all coordinates were measured, or two (n, 2), along its axes that are not up.
+
+    Raises:
+        RecordingError: if there are two, and no axis of S is up.
+    """
+    if values.shape[1] == 3:
+        return values
+    vertical = np.abs((rotation_wxyz(world.rotation).as_matrix() @ world.axes)[2])
+    up = int(np.argmax(vertical))
+    if vertical[up] < 1.0 - TILTED:
+        raise RecordingError("two columns lie in the table's plane, but no axis of the log is up; give three.")
+    return np.asarray(np.insert(values, up, 0.0, axis=1))
 
 
 def places_in_world(positions: Array, world: World) -> Array:

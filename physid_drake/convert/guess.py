@@ -83,6 +83,9 @@ def _guess_table(source: Path) -> Guess:
     rows += [(name, "", "", "not read", "") for name in columns.unread]
     bodies = bodies_of(columns)
     body, hand, force = _roles(bodies, columns)
+    nameless = next((one for one in bodies if not one.position and one.rotation), None)
+    if body is not None and nameless is not None and not body.rotation:
+        body.rotation, body.kind, body.order = nameless.rotation, nameless.kind, nameless.order
     doubt = _set_units([one for one in (body, hand) if one is not None], columns)
     lines = [*_head(source, body, columns, hand is not None)]
     if time is None:
@@ -209,6 +212,8 @@ def _world_lines(body: Body, columns: Columns) -> list[str]:
     if up is None:
         return []
     axes = {0: "[y, z, x]", 1: "[z, x, y]", 2: "[x, y, z]"}[up]
+    if len(body.position) < len("xyz"):
+        return [f"# The object has no {'xyz'[up]}, which is taken for up.", f"world: {{axes: {axes}}}"]
     height = float(np.median(values[:, up]))
     return [
         f"# {'xyz'[up]} of the object changes least, and is taken for up. It is {height:.4g} m: unless that is",
@@ -252,7 +257,8 @@ def _pose_lines(key: str, body: Body | None, columns: Columns, doubt: str, time:
         lines.append(f"  rotation: {{columns: {_list(body.rotation)}, as: {body.kind}}}{other}")
     else:
         values = np.concatenate([columns.numbers[name] for name in body.rotation])
-        unit = "deg" if np.nanmax(np.abs(values), initial=0.0) > 2.5 * np.pi else "rad"
+        likely = "deg" if np.nanmax(np.abs(values), initial=0.0) > 2.5 * np.pi else "rad"
+        unit = columns.unit_of(body.rotation[0]) or likely
         order = f", order: {body.order}" if body.kind == "euler" else ""
         lines.append(
             f"  rotation: {{columns: {_list(body.rotation)}, as: {body.kind}{order}, unit: {unit}}}   # deg or rad?"

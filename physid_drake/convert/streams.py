@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from physid_drake.convert.columns import Array, Columns
 from physid_drake.convert.conventions import (
     forces_in_world,
+    in_space,
     places_in_world,
     rotation_of,
     rotations_in_world,
@@ -173,10 +174,8 @@ def pose_stream(times: Array, place: Array, rotation: Rotation | None, pose: Pos
         kind = "none"
     elif pose is chart.object and pose.turn is not None and pose.turn.kind == "yaw":
         kind = "yaw"
-    if place.shape[1] == 2:
-        place = np.column_stack([place, np.zeros(len(place))])
     world = chart.world_of(pose)
-    positions = places_in_world(place, world)
+    positions = places_in_world(in_space(place, world), world)
     turned = None if rotation is None else rotations_in_world(rotation, world)
     positions, turned = with_offset(positions, turned, pose.offset)
     if pose.height is not None:
@@ -190,17 +189,16 @@ def _forces(columns: Columns, force: ForceMap, hand: PoseStream | None, chart: M
     if not force.force.columns:
         raise RecordingError("it needs columns; a topic is a bag's.")
     times = _times(columns, force.clock, chart)
-    values = _scaled(columns, force.force, FORCES, "N")
+    world = chart.world_of(force)
+    values = in_space(_scaled(columns, force.force, FORCES, "N"), World() if force.in_hand else world)
     seen = np.isfinite(values).all(axis=1) & np.isfinite(times)
     if not seen.any():
         raise RecordingError("no row has all of its columns filled.")
     times, values = times[seen], values[seen]
-    if values.shape[1] == 2:
-        values = np.column_stack([values, np.zeros(len(values))])
     order = _order(times)
     times, values = times[order], values[order]
     turns = _turns_at(times, hand) if force.in_hand and hand is not None else None
-    return ForceStream(times=times, forces=forces_in_world(values, force, turns, chart.world_of(force)))
+    return ForceStream(times=times, forces=forces_in_world(values, force, turns, world))
 
 
 def _times(columns: Columns, clock: Clock, chart: Map) -> Array:
@@ -221,14 +219,13 @@ def _times(columns: Columns, clock: Clock, chart: Map) -> Array:
 
 def _scaled(columns: Columns, quantity: Quantity, kind: Mapping[str, float], default: str) -> Array:
     values = columns.stack(quantity.columns)
-    names = [columns.find(name) for name in quantity.columns]
-    stated = {columns.units[name] for name in names if name in columns.units}
+    stated = {unit for unit in map(columns.unit_of, quantity.columns) if unit is not None}
     if kind is LENGTHS and not stated and columns.length is not None:
         stated = {columns.length}
     if quantity.unit is None and len(stated) > 1:
         raise RecordingError(f"its columns are in {' and '.join(sorted(stated))}; give columns of one unit.")
     unit = quantity.unit or next(iter(stated), default)
-    if stated and unit not in stated:
+    if stated and kind.get(unit) not in map(kind.get, stated):
         raise RecordingError(f"the map says {unit}, but the table's header says {', '.join(sorted(stated))}.")
     return values * factor(unit, kind, "these columns")
 
@@ -240,8 +237,10 @@ def _turns(columns: Columns, turn: Turn) -> Array:
 
 
 def _rotation(columns: Columns, turn: Turn, values: Array, world: World) -> Rotation:
-    stated = next((columns.units[n] for n in map(columns.find, turn.columns) if n in columns.units), None)
-    unit = turn.unit or (stated if stated in ANGLES else None)
+    stated = next((unit for unit in map(columns.unit_of, turn.columns) if unit in ANGLES), None)
+    if None not in (turn.unit, stated) and turn.unit != stated:
+        raise RecordingError(f"rotation: the map says {turn.unit}, but the table's header says {stated}.")
+    unit = turn.unit or stated
     if unit is None and turn.kind not in ("wxyz", "xyzw", "matrix"):
         raise RecordingError("rotation: angles need a unit, rad or deg; add it.")
     largest = float(np.abs(values).max(initial=0.0))

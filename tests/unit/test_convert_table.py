@@ -295,6 +295,17 @@ class TestRefusals:
         found = self.convert(tmp_path, MAP, table)
         assert found.pushes[0].object.positions[-1, 0] == pytest.approx(8e-6)
 
+    def test_units_in_brackets_are_held_against_the_map(self, tmp_path: Path) -> None:
+        table = TABLE.replace("t,x,y,yaw,hx,hy", "t,x [mm],y [mm],yaw [rad],hx,hy")
+        chart = MAP.replace("columns: [x, y]", "columns: ['x [mm]', 'y [mm]']")
+        chart = chart.replace("columns: yaw", "columns: ['yaw [rad]']")
+        with pytest.raises(RecordingError, match="the map says inch, but the table's header says mm"):
+            self.convert(tmp_path, chart.replace("'y [mm]']", "'y [mm]'], unit: inch"), table)
+        with pytest.raises(RecordingError, match="the map says deg, but the table's header says rad"):
+            self.convert(tmp_path, chart.replace("unit: rad", "unit: deg"), table)
+        found = self.convert(tmp_path, chart, table)
+        assert found.pushes[0].object.positions[-1, 0] == pytest.approx(8e-6)
+
     def test_motives_preamble_states_the_unit(self, tmp_path: Path) -> None:
         table = "Format Version,1.23,Length Units,Millimeters\n\n" + TABLE
         with pytest.raises(RecordingError, match="the map says m, but the table's header says mm"):
@@ -363,6 +374,23 @@ def test_a_hand_in_the_frame_of_its_robot_is_brought_into_that_of_the_tracker(tm
     np.testing.assert_allclose(hand.positions, expected, atol=1e-9)
 
 
+def test_two_columns_lie_in_the_tables_plane_whichever_axis_is_up(tmp_path: Path) -> None:
+    """They were taken for the log's x and y, so that with y up one of them was lost."""
+    (tmp_path / "log.csv").write_text(TABLE.replace("t,x,y,yaw", "t,z,x,yaw"), encoding="utf-8")
+    (tmp_path / "plain.csv").write_text(TABLE, encoding="utf-8")
+    (tmp_path / "plain.yaml").write_text(MAP, encoding="utf-8")
+    chart = MAP.replace("columns: [x, y]", "columns: [x, z]").replace("columns: [hx, hy]", "columns: [hy, hx]")
+    (tmp_path / "map.yaml").write_text(f"{chart}world: {{axes: [z, x, y]}}\n", encoding="utf-8")
+    found = convert_table(tmp_path / "log.csv", tmp_path / "found", tmp_path / "map.yaml").pushes[0]
+    plain = convert_table(tmp_path / "plain.csv", tmp_path / "out", tmp_path / "plain.yaml").pushes[0]
+    assert found.object == plain.object and found.hand == plain.hand
+    (tmp_path / "map.yaml").write_text(
+        f"{chart}world: {{pose: {{translation: [0, 0, 0], rotation_wxyz: [0.9, 0.43589, 0, 0]}}}}\n", encoding="utf-8"
+    )
+    with pytest.raises(RecordingError, match="no axis of the log is up; give three"):
+        convert_table(tmp_path / "log.csv", tmp_path / "other", tmp_path / "map.yaml")
+
+
 def test_rows_without_any_number_do_not_cut_a_push(tmp_path: Path) -> None:
     table = np.array([[float(v) for v in line.split(",")] for line in TABLE.splitlines()[1:]])
     table = np.insert(table, 4, np.nan, axis=0)
@@ -406,6 +434,15 @@ class TestGuess:
             assert push.object == other.object
             assert other.hand is not None and push.hand is not None
             assert np.array_equal(push.hand.positions, other.hand.positions)
+
+    def test_a_yaw_without_a_name_is_the_objects_and_two_axes_say_which_is_up(self, tmp_path: Path) -> None:
+        head = "t,obj x [in],obj z [in],yaw [deg],tip x [in],tip y [in],tip z [in]"
+        rows = [f"{0.01 * k:.2f},{0.02 * k},{0.01 * k},{0.1 * k},{0.02 * k},0.8,{0.01 * k - 2}" for k in range(50)]
+        (tmp_path / "log.csv").write_text("\n".join([head, *rows]))
+        text = guess_map(tmp_path / "log.csv").text
+        assert 'position: {columns: ["obj x [in]", "obj z [in]"], unit: in}' in text
+        assert 'rotation: {columns: ["yaw [deg]"], as: yaw, unit: deg}' in text
+        assert "world: {axes: [z, x, y]}" in text and "# not used" not in text
 
     def test_what_it_cannot_tell_is_a_question(self, sealed: Recording, tmp_path: Path) -> None:
         pytest.importorskip("pyarrow")
