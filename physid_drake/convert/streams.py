@@ -208,7 +208,7 @@ def _times(columns: Columns, clock: Clock, chart: Map) -> Array:
         raise RecordingError("there are no times; name their column in time.column.")
     name = columns.find(column)
     own = clock if clock.column is not None else chart.clock
-    stated = columns.units.get(name)
+    stated = columns.unit_of(name)
     if own.unit is not None and stated in TIMES and own.unit != stated:
         raise RecordingError(f"the map says {own.unit}, but times in column {shown(name)} are in {stated}.")
     unit = own.unit or stated or "s"

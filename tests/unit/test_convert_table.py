@@ -306,6 +306,14 @@ class TestRefusals:
         found = self.convert(tmp_path, chart, table)
         assert found.pushes[0].object.positions[-1, 0] == pytest.approx(8e-6)
 
+    def test_a_unit_of_time_in_brackets_is_that_of_the_times(self, tmp_path: Path) -> None:
+        _, *rows = TABLE.splitlines()
+        table = "t [ms],x,y,yaw,hx,hy\n" + "".join(f"{10 * k},{row.split(',', 1)[1]}\n" for k, row in enumerate(rows))
+        chart = MAP.replace("column: t}", "column: 't [ms]'}")
+        with pytest.raises(RecordingError, match=r"the map says us, but times in column 't \[ms\]' are in ms"):
+            self.convert(tmp_path, chart.replace("'t [ms]'}", "'t [ms]', unit: us}"), table)
+        assert self.convert(tmp_path, chart, table).pushes[0].object.times[-1] == pytest.approx(0.08)
+
     def test_motives_preamble_states_the_unit(self, tmp_path: Path) -> None:
         table = "Format Version,1.23,Length Units,Millimeters\n\n" + TABLE
         with pytest.raises(RecordingError, match="the map says m, but the table's header says mm"):

@@ -131,7 +131,7 @@ def test_errors_that_are_no_noise_are_a_mismatch_though_no_effect_helps():
     (1.0, True, "underpowered"), (1.0, False, "consistent"), (2.0 * MOST_NOISE_SCALE, True, "unexplained"),
 ])  # fmt: skip
 def test_a_name_with_which_held_out_pushes_are_no_nearer_is_not_given(plain, rare, verdict):
-    """Without an effect, in MuJoCo: a patch of -5 % gained 24 nats, and held-out pushes were .32 mm off, not .30."""
+    """Without an effect, in MuJoCo: a patch of -5 % gained 24 nats, and held-out pushes were predicted worse."""
     everything = found(hypothesis(TableTilt, gain=2.0 * MUCH), plain=plain, rare=rare)
     named = decided(everything, most=MOST_NOISE_SCALE)
     assert named.verdict == "explained"
