@@ -150,6 +150,8 @@ def _run_convert(arguments: argparse.Namespace) -> int:
         refused = look(recording)[:1]
         for why in refused:
             say_error(why)
+        if refused:
+            print("A diagnosis would refuse it: correct the map, and convert to another folder.")
         print(f"next: physid_drake inspect {arguments.folder}")
         return 1 if refused else 0
     return 0

@@ -98,7 +98,8 @@ def up_of(place: Sequence[str], columns: Columns) -> int | None:
     """The axis along which a body hardly moves, or that is missing between two; None if that is not known."""
     if len(place) < 3:
         letters = [match["axis"].lower()[-1] for name in place if (match := _AXIS.match(_unit_of(name, columns)[0]))]
-        return 1 if letters == ["x", "z"] else None
+        missing = set("xyz") - set(letters)
+        return "xyz".index(*missing) if len(missing) == 1 else None
     values = _filled(place, columns)
     return int(np.argmin(_ways(values))) if len(values) else None
 

@@ -235,7 +235,7 @@ def _set_units(bodies: Sequence[Body], columns: Columns) -> str:
     likely = "m" if largest < METRES else "cm" if largest < CENTIMETRES else "mm"
     for body in bodies:
         body.unit = body.unit if body.unit in LENGTHS else stated or likely
-    return "" if stated else "   # m, cm or mm?"
+    return "" if stated else "   # m, cm, inch or mm?"
 
 
 def _pose_lines(key: str, body: Body | None, columns: Columns, doubt: str, time: str | None) -> list[str]:

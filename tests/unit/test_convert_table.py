@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from physid_drake import cli
 from physid_drake.convert import convert_table, guess_map
 from physid_drake.convert.conventions import forces_in_world, places_in_world, rotation_of, rotations_in_world
 from physid_drake.convert.map_reading import read_map
@@ -416,6 +417,29 @@ def test_a_value_that_comes_again_is_said(tmp_path: Path) -> None:
     (tmp_path / "map.yaml").write_text(MAP + "pushes: {cut: column, column: trial}\n", encoding="utf-8")
     with pytest.warns(UserWarning, match="trial 1 comes in 2 pieces, and each is taken for a push"):
         convert_table(tmp_path / "log.csv", tmp_path / "found", tmp_path / "map.yaml")
+
+
+@pytest.mark.parametrize(("pair", "axes"), [("x,y", "[x, y, z]"), ("x,z", "[z, x, y]")])
+def test_of_two_columns_the_missing_one_is_taken_for_up_and_said(pair: str, axes: str, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(TABLE.replace("t,x,y,yaw", f"t,{pair},yaw"), encoding="utf-8")
+    text = guess_map(tmp_path / "log.csv").text
+    (missing,) = set("xyz") - set(pair)
+    assert f"# The object has no {missing}, which is taken for up.\nworld: {{axes: {axes}}}" in text
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_what_a_diagnosis_would_refuse_is_said_with_what_to_do(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    still = "".join(f"{0.01 * k:.2f},0,0,0,{0.001 * k - 0.05:.3f},0\n" for k in range(9))
+    (tmp_path / "log.csv").write_text("t,x,y,yaw,hx,hy\n" + still, encoding="utf-8")
+    (tmp_path / "map.yaml").write_text(MAP, encoding="utf-8")
+    status = cli.main(
+        ["convert", "table", str(tmp_path / "log.csv"), str(tmp_path / "r"), "--map", str(tmp_path / "map.yaml")]
+    )
+    shown = capsys.readouterr()
+    assert status == 1 and "ERROR: " in shown.err
+    assert "correct the map, and convert to another folder" in shown.out
 
 
 def test_a_map_may_be_read_on_its_own(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from fuzz.trees import json_text, mutated, yaml_text
 from fuzz.watch import lay_out
 from fuzz.wrong import FAULTS
 
-QUICK, LONG = 90, 900  # inputs: each kind five times; about half a minute's worth
+QUICK, LONG = 90, 450  # inputs: each kind five times, and 25 times; benchmarks/fuzz.py runs 10,000
 
 
 @pytest.fixture(scope="module")

@@ -211,7 +211,7 @@ def test_a_robot_with_straight_ramps_keeps_them(seed):
 @pytest.mark.slow
 def test_a_path_of_few_knots_is_explained_to_its_noise():
     ratios = []
-    for seed in range(20, 40):
+    for seed in range(20, 32):
         rng = np.random.default_rng([2, seed])
         k = int(rng.integers(3, 8))
         knots, velocities = np.cumsum(rng.uniform(0.05, 0.3, k)), rng.uniform(-0.5, 0.5, (k, 2))
@@ -226,8 +226,8 @@ def test_a_path_of_few_knots_is_explained_to_its_noise():
 
 @pytest.mark.slow
 def test_every_noisy_path_is_fitted_with_few_knots():
-    """Sixty paths: knots, speeds, rates, noise and rounding at random, some jumping, some frozen."""
-    for seed in range(60):
+    """Forty paths: knots, speeds, rates, noise and rounding at random, some jumping, some frozen."""
+    for seed in range(40):
         rng = np.random.default_rng([1, seed])
         count = int(rng.integers(6, 40))
         times = np.cumsum(rng.uniform(0.5, 1.5, count)) / rng.choice([20.0, 100.0, 250.0])
