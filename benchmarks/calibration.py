@@ -19,10 +19,10 @@ from rich.console import Console
 from rich.table import Table
 from scipy import stats
 
-from physid_drake.diagnose.hypotheses import with_one_more
+from physid_drake.diagnose.hypotheses import freed, with_one_more
 from physid_drake.diagnose.proposals import with_part
 from physid_drake.effects import applicable
-from physid_drake.identify.baseline import baseline, baseline_hypothesis, fitter_of, with_tolerances
+from physid_drake.identify.baseline import baseline, baseline_hypothesis, fitter_of, settled, with_tolerances
 from physid_drake.identify.estimates import t_factor
 from physid_drake.inference.fit import Fitter
 from physid_drake.inference.predictions import Predictor
@@ -85,7 +85,7 @@ def world(case, kind, rng):
     fits = [fit for fit in with_one_more(finder, base, found) if fit.hypothesis.parts]
     if not fits:
         return None
-    fit = fits[0]
+    fit = settled(finder, freed(finder, fits[0]), rng)
     _, chance = gains_by_chance(finder, base, found, rng)
     gain = without_best(finder.held_out(fit) - finder.held_out(base))
     sure = bool(surprise(gain[None], chance[kind.name])[0] > SURE)

@@ -99,7 +99,7 @@ def up_of(place: Sequence[str], columns: Columns) -> int | None:
     if len(place) < 3:
         letters = [match["axis"].lower()[-1] for name in place if (match := _AXIS.match(_unit_of(name, columns)[0]))]
         missing = set("xyz") - set(letters)
-        return "xyz".index(*missing) if len(missing) == 1 else None
+        return "xyz".index(missing.pop()) if len(missing) == 1 else None
     values = _filled(place, columns)
     return int(np.argmin(_ways(values))) if len(values) else None
 
