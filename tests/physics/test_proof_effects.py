@@ -19,6 +19,8 @@ from physid_drake.validation.worlds.scene import draw_scene
 from physid_drake.validation.worlds.shapes import gyration_squared
 from physid_drake.validation.worlds.world_plan import GRAVITY, HandPath
 
+pytestmark = pytest.mark.slow  # of worlds that the proof makes, not of what users run
+
 
 def moves(plain, poses):
     length = min(len(plain), len(poses))

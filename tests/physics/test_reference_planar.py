@@ -25,6 +25,8 @@ from reference.scenes import (
 )
 from reference.steps import GRAVITY, routh_impact
 
+pytestmark = pytest.mark.slow  # of what other tests are measured against, not of what users run
+
 LONG_ERASER = box("long eraser", (0.05, 0.12, 0.03), 0.05)
 ERASER = OBJECTS["eraser"]
 BOX = OBJECTS["box"]
