@@ -1,4 +1,4 @@
-"""Whether intervals hold what they say: calibration.py [--worlds N] [--effects NAME ...] [--seed S] [--out FILE].
+"""Whether intervals and p-values hold what they say: calibration.py [--worlds N] [--effects NAME ...] [--chance].
 
 Simulation-based calibration (S. Talts et al., arXiv 1804.06788, 2018) on worlds of the twin: theta, an effect and
 each push's nuisance parameters are drawn, the pushes of a shipped recording are made with them and with noise as the
@@ -6,6 +6,8 @@ objective has it, and the hypothesis with that effect is fitted as a diagnosis f
 rank of the truth in what the fit believes is uniform. For every effect and coordinate: in how many worlds the 90 %
 interval holds the truth, the same of those in which the effect was confirmed, and the p-value of a uniform rank
 (Kolmogorov and Smirnov); with ``--out`` one figure of all ranks. 1,000 worlds take about an hour on one core.
+
+With ``--chance`` no effect is drawn, and of all effects' p-value it is said how often it is below some values.
 """
 
 import argparse
@@ -26,7 +28,7 @@ from physid_drake.identify.baseline import baseline, baseline_hypothesis, fitter
 from physid_drake.identify.estimates import t_factor
 from physid_drake.inference.fit import Fitter
 from physid_drake.inference.predictions import Predictor
-from physid_drake.inference.replicates import gains_by_chance, surprise, without_best
+from physid_drake.inference.replicates import gains_by_chance, p_value, surprise, without_best
 from physid_drake.inference.scores import columns
 from physid_drake.pushes.case import case_of, cell_config
 from physid_drake.pushes.config import ThetaConfig
@@ -37,6 +39,7 @@ SIZES = (3.0, 30.0)  # steps of an amplitude's chart: from faint to strong, log-
 FRICTIONS = (0.3, 0.7)  # of the unit cube, what is drawn of theta
 SCATTER = 0.6  # of friction from push to push, in units
 SURE = 9.2  # nats of surprise: confirmed
+LEVELS = (0.01, 0.05, 0.1, 0.2, 0.5)
 
 
 def main():
@@ -45,10 +48,16 @@ def main():
     parser.add_argument("--effects", nargs="*", metavar="NAME")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, metavar="FILE")
+    parser.add_argument("--chance", action="store_true")
     given = parser.parse_args()
     recording = read_recording(shipped("recordings") / "eraser_reference")
     case = case_of(recording, cell_config(recording), ThetaConfig(), jobs=1)
     kinds = applicable(case.around, given.effects)
+    if given.chance:
+        draws = (chance(case, kinds, np.random.default_rng([given.seed, k])) for k in range(given.worlds))
+        values = np.array([p for p in draws if p is not None])
+        print(", ".join(f"below {a:g}: {np.sum(values < a)} of {len(values)}" for a in LEVELS))
+        return
     scores, named, lost = defaultdict(list), defaultdict(list), 0
     for k in range(given.worlds):
         rng = np.random.default_rng([given.seed, k])
@@ -66,9 +75,8 @@ def main():
         figure(scores).savefig(given.out)
 
 
-def world(case, kind, rng):
-    """By coordinate: the truth less the estimate in standard deviations, and whether the effect was confirmed."""
-    h, z = drawn(case, kind, rng)
+def recorded(case, h, z, rng):
+    """What fits a recording of this truth, made by the twin, and its baseline; None if it cannot be rolled out."""
     maker = Fitter(case, Predictor(case))
     own = tuple(np.clip(rng.standard_normal(len(prior)), -2.0, 2.0) * prior for prior in maker.priors(SCATTER))
     point = maker.points([h], [z], [own])[0]
@@ -80,15 +88,34 @@ def world(case, kind, rng):
         for f, w, y in zip(case.features, maker.predictor.whitening, heard, strict=True)
     )
     finder = fitter_of(dc.replace(case, features=features), 0)
-    base = with_tolerances(finder, baseline(finder, rng))
+    return finder, with_tolerances(finder, baseline(finder, rng))
+
+
+def chance(case, kinds, rng):
+    """The p-value of pushes without an effect."""
+    h = baseline_hypothesis(case)
+    seen = recorded(case, h, theta_of(h, rng), rng)
+    if seen is None:
+        return None
+    finder, base = seen
+    return p_value(*gains_by_chance(finder, base, columns(finder, base, kinds), rng))
+
+
+def world(case, kind, rng):
+    """By coordinate: the truth less the estimate in standard deviations, and whether the effect was confirmed."""
+    h, z = drawn(case, kind, rng)
+    seen = recorded(case, h, z, rng)
+    if seen is None:
+        return None
+    finder, base = seen
     found = columns(finder, base, [kind])
     fits = [fit for fit in with_one_more(finder, base, found) if fit.hypothesis.parts]
     if not fits:
         return None
     fit = settled(finder, freed(finder, fits[0]), rng)
-    _, chance = gains_by_chance(finder, base, found, rng)
+    _, by_chance = gains_by_chance(finder, base, found, rng)
     gain = without_best(finder.held_out(fit) - finder.held_out(base))
-    sure = bool(surprise(gain[None], chance[kind.name])[0] > SURE)
+    sure = bool(surprise(gain[None], by_chance[kind.name])[0] > SURE)
     stds = t_factor(fit) * np.sqrt(np.diag(finder.covariance(fit)))
     d, here, there = h.space.dimension, fit.hypothesis, fit.point.z
     made = {}
@@ -114,11 +141,16 @@ def drawn(case, kind, rng):
         step = abs(step) if chart[j].lower >= point[j] else step
         point[j] = np.clip(point[j] + step, chart[j].lower, chart[j].upper)
     h = with_part(base, kind, point)
+    return h, np.concatenate([theta_of(base, rng), [point[j] for j in h.parts[0].free]])
+
+
+def theta_of(base, rng):
+    """Theta (d,) in the unit cube: frictions even within FRICTIONS, all else from its prior."""
     least, most = base.bounds
     theta = np.clip(base.mean + base.std * rng.standard_normal(len(base.mean)), least, most)
     told = [k for k, name in enumerate(base.space.names) if "friction" in name]
     theta[told] = rng.uniform(*FRICTIONS, size=len(told))
-    return h, np.concatenate([theta, [point[j] for j in h.parts[0].free]])
+    return theta
 
 
 def table(scores, named):
