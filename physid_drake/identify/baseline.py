@@ -12,7 +12,7 @@ from physid_drake.effects import tolerated
 from physid_drake.errors import RecordingError
 from physid_drake.inference.fit import Fit, Fitter
 from physid_drake.inference.hypothesis import Hypothesis
-from physid_drake.inference.multistart import refound, reseated
+from physid_drake.inference.multistart import reseated
 from physid_drake.inference.predictions import Predictor
 from physid_drake.inference.push import TAIL
 from physid_drake.inference.rollouts import Ask, Physics
@@ -103,10 +103,10 @@ def baseline(fitter: Fitter, rng: np.random.Generator, starts: Sequence[Array] =
 
 
 def settled(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
-    """The fit after repeated searches for better nuisance parameters and effects, each followed by a fit.
+    """The fit after repeated searches for better nuisance parameters, each followed by a fit.
 
-    The searches are those of ``multistart``. It ends after two rounds in a row that gain nothing, since starts are
-    drawn and one search may miss a better minimum.
+    The searches are those of ``multistart.reseated``. It ends after two searches in a row that gain nothing, since
+    starts are drawn and one search may miss a better minimum.
 
     Args:
         fitter: of the fit.
@@ -116,7 +116,7 @@ def settled(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
     in_vain = 0
     for _ in range(RESEATINGS):
         seated = reseated(fitter, fit, rng)
-        again = refound(fitter, fitter.fitted([seated.again()], LAST)[0])
+        again = fitter.fitted([seated.again()], LAST)[0]
         gained = again.log_likelihood - fit.log_likelihood
         in_vain = 0 if gained > WORTH else in_vain + 1
         if in_vain > 1 or (in_vain and seated is fit):

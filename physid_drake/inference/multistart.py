@@ -1,8 +1,6 @@
-"""Searches from many starts: a push can go two ways, and a bounce or a magnet's core acts all at once."""
+"""Searches a push's nuisance parameters from many starts, since a push can go two ways."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +14,6 @@ Array = NDArray[np.float64]
 
 ODD = 1.5  # mean squared error in units of the noise: above it, the fit does not explain a push
 DRAWN, STEPS = 4, 4  # starts of a push's nuisance parameters that are drawn; steps from each
-SIZES, BASINS, ROUNDS = 8, 4, 8  # moves of a coordinate each way; points that are fitted, and steps from each
-FURTHEST = 100.0  # standard deviations, where a coordinate has no bound
 
 
 def reseated(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
@@ -31,7 +27,8 @@ def reseated(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
         fit: where to search.
         rng: draws starts.
     """
-    odd = _odd(fitter, fit)
+    left = [y - f for y, f in zip(fitter.predictor.recorded, fit.point.predicted, strict=True)]
+    odd = [i for i, errors in enumerate(left) if float(errors @ errors) > ODD * len(errors)]
     if not odd:
         return fit
     h, point = fit.hypothesis, fit.point
@@ -69,54 +66,6 @@ def reseated(fitter: Fitter, fit: Fit, rng: np.random.Generator) -> Fit:
         return fit
     moved = fitter.points([h], [point.z], [tuple(nuisances)])[0]
     return fit if moved is None else fitter.started([h], [moved], [None], fit.tail)[0]
-
-
-def refound(fitter: Fitter, fit: Fit) -> Fit:
-    """A likelier fit of the same hypothesis from elsewhere along its effects' coordinates, where pushes are left odd.
-
-    Each coordinate is moved both ways, by one standard deviation up to its bound, and all others follow as the
-    linearised posterior has it. The best of these points are fitted.
-
-    Args:
-        fitter: of the fit.
-        fit: where to search.
-    """
-    h, z = fit.hypothesis, fit.point.z
-    moves = _along_profiles(fitter, fit) if _odd(fitter, fit) else []
-    if not moves:
-        return fit
-    zs = [np.clip(z + move, *h.bounds) for move in moves]
-    nuisances = [
-        tuple(
-            np.clip(one.nuisance + one.to_nuisance @ (there - z), -most, most)
-            for one, most in zip(fit.weighed, fitter.most, strict=True)
-        )
-        for there in zs
-    ]
-    points = [point for point in fitter.points([h] * len(zs), zs, nuisances) if point is not None]
-    points.sort(key=lambda point: fitter.cost(h, point, fit.scatter, fit.noise_scale, fit.tail))
-    best = points[:BASINS]
-    fits = fitter.fitted(fitter.started([h] * len(best), best, [fit] * len(best), fit.tail), ROUNDS)
-    return max([fit, *fits], key=lambda one: one.log_likelihood)
-
-
-def _along_profiles(fitter: Fitter, fit: Fit) -> list[Array]:
-    """Moves (n,) of z, each along the profile of one of the effects' coordinates."""
-    h, covariance = fit.hypothesis, fitter.covariance(fit)
-    moves: list[Array] = []
-    for j in range(h.space.dimension, h.simulated):
-        std = math.sqrt(covariance[j, j])
-        for way, bound in zip((-1.0, 1.0), h.bounds, strict=True):
-            room = min(abs(float(bound[j] - fit.point.z[j])), FURTHEST * std)
-            if room >= std:
-                moves += [way * size * covariance[:, j] / std**2 for size in np.geomspace(std, room, SIZES)]
-    return moves
-
-
-def _odd(fitter: Fitter, fit: Fit) -> list[int]:
-    """Indices of the pushes that a fit does not explain."""
-    left = [y - f for y, f in zip(fitter.predictor.recorded, fit.point.predicted, strict=True)]
-    return [i for i, errors in enumerate(left) if float(errors @ errors) > ODD * len(errors)]
 
 
 def _starts(nuisance: Array, most: Array, rng: np.random.Generator) -> list[Array]:

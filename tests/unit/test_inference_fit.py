@@ -11,7 +11,7 @@ from physid_drake.effects.fields import TableTilt
 from physid_drake.effects.friction import AnisotropicTable
 from physid_drake.identify.baseline import baseline, settled, with_tolerances
 from physid_drake.inference.fit import Fitter
-from physid_drake.inference.multistart import refound, reseated
+from physid_drake.inference.multistart import reseated
 from physid_drake.inference.predictions import Predictor
 from physid_drake.inference.push import normal_equations
 from physid_drake.inference.rollouts import Ask, Physics
@@ -69,18 +69,6 @@ def test_a_push_on_the_wrong_one_of_its_ways_is_put_back(eraser):
     lost = fitter.started([fit.hypothesis], [point], [None], fit.tail)[0]
     assert lost.cost > fit.cost + 10.0
     assert reseated(fitter, lost, np.random.default_rng(0)).cost < fit.cost + 5.0
-
-
-def test_an_effect_at_the_wrong_place_is_found_again_and_one_that_explains_is_left_alone(grain):
-    fitter, plain = grain
-    fit = with_one_more(fitter, plain, columns(fitter, plain, [AnisotropicTable]))[0]
-    z, begin = fit.point.z.copy(), fit.hypothesis.space.dimension
-    z[begin : begin + 2] *= -1.0  # the grain across
-    point = fitter.points([fit.hypothesis], [z], [fitter.at_rest()])[0]
-    lost = fitter.started([fit.hypothesis], [point], [None], fit.tail)[0]
-    assert lost.log_likelihood < plain.log_likelihood
-    assert refound(fitter, lost).log_likelihood > fit.log_likelihood - 2.0
-    assert refound(fitter, fit) is fit
 
 
 def test_null_effects_change_not_a_bit(eraser):
