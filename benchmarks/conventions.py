@@ -93,6 +93,8 @@ WRONG = {
     "frame beside the middle": ("the middle of the object is", objects(in_itself)),
     "hand mirrored": ("of the hand, y is mirrored", hands(placed(MIRROR))),
     "hand swapped": ("of the hand, x and y are swapped", hands(placed(SWAP))),
+    "object's places mirrored": ("but not of its rotations, y is mirrored", objects(placed(MIRROR))),
+    "object's places swapped": ("but not of its rotations, x and y are swapped", objects(placed(SWAP))),
     "hand 100 ms late": ("ms too late", hands(lambda s: {"times": s.times + 0.1})),
     "hand 60 ms early": ("ms too early", hands(lambda s: {"times": s.times - 0.06})),
     "hand shifted": ("the hand's frame is off by", hands(shifted)),

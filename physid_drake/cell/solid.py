@@ -21,6 +21,7 @@ from physid_drake.cell.support import second_moments
 from physid_drake.errors import CellError, RecordingError
 from physid_drake.recording import Box, Cylinder, MeshShape, Prism, convex_pieces
 from physid_drake.recording import Shape as RecordedShape
+from physid_drake.recording.mesh_outline import prism_outline
 from physid_drake.recording.obj import ObjMesh, check_solid, read_obj
 from physid_drake.wording import named
 
@@ -164,13 +165,17 @@ def _mesh(shape: MeshShape) -> Solid:
     centroid, gyration = _volume(shape, vertices, surface)
     middle = np.array([centroid[0], centroid[1], 0.5 * (low[2] + high[2])])
     centred = vertices - middle
-    hull = _hull(centred[:, :2], shape.file)
-    standing = centred[centred[:, 2] < -0.5 * height + max(1e-4, 0.01 * height)]
-    underside = _hull(standing[:, :2], shape.file)
+    prism = prism_outline(parsed, shape.scale)
+    if prism is not None:
+        outline = underside = Polygon([(x, y) for x, y in (prism - middle[:2]).tolist()])
+    else:
+        outline = _hull(centred[:, :2], shape.file)
+        standing = centred[centred[:, 2] < -0.5 * height + max(1e-4, 0.01 * height)]
+        underside = _hull(standing[:, :2], shape.file)
     look = surface or Convex(vertices.T, label=shape.file.stem)
     visual = ((look, RigidTransform(-middle)),)
-    return Solid(outline=hull, underside=underside, height=height, gyration=gyration,
-                 rolling_radius=None, faces=_polygon_faces(hull, height), visual=visual)  # fmt: skip
+    return Solid(outline=outline, underside=underside, height=height, gyration=gyration,
+                 rolling_radius=None, faces=_polygon_faces(outline, height), visual=visual)  # fmt: skip
 
 
 def _surface(parsed: ObjMesh, scale: float) -> Mesh | None:

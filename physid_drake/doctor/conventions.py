@@ -164,6 +164,12 @@ def _axes(recording: Recording) -> Iterator[Convention]:
             remedy="map: columns of hand.position, or world for the hand's stream",
             recording=each_push(recording, partial(_hand_axes, matrix=np.array(matrix))),
         )
+    for said in ("y is mirrored", "x is mirrored", "x and y are swapped"):
+        yield Convention(
+            says=f"of the object's places, but not of its rotations, {said}",
+            remedy="map: columns of object.position, or world for the object's stream",
+            recording=each_push(recording, partial(_object_axes, matrix=np.array(matrices[said]))),
+        )
     for said in ("y is mirrored", "x and y are swapped"):
         yield Convention(
             says=f"of both places, but not of the rotations, {said}",
@@ -177,8 +183,12 @@ def _hand_axes(push: Push, matrix: Array) -> Push:
     return replace(push, hand=_turned(push.hand, matrix))
 
 
+def _object_axes(push: Push, matrix: Array) -> Push:
+    return replace(push, object=_turned(push.object, matrix))
+
+
 def _both_axes(push: Push, matrix: Array) -> Push:
-    return _hand_axes(replace(push, object=_turned(push.object, matrix)), matrix)
+    return _hand_axes(_object_axes(push, matrix), matrix)
 
 
 def _turned(stream: PoseStream, matrix: Array) -> PoseStream:

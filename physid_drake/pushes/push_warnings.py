@@ -14,9 +14,10 @@ from physid_drake.pushes.plausible import implausible, some_names
 from physid_drake.pushes.standing import LEANS, RISES, misread, standing_of
 from physid_drake.pushes.stated import too_loud
 from physid_drake.recording import Cylinder, MeshShape, Push, Recording
+from physid_drake.recording.mesh_outline import prism_outline
 from physid_drake.recording.obj import read_obj
 
-FILLS = 0.95  # of its convex hull: a mesh that fills less has notches, or is hollow
+FILLS = 0.95  # of its convex hull: a mesh that fills less has notches, or a hole
 BESIDE = 3e-3  # m between tip and face as objects begin to move: 1 mm at most where description and frames agree
 
 
@@ -68,6 +69,8 @@ def _notched_mesh(recording: Recording) -> tuple[str, ...]:
     if not isinstance(shape, MeshShape):
         return ()
     mesh = read_obj(shape.file)
+    if prism_outline(mesh, shape.scale) is not None:
+        return ()
     corners = mesh.vertices[mesh.triangles][:, :, :2]
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     # What overhangs counts twice: the true share is no larger.

@@ -140,13 +140,13 @@ def convex_pieces(polygon: npt.ArrayLike) -> list[Array]:
                     break
             if joined:
                 break
-    return [_without_straight(vertices[piece]) for piece in pieces]
+    return [without_straight(vertices[piece]) for piece in pieces]
 
 
-def _without_straight(vertices: Array) -> Array:
-    """A polygon without vertices at which it goes straight on."""
-    turns, _ = _turns(vertices)
-    return vertices[np.roll(turns, 1) > FLAT * float(np.abs(turns).max())]
+def without_straight(vertices: Array) -> Array:
+    """A polygon (n, 2) without vertices at which it goes straight on."""
+    turns = np.abs(_turns(vertices)[0])
+    return vertices[np.roll(turns, 1) > FLAT * float(turns.max())]
 
 
 def _triangles(vertices: Array) -> list[list[int]]:

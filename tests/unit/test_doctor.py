@@ -67,12 +67,17 @@ def swapped(push: Push) -> Push:
     )
 
 
+def swapped_object(push: Push) -> Push:
+    return replace(push, object=swapped(push).object)
+
+
 WRONG = {
     "xyzw": (xyzw, "the object's quaternions are x, y, z, w"),
     "inverted": (inverted, "the object's rotations turn the other way"),
     "mirrored hand": (mirrored_hand, "of the hand, y is mirrored"),
     "late": (late, "the hand's times are 100 ms too late"),
     "shifted": (shifted, "the hand's frame is off by (-7.8, 4.9) mm"),
+    "swapped object": (swapped_object, "of the object's places, but not of its rotations, x and y are swapped"),
     "swapped": (swapped, "of both places, but not of the rotations, x and y are swapped"),
 }
 

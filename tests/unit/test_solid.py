@@ -12,7 +12,7 @@ from physid_drake.cell.outline import Disc
 from physid_drake.cell.solid import solid_of
 from physid_drake.cell.support import second_moments
 from physid_drake.errors import CellError
-from physid_drake.recording import Box, Cylinder, MeshShape, Prism
+from physid_drake.recording import Box, Cylinder, MeshShape, Prism, polygon_centroid
 
 TRIANGLE = tuple((float(x), float(y)) for x, y in OBJECTS["triangle"].polygon)
 HEXAGON = tuple((0.05 * math.cos(math.pi * k / 3), 0.05 * math.sin(math.pi * k / 3)) for k in range(6))
@@ -164,6 +164,49 @@ def test_a_mesh_that_is_not_convex_weighs_what_it_encloses(tmp_path):
         for area, a, b, px, py in ((20, 0.1, 0.02, 0.05, 0.01), (16, 0.02, 0.08, 0.01, 0.06))
     )
     assert solid.gyration[2] == pytest.approx(inertia / 36)
+
+
+TEE = np.array([[-2, 1], [-2, 0], [-0.5, 0], [-0.5, -3], [0.5, -3], [0.5, 0], [2, 0], [2, 1]]) * 0.04
+TEE_CAPS = [(1, 2, 3, 6, 7, 8), (3, 4, 5, 6)]
+
+
+def test_a_mesh_of_a_tee_is_the_prism_with_its_notches(tmp_path):
+    centred = TEE - polygon_centroid(TEE)
+    want = solid_of(Prism(polygon=tuple(map(tuple, centred.tolist())), height=0.03))
+    mesh = solid_of(prism_mesh(tmp_path / "tee.obj", TEE.tolist(), 0.03, caps=TEE_CAPS))
+    assert mesh.gyration == pytest.approx(want.gyration, rel=1e-9)
+    for outline, other in ((mesh.outline, want.outline), (mesh.underside, want.underside)):
+        np.testing.assert_allclose(sorted(outline.vertices), sorted(other.vertices), atol=1e-12)
+    for point in np.random.default_rng(0).uniform(-0.1, 0.1, (100, 2)):
+        assert mesh.outline.nearest(*point) == pytest.approx(want.outline.nearest(*point), abs=1e-9)
+    places = [sorted(pose.translation().round(9).tolist() for _, pose in solid.faces) for solid in (mesh, want)]
+    np.testing.assert_allclose(*places, atol=1e-9)
+
+
+def test_a_vertex_on_a_straight_line_is_no_corner(tmp_path):
+    square = np.array([[0.0, 0.0], [0.05, 0.0], [0.1, 0.0], [0.1, 0.1], [0.0, 0.1]])
+    assert len(solid_of(prism_mesh(tmp_path / "square.obj", square.tolist(), 0.03)).outline.vertices) == 4
+
+
+def test_what_is_no_prism_has_its_hull(tmp_path):
+    """A frame with a hole, a tee whose top is open, and a tee that is wound inside out."""
+    ring = [(x, y, z) for z in (0.0, 0.03) for h in (0.05, 0.03) for x, y in ((-h, -h), (h, -h), (h, h), (-h, h))]
+    faces = []
+    for k in range(4):
+        a, b = k + 1, (k + 1) % 4 + 1
+        faces += [
+            (b, a, a + 4, b + 4),
+            (a + 8, b + 8, b + 12, a + 12),
+            (a, b, b + 8, a + 8),
+            (b + 4, a + 4, a + 12, b + 12),
+        ]
+    rows = [f"v {x} {y} {z}" for x, y, z in ring] + ["f " + " ".join(map(str, face)) for face in faces]
+    (tmp_path / "ring.obj").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    assert len(solid_of(MeshShape(file=tmp_path / "ring.obj")).outline.vertices) == 4
+    opened = prism_mesh(tmp_path / "opened.obj", TEE.tolist(), 0.03, caps=TEE_CAPS, closed=False)
+    assert len(solid_of(opened).outline.vertices) == 6
+    turned = prism_mesh(tmp_path / "turned.obj", TEE[::-1].tolist(), 0.03, caps=[(1, 2, 3, 6, 7, 8), (3, 4, 5, 6)])
+    assert len(solid_of(turned).outline.vertices) == 6
 
 
 def test_a_mesh_of_a_box_slides_like_the_box(box_mesh):
