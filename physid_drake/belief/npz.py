@@ -14,6 +14,8 @@ from physid_drake.space import Array
 from physid_drake.wording import named, one_line, shown
 
 MOST_COUNT = 1_000_000
+SMALLEST = 1e-9
+"""Of a hyperparameter, on the unit cube; the largest is its reciprocal. Their squares are ordinary numbers."""
 
 
 def read_npz(path: str | Path, form: str) -> tuple[dict[str, Array], dict[str, Any]]:
@@ -74,8 +76,11 @@ def check_trials(arrays: Mapping[str, Array], dimension: int) -> None:
         # A failed trial's error is infinite, or none at all.
         if name != "errors" and not np.isfinite(arrays[name]).all():
             raise ParameterError(f"'{name}' must be finite")
-    if not (n and (arrays["lengths"] > 0.0).all() and (arrays["variances"] > 0.0).all()):
-        raise ParameterError("there must be candidates, and lengths and variances above 0")
+    for name in ("lengths", "variances"):
+        if not ((arrays[name] > SMALLEST) & (arrays[name] < 1.0 / SMALLEST)).all():
+            raise ParameterError(f"'{name}' must be between {SMALLEST:g} and {1.0 / SMALLEST:g}")
+    if not n:
+        raise ParameterError("there must be candidates")
 
 
 def check_whole(what: str, value: object) -> None:

@@ -337,3 +337,6 @@ def test_an_array_that_does_not_fit_the_others_is_one_line(tmp_path, name):
             refusal(tmp_path, {**arrays, name: other}, header)
     if name not in ("errors", "tried"):
         refusal(tmp_path, {**arrays, name: np.full(array.shape, np.nan)}, header)
+    if name in ("lengths", "variances"):
+        for value in (0.0, -1.0, 1e-320, 1e300):
+            refusal(tmp_path, {**arrays, name: np.full(array.shape, value)}, header)
