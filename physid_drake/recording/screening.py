@@ -28,6 +28,12 @@ STALL_SAMPLES: Final = 5
 LEAP_FACTOR: Final = 5.0
 """A leap is this much longer than nine tenths of the stream's steps, and than the steps beside it."""
 
+FEWEST_STEPS: Final = 3
+"""From value to value that show a grid: a leap away and back makes two."""
+
+GRID_FACTOR: Final = 1.5
+"""A leap is this much longer than a step of the grid that a stream was rounded to: slow motion goes by such steps."""
+
 HELD: Final = 1.5
 """A tracker that is slower than the log shows each of its poses so many times or more, on the average."""
 
@@ -212,7 +218,8 @@ def _find_leaps(times: Array, positions: Array, quaternions: Array) -> tuple[lis
         return [], []
     steps = _distances(positions, quaternions, slice(None, -1), slice(1, None))
     steps = steps / np.maximum(1.0, np.diff(times) / np.median(np.diff(times)))
-    floor = max(LEAP_FACTOR * float(np.quantile(steps, 0.9)), _SMALLEST_LEAP)
+    grid = GRID_FACTOR * _grid(positions, quaternions)
+    floor = max(LEAP_FACTOR * float(np.quantile(steps, 0.9)), _SMALLEST_LEAP, grid)
     padded = np.concatenate([[0.0], steps, [0.0]])
     far = np.flatnonzero(steps > floor).tolist()
     leaps: list[tuple[int, int]] = []
@@ -244,6 +251,20 @@ def _find_leaps(times: Array, positions: Array, quaternions: Array) -> tuple[lis
         and steps[k] > 2.0 * max(floor, LEAP_FACTOR * max(steps[k - 1], steps[k + 1]))
     ]
     return leaps, lone
+
+
+def _grid(positions: Array, quaternions: Array) -> float:
+    """One step of a stream's grid in all coordinates, in the measure of ``_distances``; tiny without a grid."""
+    places = np.abs(np.diff(positions, axis=0)).ravel()
+    turns = _distances(np.zeros_like(positions), quaternions, slice(None, -1), slice(1, None))
+    place, turn = (_fine(steps) for steps in (places, turns))
+    return math.sqrt(3.0) * place + turn
+
+
+def _fine(steps: Array) -> float:
+    """A step that is among the shortest; 0 where there are too few to tell them from leaps."""
+    some = np.sort(steps[steps > 0.0])
+    return float(some[FEWEST_STEPS - 1]) if len(some) >= FEWEST_STEPS else 0.0
 
 
 def _find_swaps(times: Array, positions: Array, quaternions: Array, lone: Sequence[int]) -> list[int]:

@@ -178,16 +178,17 @@ def _noise_line(noise: NoiseEstimate, steps: tuple[float, float]) -> str:
         for said, step, scale, unit in (("places", steps[0], 1e3, "mm"), ("yaw", steps[1], 180.0 / np.pi, "deg"))
         if step > 0.0
     )
-    rounded = f"; rounded: {grid}, which adds a noise of step / sqrt(12)" if grid else ""
-    return _seen_line(noise) + rounded
+    rounded = f"; rounded: {grid}, which is a noise of step / sqrt(12) or more" if grid else ""
+    return _seen_line(noise, steps) + rounded
 
 
-def _seen_line(noise: NoiseEstimate) -> str:
+def _seen_line(noise: NoiseEstimate, steps: tuple[float, float]) -> str:
     if noise.object_position_std is None or noise.object_rotation_std is None:
         return "noise: unknown, because the object is never recorded at rest"
+    place, turn = max(noise.object_position_std, steps[0]), max(noise.object_rotation_std, steps[1])
     parts = [
-        f"noise at rest: object {noise.object_position_std * 1e3:.3f} mm, "
-        f"{np.rad2deg(noise.object_rotation_std):.3f} deg (one standard deviation, {noise.samples} samples)"
+        f"noise at rest: object {place * 1e3:.3f} mm, {np.rad2deg(turn):.3f} deg"
+        f" (one standard deviation, {noise.samples} samples)"
     ]
     if noise.position_autocorrelation is not None:
         parts.append(f"correlation of successive samples {noise.position_autocorrelation:.2f}")

@@ -139,6 +139,23 @@ def test_rounded_poses_are_not_taken_for_those_of_a_slow_tracker(written, step):
     assert len(read_recording(written(rows=long_table(rounded, noise=1e-5, count=400))).pushes[0].object) == 400
 
 
+@pytest.mark.parametrize("turn", [0.0, 1.0])
+@pytest.mark.parametrize("step", [0.005, 0.01, 0.02])
+def test_steps_of_a_coarse_grid_are_no_leaps(written, step, turn):
+    """In x many, in y one; the heading on a grid of 1 degree, too, where it turns."""
+
+    def rounded(poses):
+        way = np.clip((np.arange(len(poses)) - 60) / 90, 0.0, 1.0) ** 2
+        poses[:, 1] = step * np.round(0.2 * way / step)
+        poses[:, 2] = step * np.round(0.6 * way)
+        half = 0.5 * np.radians(np.round(turn * 20.0 * way))
+        poses[:, 4], poses[:, 7] = np.cos(half), np.sin(half)
+        return poses
+
+    push = read_recording(written(rows=long_table(rounded, count=200))).pushes[0]
+    assert len(push.object) == 200 and not any("jumps" in w for w in push.warnings)
+
+
 @pytest.mark.parametrize("noise", [0.0, 1e-5])
 @pytest.mark.parametrize(
     ("change", "expected", "left"),
