@@ -16,7 +16,7 @@ from rich.table import Table
 from physid_drake.recording.rounding import rounding_std
 from physid_drake.recording.statistics import NoiseEstimate, PushSummary, estimate_noise, summarise
 from physid_drake.recording.values import Array, Recording
-from physid_drake.report.outline import outline_of
+from physid_drake.report.outline import outline_of, shape_in_words
 from physid_drake.report.terminal import narrow_table, numbers, words
 
 MOST_KINDS = 8
@@ -33,8 +33,9 @@ def inspection_table(recording: Recording) -> Table:
         "noise\n[deg]", "warnings",
     )  # fmt: skip
     table = narrow_table(
-        recording.name, words("push"), *map(numbers, headings), caption=_noise_line(estimate_noise(recording), steps)
-    )
+        recording.name, words("push"), *map(numbers, headings),
+        caption=f"object: {shape_in_words(recording.object.shape)}\n{_noise_line(estimate_noise(recording), steps)}",
+    )  # fmt: skip
     for push in recording.pushes:
         table.add_row(_short(push.name), *_cells(summarise(push), steps, push.object.rotation != "none"))
     return table
@@ -131,7 +132,8 @@ def _finish(axes: Axes, recording: Recording) -> None:
     axes.set_ylabel("y [m]")
     count = len(recording.pushes)
     # A name with a $ would be read as mathematics.
-    axes.set_title(f"{recording.name}: {count} push{'es' if count != 1 else ''} from above", parse_math=False)
+    title = f"{recording.name}: {count} push{'es' if count != 1 else ''} from above"
+    axes.set_title(f"{title}\n{shape_in_words(recording.object.shape)}", parse_math=False)
     handles = [
         Line2D([], [], color="tab:blue", alpha=0.3, label="object at start"),
         Line2D([], [], color="tab:blue", label="object at end, and its path"),

@@ -9,9 +9,11 @@ from physid_drake import cli, run_inspect
 from physid_drake.errors import RecordingError
 from physid_drake.recording import (
     Box,
+    Cylinder,
     Hand,
     ObjectModel,
     PoseStream,
+    Prism,
     Push,
     Recording,
     Sensors,
@@ -182,3 +184,21 @@ def test_a_stream_on_a_grid_has_the_grids_noise(tmp_path, capsys):
     shown = capsys.readouterr().out
     assert "2.887" in shown and "0.289" in shown and "0.000" not in shown
     assert "rounded: places to 10 mm, yaw to 1 deg" in " ".join(shown.split())
+
+
+@pytest.mark.parametrize(
+    ("shape", "said"),
+    [
+        (Box(size=(0.1, 0.05, 0.03)), "a box, 100.0 by 50.0 mm, 30.0 mm high"),
+        (Cylinder(radius=0.02, length=0.1, axis="y"), "a lying cylinder, 40.0 by 100.0 mm, 40.0 mm high"),
+        (
+            Prism(polygon=((-0.02, -0.02), (0.04, -0.02), (-0.02, 0.04)), height=0.03),
+            "a prism of 3 corners, 60.0 by 60.0 mm, 30.0 mm high",
+        ),
+    ],
+)
+def test_inspect_says_what_the_object_is_taken_for(shape, said, tmp_path, capsys):
+    recording = some_recording(1)
+    write_recording(dc.replace(recording, object=dc.replace(recording.object, shape=shape)), tmp_path / "r")
+    cli.main(["inspect", "--no-fit", str(tmp_path / "r")])
+    assert f"object: {said}" in capsys.readouterr().out
