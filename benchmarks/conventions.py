@@ -106,6 +106,17 @@ WRONG = {
 }  # fmt: skip
 
 
+SAME = {
+    frozenset(
+        {"hand mirrored", "object's places mirrored"}
+    ): "of both places, but not of the rotations, y is mirrored",
+    frozenset(
+        {"hand swapped", "object's places swapped"}
+    ): "of both places, but not of the rotations, x and y are swapped",
+}
+"""Two of these that are one convention."""
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("proofs", type=Path, nargs="+", metavar="PROOF")
@@ -149,7 +160,8 @@ def judged(recording, names, own=()):
     finding = examined(wrong)
     took = time.process_time() - begin
     said = [one.says for one in finding.better]
-    hit = [s for s in said if all(any(w in s for w in WRONG[name][0].split("|")) for name in names)]
+    words = [SAME[frozenset(names)]] if frozenset(names) in SAME else [WRONG[name][0] for name in names]
+    hit = [s for s in said if all(any(w in s for w in one.split("|")) for one in words)]
     found = f"{finding.before and round(finding.before, 1)} -> {finding.after and round(finding.after, 1)} {said[:3]}"
     of_its_own = bool(said) and any(word in s for word in own for s in said)
     if not names:
