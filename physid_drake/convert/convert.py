@@ -14,7 +14,9 @@ from typing import Final
 import numpy as np
 
 from physid_drake.convert.arrays import READERS, read_array_table
-from physid_drake.convert.bag import ENDINGS, RECEIVE, STAMP, bag_files, read_bag
+from physid_drake.convert.bag import RECEIVE, STAMP, read_bag
+from physid_drake.convert.bag_frames import in_one_frame
+from physid_drake.convert.bag_reading import ENDINGS, bag_files
 from physid_drake.convert.columns import Columns
 from physid_drake.convert.cutting import Piece, pieces_of, rows_by_value, sizes_said
 from physid_drake.convert.map_reading import read_map
@@ -211,8 +213,8 @@ def _bag_parts(source: Path, chart: Map) -> Parts:
             wanted[key] = (stream.topic, stream.frame if isinstance(stream, PoseMap) else None)
     if chart.cut.by == "column":
         raise RecordingError("pushes: a bag has no columns; cut by rest, gap or times.")
-    found = read_bag(source, list(wanted.values()))
-    columns = {key: found[where] for key, where in wanted.items()}
+    bag = read_bag(source, list(wanted.values()), by_arrival=chart.by_receive)
+    columns = in_one_frame({key: bag.tracks[where] for key, where in wanted.items()}, chart, bag.tree)
     hand, force = chart.hand_path, chart.force
     named_chart = replace(
         chart,

@@ -14,10 +14,12 @@ from typing import Final
 
 import numpy as np
 
-from physid_drake.convert.bag import ENDINGS, RECEIVE, STAMP, TopicInfo, holds_numbers, read_bag, topics_of
+from physid_drake.convert.bag import read_whole_bag
+from physid_drake.convert.bag_reading import ENDINGS, is_packed
 from physid_drake.convert.bodies import Body, bodies_of, up_of
 from physid_drake.convert.columns import Array, Columns
 from physid_drake.convert.convert import ARRAYS, TEXTS, read_columns
+from physid_drake.convert.guess_bag import QUATERNION, frame_lines, name_of, roles_in_bag, row_of, unread_lines
 from physid_drake.convert.units import FORCES, LENGTHS, TIMES
 from physid_drake.recording.adapters.sources import source_files
 from physid_drake.recording.clocks import LIKELY
@@ -69,8 +71,9 @@ def guess_map(source: Path) -> Guess:
 
 
 def is_bag(source: Path) -> bool:
-    """Whether a file or a folder looks like a bag, by its endings."""
-    return source.suffix in ENDINGS or (source.is_dir() and any(f.suffix in ENDINGS for f in source.iterdir()))
+    """Whether a file or a folder looks like a bag, packed or not, by its endings."""
+    files = list(source.iterdir()) if source.is_dir() else [source]
+    return any(file.suffix in ENDINGS or is_packed(file) for file in files)
 
 
 def _guess_table(source: Path) -> Guess:
@@ -306,57 +309,34 @@ def _cut_line(columns: Columns, time: str | None, *, many: bool) -> str:
 
 
 def _guess_bag(source: Path) -> Guess:
-    topics = topics_of(source)
-    wanted = [
-        (topic, frame)
-        for topic, info in topics.items()
-        if info.count
-        for frame in (info.frames or (None,))
-        if _usable(info)
-    ]
-    found = read_bag(source, wanted) if wanted else {}
-    rows = [_topic_row(topic, frame, columns) for (topic, frame), columns in found.items()]
-    read = {topic for topic, _ in found}
-    rows += [(topic, str(info.count), "", info.kind, "") for topic, info in topics.items() if topic not in read]
-    bodies = {
-        key: Body(name=f"{key[0]} {key[1] or ''}".strip(), position=["x", "y", "z"], rotation=_turn_columns(columns))
-        for key, columns in found.items()
-        if "tx" not in columns.numbers
-    }
-    body, hand, _ = _roles(list(bodies.values()), None)
-    force = next((key for key, columns in found.items() if "tx" in columns.numbers), None)
-    where = {one.name: key for key, one in bodies.items()}
-    columns = found[where[body.name]] if body is not None else Columns(source="", numbers={})
-    lines = [*_head(source, body, columns, hand is not None)]
-    for key, one in (("object", body), ("hand", hand)):
-        if one is not None:
-            topic, frame = where[one.name]
-            turn = "" if one.rotation else ", rotation: none"
-            of = "" if frame is None else f", frame: {_quoted(frame)}"
-            lines.append(f"{key}: {{topic: {_quoted(topic)}{of}{turn}}}")
-    if body is None:
-        lines.append('object: {topic: "?"}   # CHANGE: no topic holds poses')
-    if force is not None:
-        lines.append(
-            f"force: {{topic: {_quoted(force[0])}, axes: hand, acts_on: hand}}   # or world, object? tare_s: 0.2?"
-        )
+    bag = read_whole_bag(source)
+    rows = [row_of(key, track) for key, track in bag.tracks.items()]
+    read = {topic for topic, _ in bag.tracks}
+    rows += [(topic, str(count), "", kind, "") for topic, (kind, count) in bag.topics.items() if topic not in read]
+    roles = roles_in_bag(bag, HAND_WORDS, OBJECT_WORDS)
+    body, columns = None, Columns(source="", numbers={})
+    if roles.body is not None:
+        columns = bag.tracks[roles.body].columns
+        body = Body(name=name_of(roles.body), position=["x", "y", "z"])
+    lines = [*_head(source, body, columns, roles.hand is not None)]
+    for role, key in (("object", roles.body), ("hand", roles.hand), ("force", roles.force)):
+        if key is not None:
+            lines += frame_lines(role, bag, key, roles.body or key)
+            lines.append(_topic_line(role, key, bag.tracks[key].columns))
+        elif role == "object":
+            lines.append('object: {topic: "?"}   # CHANGE: no topic holds poses that move')
     lines.append("pushes: {cut: rest}   # between two rests of the object")
+    lines += unread_lines(bag, MOST_UNREAD)
     return Guess(text="\n".join(lines) + "\n", rows=tuple(rows))
 
 
-def _usable(info: TopicInfo) -> bool:
-    return holds_numbers(info.kind)
-
-
-def _turn_columns(columns: Columns) -> list[str]:
-    return [name for name in ("qx", "qy", "qz", "qw") if name in columns.numbers]
-
-
-def _topic_row(topic: str, frame: str | None, columns: Columns) -> tuple[str, ...]:
-    clock = columns.numbers.get(STAMP, columns.numbers[RECEIVE])
-    values = np.column_stack([columns.numbers[name] for name in ("x", "y", "z")])
-    least, largest = (", ".join(f"{v:.4g}" for v in side(values, axis=0)) for side in (np.min, np.max))
-    return f"{topic} {frame or ''}".strip(), str(len(clock)), _rate(clock), least, largest
+def _topic_line(role: str, key: tuple[str, str | None], columns: Columns) -> str:
+    topic, frame = key
+    if role == "force":
+        return f"force: {{topic: {_quoted(topic)}, axes: hand, acts_on: hand}}   # or world, object? tare_s: 0.2?"
+    of = "" if frame is None else f", frame: {_quoted(frame)}"
+    turn = "" if QUATERNION[0] in columns.numbers else ", rotation: none"
+    return f"{role}: {{topic: {_quoted(topic)}{of}{turn}}}"
 
 
 def _quoted(name: str) -> str:
