@@ -19,7 +19,15 @@ from physid_drake.convert.bag_reading import ENDINGS, is_packed
 from physid_drake.convert.bodies import Body, bodies_of, up_of
 from physid_drake.convert.columns import Array, Columns
 from physid_drake.convert.convert import ARRAYS, TEXTS, read_columns
-from physid_drake.convert.guess_bag import QUATERNION, frame_lines, name_of, roles_in_bag, row_of, unread_lines
+from physid_drake.convert.guess_bag import (
+    QUATERNION,
+    frame_lines,
+    in_a_map,
+    name_of,
+    roles_in_bag,
+    row_of,
+    unread_lines,
+)
 from physid_drake.convert.units import FORCES, LENGTHS, TIMES
 from physid_drake.recording.adapters.sources import source_files
 from physid_drake.recording.clocks import LIKELY
@@ -322,7 +330,7 @@ def _guess_bag(source: Path) -> Guess:
     for role, key in (("object", roles.body), ("hand", roles.hand), ("force", roles.force)):
         if key is not None:
             lines += frame_lines(role, bag, key, roles.body or key)
-            lines.append(_topic_line(role, key, bag.tracks[key].columns))
+            lines.append(_topic_line(role, in_a_map(bag, key), bag.tracks[key].columns))
         elif role == "object":
             lines.append('object: {topic: "?"}   # CHANGE: no topic holds poses that move')
     lines.append("pushes: {cut: rest}   # between two rests of the object")

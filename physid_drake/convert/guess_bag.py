@@ -11,7 +11,9 @@ import numpy as np
 
 from physid_drake.convert.bag import RECEIVE, STAMP, Bag, Key, Track
 from physid_drake.convert.bag_frames import joined
+from physid_drake.convert.bag_values import holds_transforms
 from physid_drake.convert.columns import Array
+from physid_drake.convert.transforms import STATIC
 
 MOVES: Final = 0.005
 """m: what never is so far from where it was at first does not move, give or take a tracker's noise."""
@@ -69,6 +71,14 @@ def row_of(key: Key, track: Track) -> tuple[str, ...]:
 def name_of(key: Key) -> str:
     """A topic, with which of its frames or poses."""
     return f"{key[0]} {key[1] or ''}".strip()
+
+
+def in_a_map(bag: Bag, key: Key) -> Key:
+    """How a map names a track: a frame of a tree by the topic of what moves there."""
+    topic, child = key
+    moving = topic.removesuffix(STATIC)
+    kind, _ = bag.topics.get(moving, ("", 0))
+    return (moving, child) if holds_transforms(kind) else key
 
 
 def frame_lines(key: str, bag: Bag, where: Key, body: Key) -> list[str]:
