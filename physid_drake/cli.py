@@ -160,6 +160,7 @@ def _run_convert(arguments: argparse.Namespace) -> int:
 def _guess(arguments: argparse.Namespace) -> int:
     from physid_drake.convert.guess import guess_map, is_bag  # noqa: PLC0415
     from physid_drake.report.inspection import log_table  # noqa: PLC0415
+    from physid_drake.report.progress import progress_bar  # noqa: PLC0415
     from physid_drake.report.terminal import terminal  # noqa: PLC0415
 
     if arguments.layout not in ("table", "bag"):
@@ -171,7 +172,8 @@ def _guess(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"'{arguments.source}': is no {arguments.layout}; use `convert {other}`.")
     if arguments.map is not None and arguments.map.exists():
         raise ConfigError(f"--map '{arguments.map}': is there; choose another name for the map that is guessed.")
-    guess = guess_map(arguments.source)
+    with progress_bar(terminal()) as progress:
+        guess = guess_map(arguments.source, progress)
     terminal().print(log_table(arguments.source.name, guess.rows))
     if arguments.map is None:
         print(guess.text, end="")

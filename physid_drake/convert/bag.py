@@ -6,7 +6,7 @@ from array import array
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -25,11 +25,15 @@ from physid_drake.convert.bag_values import (
 from physid_drake.convert.columns import Array, Columns
 from physid_drake.convert.transforms import STATIC, Link, Tree, partner_of
 from physid_drake.errors import RecordingError
+from physid_drake.progress import Progress
 from physid_drake.wording import named, shown
 
 STAMP, RECEIVE = "stamp", "receive"
 MOST_POSES: Final = 8
 """Of the poses of one message: so many are looked at for a first map."""
+
+TOLD: Final = 5000
+"""Messages, after which somebody who waits is told how far it is."""
 
 _TREE: Final = "/tf"
 _NAMES: Final = {len(names): names for names in (POINT, WRENCH, POSE)}
@@ -108,8 +112,12 @@ def read_bag(source: Path, wanted: Collection[Key], *, by_arrival: bool = False)
     return Bag(tracks=tracks, tree=found.tree(_TREE), topics=found.topics())
 
 
-def read_whole_bag(source: Path) -> Bag:
+def read_whole_bag(source: Path, progress: Progress | None = None) -> Bag:
     """All that a map could name, with why something cannot be followed.
+
+    Args:
+        source: a file, or a folder of them.
+        progress: called with the file that is read, messages read and messages in all.
 
     Raises:
         RecordingError: if the bag cannot be read.
@@ -120,6 +128,7 @@ def read_whole_bag(source: Path) -> Bag:
         source,
         lambda _, kind: holds_numbers(kind),
         lambda topic, child: not holds_poses(found.kinds[topic]) or child in some,
+        progress,
     )
     tracks: dict[Key, Track] = {}
     refused: dict[Key, str] = {}
@@ -163,21 +172,38 @@ class _Gathered:
         self._trees: dict[str, Tree] = {}
 
     def gather(
-        self, source: Path, chosen: Callable[[str, str], bool], kept: Callable[[str, str | None], bool]
+        self,
+        source: Path,
+        chosen: Callable[[str, str], bool],
+        kept: Callable[[str, str | None], bool],
+        progress: Progress | None = None,
     ) -> None:
         """Reads the topics that are chosen by name and type, and keeps what is wanted of them; trees as a whole."""
         for file in opened_files(source):
             self.kinds |= file.kinds
+            topics = {topic for topic, kind in file.kinds.items() if chosen(topic, kind)}
+            total = 0
             for topic, count in file.counts():
                 self._counts[topic] = self._counts.get(topic, 0) + count
-            topics = [topic for topic, kind in file.kinds.items() if chosen(topic, kind)]
-            for topic, kind, receive, message in file.messages(topics):
-                for taken in taken_from(message, kind) if holds_numbers(kind) else ():
-                    if taken.child is not None:
-                        children = self._children.setdefault(topic, {})
-                        children[taken.child] = children.get(taken.child, 0) + 1
-                    if holds_transforms(kind) or kept(topic, taken.child):
-                        self.rows.setdefault((topic, taken.child), _Rows()).add(topic, taken, receive)
+                total += count if topic in topics else 0
+            for done, (topic, kind, receive, message) in enumerate(file.messages(topics)):
+                if progress is not None and done % TOLD == TOLD - 1:
+                    progress(f"reading {file.file.name}", done, total)
+                if holds_numbers(kind):
+                    self._add(topic, kind, receive, message, kept)
+
+    def _add(
+        self, topic: str, kind: str, receive: float, message: Any, kept: Callable[[str, str | None], bool]
+    ) -> None:
+        for taken in taken_from(message, kind):
+            if taken.child is not None:
+                children = self._children.setdefault(topic, {})
+                children[taken.child] = children.get(taken.child, 0) + 1
+            if holds_transforms(kind) or kept(topic, taken.child):
+                key = topic, taken.child
+                if key not in self.rows:
+                    self.rows[key] = _Rows()
+                self.rows[key].add(topic, taken, receive)
 
     def topics(self) -> dict[str, tuple[str, int]]:
         """Type and number of messages of all topics."""

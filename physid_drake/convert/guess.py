@@ -29,6 +29,7 @@ from physid_drake.convert.guess_bag import (
     unread_lines,
 )
 from physid_drake.convert.units import FORCES, LENGTHS, TIMES
+from physid_drake.progress import Progress
 from physid_drake.recording.adapters.sources import source_files
 from physid_drake.recording.clocks import LIKELY
 from physid_drake.wording import named
@@ -68,14 +69,18 @@ class Guess:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # numbers out of all proportion are looked at as well
-def guess_map(source: Path) -> Guess:
+def guess_map(source: Path, progress: Progress | None = None) -> Guess:
     """Looks at a table, a bag, or a folder of tables.
+
+    Args:
+        source: a file or a folder.
+        progress: of a large bag, called with the file that is read, messages read and messages in all.
 
     Raises:
         RecordingError: if it cannot be read.
     """
     source = Path(source)
-    return _guess_bag(source) if is_bag(source) else _guess_table(source)
+    return _guess_bag(source, progress) if is_bag(source) else _guess_table(source)
 
 
 def is_bag(source: Path) -> bool:
@@ -316,8 +321,8 @@ def _cut_line(columns: Columns, time: str | None, *, many: bool) -> str:
     return "pushes: {cut: rest}   # between two rests of the object"
 
 
-def _guess_bag(source: Path) -> Guess:
-    bag = read_whole_bag(source)
+def _guess_bag(source: Path, progress: Progress | None) -> Guess:
+    bag = read_whole_bag(source, progress)
     rows = [row_of(key, track) for key, track in bag.tracks.items()]
     read = {topic for topic, _ in bag.tracks}
     rows += [(topic, str(count), "", kind, "") for topic, (kind, count) in bag.topics.items() if topic not in read]
