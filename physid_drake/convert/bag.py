@@ -96,7 +96,9 @@ def read_bag(source: Path, wanted: Collection[Key], *, by_arrival: bool = False)
 
     def chosen(topic: str, kind: str) -> bool:
         if topic in topics and not holds_numbers(kind):
-            raise RecordingError(f"topic {shown(topic)} is of {kind}, which holds no pose, point or force.")
+            raise RecordingError(
+                f"topic {shown(topic)} is of {kind}, no standard type of a pose, a point or a force."
+            )
         others = {partner_of(one) for one in (*topics, _TREE)}
         return topic in topics or (topic in others and holds_transforms(kind))
 

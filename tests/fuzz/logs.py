@@ -15,6 +15,7 @@ from typing import Any
 
 import foreign
 import yaml
+from foreign.frame_trees import tree
 
 from fuzz import seeds
 from fuzz.case import Case
@@ -27,6 +28,11 @@ TABLES = foreign.TABLES | {
     "rows.csv": foreign.Log(write=foreign.rulers),
     "tracks": foreign.Log(write=foreign.video),
 }
+BAGS = foreign.BAGS | {
+    "tree": foreign.Log(write=tree, needs="rosbags"),
+    "tree.bag": foreign.Log(write=tree, needs="rosbags"),
+    "loop": foreign.Log(write=partial(tree, wrong=True), needs="rosbags"),
+}
 MESHES = ("stl", "obj", "glb", "ply", "off")
 FIELDS = ("nan", "inf", "-inf", "1e308", "-1", "x", "", "0", "1e400", "9" * 400, "1_0", "1,5", "1.000,5", "\u0661",
           '"', "NULL", "--", "1e-320", "0x1", "true")  # fmt: skip
@@ -34,7 +40,7 @@ FIELDS = ("nan", "inf", "-inf", "1e308", "-1", "x", "", "0", "1e400", "9" * 400,
 
 def make(rng: Random, folder: Path) -> Case:
     """A log that is converted, or looked at for a first map."""
-    logs = {**TABLES, **foreign.BAGS}
+    logs = {**TABLES, **BAGS}
     name = rng.choice([name for name, log in logs.items() if importlib.util.find_spec(log.needs)])
     files, chart = _written(name)
     changed = dict(files)
@@ -53,7 +59,7 @@ def make(rng: Random, folder: Path) -> Case:
     (folder / "s/map.yaml").write_bytes(chart)
     if rng.random() < 0.03:
         replaced(rng, rng.choice([folder / "s/map.yaml", *((folder / "s" / one) for one in changed)]))
-    convert = convert_bag if name in foreign.BAGS else convert_table
+    convert = convert_bag if name in BAGS else convert_table
     if rng.random() < 0.2:
         return Case(partial(guess_map, folder / "s" / name))
     return Case(partial(_convert, convert, folder / "s" / name, folder))
@@ -69,7 +75,7 @@ def _convert(convert: Any, source: Path, folder: Path) -> None:
 @cache
 def _written(name: str) -> tuple[seeds.Files, bytes]:
     """The files of a log of two short pushes, and its map."""
-    writer = {**TABLES, **foreign.BAGS}[name].write
+    writer = {**TABLES, **BAGS}[name].write
     with tempfile.TemporaryDirectory() as scratch:
         chart = writer(seeds.read_small(), Path(scratch) / name)
         found = {

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from foreign.common import DESCRIPTION, EPOCH, HAND
+from foreign.frame_trees import CAMERA, OPTICAL, Pose, Writing, inside
 from scipy.spatial.transform import Rotation
 
 pytest.importorskip("rosbags")
@@ -22,7 +21,6 @@ from physid_drake.recording import Recording
 
 TIMES = np.arange(0.0, 6.0, 0.01)
 UPRIGHT = Rotation.identity()
-Pose = tuple[np.ndarray, Rotation]
 
 
 def push(time: float) -> tuple[Pose, Pose]:
@@ -33,100 +31,7 @@ def push(time: float) -> tuple[Pose, Pose]:
     return (np.array([way, 0.0, 0.05]), turn), (np.array([way + behind - 0.1, 0.0, 0.05]), UPRIGHT)
 
 
-@dataclass
-class Writing:
-    """A bag that is written with rosbags: of ROS 2 in a folder, or of ROS 1 in a file."""
-
-    path: Path
-    options: dict[str, Any] = field(default_factory=dict)
-    rows: list[tuple[float, str, str, Any]] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-        self.is_first = self.path.suffix == ".bag"
-        self.store = get_typestore(Stores.ROS1_NOETIC if self.is_first else Stores.ROS2_HUMBLE)
-        if self.is_first:
-            for name in ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"):
-                self.store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms\n", name))
-
-    def __enter__(self) -> Writing:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        from rosbags import rosbag1, rosbag2
-
-        if self.is_first:
-            bag: Any = rosbag1.Writer(self.path)
-        else:
-            bag = rosbag2.Writer(self.path, version=8, storage_plugin=rosbag2.StoragePlugin.SQLITE3)
-            if self.options:
-                bag.set_compression(**self.options)
-        kinds = {topic: kind for _, topic, kind, _ in self.rows}
-        write = self.store.serialize_ros1 if self.is_first else self.store.serialize_cdr
-        with bag:
-            links = {topic: bag.add_connection(topic, kind, typestore=self.store) for topic, kind in kinds.items()}
-            for time, topic, kind, message in sorted(self.rows, key=lambda row: row[0]):
-                bag.write(links[topic], round(1e9 * (EPOCH + time)), bytes(write(message, kind)))
-
-    def header(self, time: float, frame: str) -> Any:
-        now = EPOCH + time
-        stamp = self.make("builtin_interfaces/msg/Time", sec=int(now), nanosec=round((now % 1.0) * 1e9) % 10**9)
-        return self.make("std_msgs/msg/Header", stamp=stamp, frame_id=frame, **({"seq": 0} if self.is_first else {}))
-
-    def make(self, kind: str, *values: Any, **named: Any) -> Any:
-        return self.store.types[kind](*values, **named)
-
-    def pose(self, topic: str, time: float, frame: str, *poses: Pose) -> None:
-        """A PoseStamped; a PoseArray of several."""
-        made = [
-            self.make(
-                "geometry_msgs/msg/Pose",
-                position=self.make("geometry_msgs/msg/Point", *map(float, place)),
-                orientation=self.make("geometry_msgs/msg/Quaternion", *map(float, turn.as_quat())),
-            )
-            for place, turn in poses
-        ]
-        header = self.header(time, frame)
-        if len(made) == 1:
-            kind, message = "PoseStamped", self.make("geometry_msgs/msg/PoseStamped", header=header, pose=made[0])
-        else:
-            kind, message = "PoseArray", self.make("geometry_msgs/msg/PoseArray", header=header, poses=made)
-        self.rows.append((time, topic, f"geometry_msgs/msg/{kind}", message))
-
-    def transform(self, topic: str, time: float, parent: str, child: str, pose: Pose, kind: str = "tf2_msgs") -> None:
-        place, turn = pose
-        moved = self.make(
-            "geometry_msgs/msg/Transform",
-            translation=self.make("geometry_msgs/msg/Vector3", *map(float, place)),
-            rotation=self.make("geometry_msgs/msg/Quaternion", *map(float, turn.as_quat())),
-        )
-        one = self.make(
-            "geometry_msgs/msg/TransformStamped",
-            header=self.header(time, parent), child_frame_id=child, transform=moved,
-        )  # fmt: skip
-        name = "tf/msg/tfMessage" if kind == "tf" else "tf2_msgs/msg/TFMessage"
-        self.rows.append((time, topic, name, self.make(name, transforms=[one])))
-
-    def force(self, topic: str, time: float, frame: str, force: Sequence[float]) -> None:
-        felt = self.make(
-            "geometry_msgs/msg/Wrench",
-            force=self.make("geometry_msgs/msg/Vector3", *map(float, force)),
-            torque=self.make("geometry_msgs/msg/Vector3", 0.0, 0.0, 0.0),
-        )
-        message = self.make("geometry_msgs/msg/WrenchStamped", header=self.header(time, frame), wrench=felt)
-        self.rows.append((time, topic, "geometry_msgs/msg/WrenchStamped", message))
-
-
-def inside(frame: Pose, pose: Pose) -> Pose:
-    """A pose in W as one in a frame of which the pose in W is known."""
-    place, turn = frame
-    return turn.inv().apply(pose[0] - place), turn.inv() * pose[1]
-
-
 BASE: Pose = (np.array([0.06, -0.02, 0.0]), Rotation.from_euler("z", 20, degrees=True))
-CAMERA: Pose = (np.array([0.1, -0.2, 1.2]), Rotation.from_euler("xyz", [178, 3, 30], degrees=True))
-OPTICAL = Rotation.from_euler("xyz", [-90, 0, -90], degrees=True)
 
 
 def apart(path: Path, *, static: bool = False, **options: Any) -> Path:
@@ -377,3 +282,30 @@ def test_poses_of_an_array_by_their_index(steady: bool, tmp_path: Path) -> None:
     assert any("topic /seen (PoseArray) has more poses at times" in line for line in said) != steady
     with pytest.raises(RecordingError, match=r"topic '/seen' holds poses of '\[0\]', '\[1\]'.*; add the one"):
         converted(tmp_path / "bag", "object: {topic: /seen}\nhand: {topic: /tip}\n", tmp_path)
+
+
+def test_a_type_that_is_only_called_like_one(tmp_path: Path) -> None:
+    """Its definition is the bag's, which is not read."""
+    from rosbags.typesys import get_types_from_msg
+
+    with Writing(tmp_path / "bag") as bag:
+        kind = "turtlesim/msg/Pose"
+        bag.store.register(get_types_from_msg("float32 x\nfloat32 y\n", kind))
+        for time in TIMES.tolist():
+            body, hand = push(time)
+            bag.rows.append((time, "/turtle", kind, bag.make(kind, 1.0, 2.0)))
+            bag.pose("/mug", time, "world", body)
+            bag.pose("/tip", time, "world", hand)
+    guess = guess_map(tmp_path / "bag")
+    assert 'object: {topic: "/mug"}' in guess.text and ("/turtle", "600", "", kind, "") in guess.rows
+    with pytest.raises(RecordingError, match=r"'/turtle' is of turtlesim/msg/Pose, no standard type"):
+        converted(tmp_path / "bag", PLAIN.replace("/mug", "/turtle"), tmp_path)
+
+
+def test_roots_without_a_name_are_not_the_same(tmp_path: Path) -> None:
+    with Writing(tmp_path / "bag") as bag:
+        bag.transform("/tf_static", 0.0, "", "mocap", BASE)
+        bag.transform("/tf_static", 0.0, "", "base", CAMERA)
+        bag.pose("/mug", 0.0, "mocap", BASE)
+    tree = read_bag(tmp_path / "bag", [("/mug", None)]).tree
+    assert set(tree.links) == {"mocap", "base"} and tree.joined("mocap", "base") is None
