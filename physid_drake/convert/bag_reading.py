@@ -34,6 +34,9 @@ _NEEDED: Final = "reading bags needs rosbags, which is not installed; run `pip i
 _ZSTD: Final = b"\x28\xb5\x2f\xfd"
 """First bytes of what zstd has compressed; a message that is not begins with 0."""
 
+_FIRST: Final = b"#ROSBAG V2.0\n"
+"""The first line of a bag of ROS 1."""
+
 _TRANSFORMS: Final = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 """Types of ROS 1 that rosbags does not know, though every robot sends them."""
 
@@ -133,6 +136,7 @@ def _opened(file: Path) -> Iterator[Any]:
     with tempfile.TemporaryDirectory() as folder:
         try:
             check_plain(file)
+            _check_first_line(file)
             # SQLite reads options from a file's name.
             plain = Path(folder) / f"bag{file.suffix}"
             plain.symlink_to(file.resolve())
@@ -144,6 +148,14 @@ def _opened(file: Path) -> Iterator[Any]:
             raise RecordingError(f"{named(file)}: {error}.") from error
         except Exception as error:  # a bag that is cut off breaks wherever its reader happens to be
             raise RecordingError(f"{named(file)}: {CUT_OFF}.") from error
+
+
+def _check_first_line(file: Path) -> None:
+    """Its reader takes all of a file for the first line where no line ends."""
+    if file.suffix == ".bag":
+        with file.open("rb") as opened:
+            if opened.read(len(_FIRST)) != _FIRST:
+                raise RecordingError(f"{named(file)}: {CUT_OFF}.")
 
 
 def _rosbags(module: str) -> Any:

@@ -42,14 +42,14 @@ def roles_in_bag(bag: Bag, hand_words: Sequence[str], body_words: Sequence[str])
     force = next((key for key in bag.tracks if key not in placed), None)
     begins = {key: onset for key, track in placed.items() if (onset := _onset(track)) is not None}
     candidates = list(begins or placed)
-    hand, body = _called(candidates, placed, hand_words), _called(candidates, placed, body_words)
-    if hand == body:
-        hand = None
+    body = _called(candidates, placed, body_words)
+    hand = _called([key for key in candidates if key != body], placed, hand_words)
     if body is None:
-        # What carries the hand moves with it.
-        chain = set() if hand is None else {hand[1], *placed[hand].through}
-        rest = [key for key in candidates if key != hand and (key[1] is None or key[1] not in chain)]
-        turned = [key for key in rest if "qx" in placed[key].columns.numbers] or rest
+        # What carries the hand, or is a part of it, moves with it.
+        chain = set() if hand is None else {hand[1], *placed[hand].through} - {None}
+        rest = [key for key in candidates if key != hand and key[1] not in chain]
+        rest = [key for key in rest if not _holds(name_of(key).lower(), hand_words)] or rest
+        turned = [key for key in rest if QUATERNION[0] in placed[key].columns.numbers] or rest
         # With a hand of no name, one alone is the object.
         body = max(turned, key=lambda key: begins.get(key, 0.0), default=None)
     rest = [key for key in candidates if key not in (hand, body)]

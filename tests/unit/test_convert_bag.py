@@ -123,3 +123,13 @@ def test_a_guess_is_a_map(name: str, bags: Path, tmp_path: Path) -> None:
     assert chart.hand_path.frame == (None if name == "pushes.bag" else "finger")
     rates = {row[0].partition(" ")[0]: row[2] for row in guess.rows}
     assert rates[{"pushes.bag": "/ft"}.get(name, "/ft/wrench")] == {"pushes.bag": "100"}.get(name, "500")
+
+
+def test_a_file_without_a_first_line_is_not_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The reader would look for its end in all of a file."""
+    import rosbags.rosbag1
+
+    monkeypatch.setattr(rosbags.rosbag1.Reader, "open", lambda _: pytest.fail("it was opened"))
+    (tmp_path / "log.bag").write_bytes(bytes(1000))
+    with pytest.raises(RecordingError, match=r"log\.bag: no bag that can be read"):
+        guess_map(tmp_path / "log.bag")

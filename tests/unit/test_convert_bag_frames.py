@@ -227,6 +227,17 @@ def test_the_hand_moves_first(tmp_path: Path) -> None:
     assert 'object: {topic: "/b"}' in text and 'hand: {topic: "/c"}' in text
 
 
+@pytest.mark.parametrize("name", ["box", "whatever"])
+def test_a_word_in_all_names_tells_nothing(name: str, tmp_path: Path) -> None:
+    with Writing(tmp_path / "bag") as bag:
+        for time in TIMES.tolist():
+            body, hand = push(time)
+            bag.pose(f"/robot/{name}", time, "world", body)
+            bag.pose("/robot/probe", time, "world", hand)
+    text = guess_map(tmp_path / "bag").text
+    assert f'object: {{topic: "/robot/{name}"}}' in text and 'hand: {topic: "/robot/probe"}' in text
+
+
 @pytest.mark.parametrize("static", [True, False])
 def test_a_guess_names_frames(static: bool, tmp_path: Path) -> None:
     guess = guess_map(apart(tmp_path / "bag", static=static))
