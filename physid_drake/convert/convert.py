@@ -5,23 +5,23 @@ from __future__ import annotations
 import hashlib
 import tempfile
 import warnings
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from physid_drake.convert.arrays import READERS, read_array_table
 from physid_drake.convert.bag import ENDINGS, RECEIVE, STAMP, bag_files, read_bag
 from physid_drake.convert.columns import Columns
-from physid_drake.convert.cutting import Piece, pieces_of, rows_by_value, sizes_said
+from physid_drake.convert.cutting import Piece, pieces_of, sizes_said
 from physid_drake.convert.map_reading import read_map
 from physid_drake.convert.mapping import Clock, ForceMap, Map, Offset, PoseMap, Quantity, Turn
 from physid_drake.convert.prisms import prism_of, prism_of_boxes
 from physid_drake.convert.streams import Streams, end_streams, streams_of
-from physid_drake.convert.text_table import read_text_table
+from physid_drake.convert.tables import ARRAYS, TEXTS, Logs, Parts, table_logs
 from physid_drake.errors import RecordingError
 from physid_drake.files import FileError, read_text, sha256_of
 from physid_drake.recording import (
@@ -37,15 +37,10 @@ from physid_drake.recording import (
     write_recording,
 )
 from physid_drake.recording.adapters.sources import source_files
-from physid_drake.wording import named, shown
+from physid_drake.wording import alike, named, shown
 
-TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".trc")
-ARRAYS: Final = tuple(READERS)
 LARGEST_REACH: Final = 1.0
 """m: of a mesh, whose file is not read here."""
-
-Parts = list[tuple[str, Map, Mapping[str, Columns]]]
-"""What of a log is cut on its own: a label, the map with the columns' names in it, and the columns of each stream."""
 
 
 def convert_table(source: Path, folder: Path, map_file: Path) -> Recording:
@@ -69,9 +64,7 @@ def convert_table(source: Path, folder: Path, map_file: Path) -> Recording:
     if source.is_dir() and any(file.suffix in ENDINGS for file in source.iterdir()):
         raise RecordingError(f"{named(source)}: holds a bag; use `convert bag`.")
     files = source_files(source, *TEXTS, *ARRAYS)
-    return _convert(
-        source, folder, map_file, files, lambda file, chart: _table_parts(read_columns(file, chart), chart)
-    )
+    return _convert(source, folder, map_file, files, partial(table_logs, files))
 
 
 def convert_bag(source: Path, folder: Path, map_file: Path) -> Recording:
@@ -90,18 +83,11 @@ def convert_bag(source: Path, folder: Path, map_file: Path) -> Recording:
         OutputError: if the folder cannot be written.
     """
     files = bag_files(Path(source))
-    return _convert(source, folder, map_file, files, lambda _, chart: _bag_parts(Path(source), chart), whole=True)
 
+    def logs(chart: Map) -> Logs:
+        yield files[0].name, partial(_bag_parts, Path(source), chart)
 
-def read_columns(file: Path, chart: Map | None = None) -> Columns:
-    """The columns of a table, by the kind of its file.
-
-    Raises:
-        RecordingError: if it cannot be read.
-    """
-    if file.suffix.lower() in ARRAYS:
-        return read_array_table(file)
-    return read_text_table(file, None if chart is None else chart.dialect)
+    return _convert(source, folder, map_file, files, logs)
 
 
 def _convert(
@@ -109,24 +95,40 @@ def _convert(
     folder: Path,
     map_file: Path,
     files: Sequence[Path],
-    parts: Callable[[Path, Map], Parts],
-    *,
-    whole: bool = False,
+    logs: Callable[[Map], Logs],
 ) -> Recording:
     chart = _with_prism(read_map(Path(map_file)))
     pushes: list[Push] = []
-    for file in files[:1] if whole else files:
-        try:
-            pieces = _pieces(file.name, parts(file, chart))
-        except RecordingError as error:
-            said = str(error)
-            raise RecordingError(said if file.name in said else f"{named(file)}: {said}") from error
-        for label, piece in pieces:
-            note = f"{file.name}{label}, from {piece.begin:.10g} s"
-            pushes.append(_push(piece, len(pushes) + 1, note, chart))
+    with _warned_by_kind():
+        for name, parts in logs(chart):
+            try:
+                pieces = _pieces(name, parts())
+            except RecordingError as error:
+                said = str(error)
+                raise RecordingError(said if name in said else f"{named(name)}: {said}") from error
+            for label, piece in pieces:
+                note = f"{name}{label}, from {piece.begin:.10g} s"
+                pushes.append(_push(piece, len(pushes) + 1, note, chart))
     if not pushes:
         raise RecordingError(f"{named(source)}: no push was found; see what was left out, and the map's 'pushes:'.")
     return _written(pushes, chart, _conversion(Path(source), files, chart), folder)
+
+
+@contextmanager
+def _warned_by_kind() -> Iterator[None]:
+    """Of warnings that are alike but for their numbers, the first, and how many more there are."""
+    caught: list[warnings.WarningMessage] = []
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            yield
+    finally:
+        for one in caught:
+            if one.category is not UserWarning:
+                warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
+        for said in alike(str(one.message) for one in caught if one.category is UserWarning):
+            more = f" ({len(said) - 1} more like it)" if len(said) > 1 else ""
+            warnings.warn(f"{said[0]}{more}", UserWarning, stacklevel=3)
 
 
 def _with_prism(chart: Map) -> Map:
@@ -161,43 +163,6 @@ def _pieces(name: str, parts: Parts) -> list[tuple[str, Piece]]:
             warnings.warn(f"{name}{label}: {line}", UserWarning, stacklevel=2)
         found.extend((label, piece) for piece in pieces)
     return found
-
-
-def _table_parts(columns: Columns, chart: Map) -> Parts:
-    """The table, or its rows by the value of a column."""
-    for key, stream in (("object", chart.object), ("hand", chart.hand_path), ("force", chart.force)):
-        if stream is not None and stream.topic is not None:
-            raise RecordingError(f"{key}: topic is of bags; give columns, or use `convert bag`.")
-    if chart.cut.by == "rows":
-        return [(f", row {row}", chart, _shared(part)) for row, part in _single_rows(columns)]
-    if chart.cut.by != "column" or chart.cut.column is None:
-        return [("", chart, _shared(columns))]
-    name = columns.find(chart.cut.column)
-    values = columns.numbers[name]
-    alike = [one for one in columns.numbers if len(columns.numbers[one]) == len(values)]
-    parts: Parts = []
-    pieces = list(rows_by_value(values))
-    for value, count in Counter(value for value, _ in pieces).items():
-        if count > 1:
-            warnings.warn(
-                f"{columns.source}: {name} {value:g} comes in {count} pieces, and each is taken for a push.",
-                UserWarning, stacklevel=2,
-            )  # fmt: skip
-    for value, rows in pieces:
-        numbers = {one: columns.numbers[one][rows] for one in alike}
-        parts.append((f", {name} {value:g}", chart, _shared(replace(columns, numbers=numbers, texts={}, rows=()))))
-    return parts
-
-
-def _single_rows(columns: Columns) -> Iterator[tuple[int, Columns]]:
-    """Each row of a table on its own, by its line."""
-    for k in range(max(map(len, columns.numbers.values()))):
-        numbers = {name: values[k : k + 1] for name, values in columns.numbers.items()}
-        yield (columns.rows[k] if columns.rows else k), replace(columns, numbers=numbers, texts={}, rows=())
-
-
-def _shared(columns: Columns) -> dict[str, Columns]:
-    return dict.fromkeys(("object", "hand", "force"), columns)
 
 
 def _bag_parts(source: Path, chart: Map) -> Parts:

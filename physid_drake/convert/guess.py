@@ -17,7 +17,7 @@ import numpy as np
 from physid_drake.convert.bag import ENDINGS, RECEIVE, STAMP, TopicInfo, holds_numbers, read_bag, topics_of
 from physid_drake.convert.bodies import Body, bodies_of, up_of
 from physid_drake.convert.columns import Array, Columns
-from physid_drake.convert.convert import ARRAYS, TEXTS, read_columns
+from physid_drake.convert.tables import ARRAYS, TEXTS, read_columns
 from physid_drake.convert.units import FORCES, LENGTHS, TIMES
 from physid_drake.recording.adapters.sources import source_files
 from physid_drake.recording.clocks import LIKELY
