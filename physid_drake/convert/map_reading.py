@@ -335,6 +335,8 @@ def _force(section: Section) -> ForceMap:
 def _quantity(section: Section, kind: Mapping[str, float], counts: tuple[int, ...]) -> Quantity:
     section.check_keys("columns", "unit")
     columns = _names(section, counts) if section.has("columns") else ()
+    if isinstance(section.values.get("unit"), int | float):
+        return Quantity(columns=columns, size=positive(section, "unit", 1.0))
     return Quantity(columns=columns, unit=unit_of(section, kind, "it"))
 
 

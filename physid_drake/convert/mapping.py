@@ -34,10 +34,11 @@ COUNTS: Final[Mapping[str, tuple[int, ...]]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """Columns of one kind: where they are, and what turns them into SI units."""
+    """Columns of one kind, and what turns them into SI units: a unit's name, or the size of one that has none."""
 
     columns: tuple[str, ...] = ()
     unit: str | None = None
+    size: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

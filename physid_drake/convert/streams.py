@@ -235,6 +235,8 @@ def _times(columns: Columns, clock: Clock, chart: Map, rows: Rows, count: int) -
 
 def _scaled(columns: Columns, quantity: Quantity, kind: Mapping[str, float], default: str) -> Array:
     values = columns.stack(quantity.columns)
+    if quantity.size is not None:
+        return quantity.size * values
     stated = {unit for unit in map(columns.unit_of, quantity.columns) if unit is not None}
     if kind is LENGTHS and not stated and columns.length is not None:
         stated = {columns.length}

@@ -119,3 +119,28 @@ def test_times_of_too_few_digits_are_said_once(sealed: Recording, tmp_path: Path
     ) as said:
         convert_table(tmp_path / "log.csv", tmp_path / "recording", tmp_path / "map.yaml")
     assert len([one for one in said if "have the time" in str(one.message)]) == 1
+
+
+def test_a_unit_without_a_name_is_a_number(sealed: Recording, tmp_path: Path) -> None:
+    """Pixels of 1.25 mm of a camera that looks down, at a rate."""
+    rows = ["trial,x,y,hx,hy"]
+    times = np.arange(0.0, 1.0, 0.02)
+    for k, push in enumerate(sealed.pushes[:2]):
+        assert push.hand is not None
+        both = [np.interp(times, s.times, s.positions[:, c]) for s in (push.object, push.hand) for c in (0, 1)]
+        rows += [f"{k}," + ",".join(f"{v / 0.00125:.4f}" for v in row) for row in np.column_stack(both)]
+    (tmp_path / "log.csv").write_text("\n".join(rows), encoding="utf-8")
+    chart = (
+        HEAD + "time: {rate_hz: 50}\npushes: {cut: column, column: trial}\n"
+        "object: {position: {columns: [x, y], unit: 0.00125}, rotation: none, height_m: 0.023}\n"
+        "hand: {position: {columns: [hx, hy], unit: 0.00125}, rotation: none, height_m: 0.023}\n"
+    )
+    (tmp_path / "map.yaml").write_text(chart, encoding="utf-8")
+    found = convert_table(tmp_path / "log.csv", tmp_path / "recording", tmp_path / "map.yaml")
+    for push, other in zip(sealed.pushes[:2], found.pushes, strict=True):
+        at = [np.interp(other.object.times, push.object.times, push.object.positions[:, c]) for c in (0, 1)]
+        assert np.abs(np.column_stack(at) - other.object.positions[:, :2]).max() < 1e-6
+        assert np.diff(other.object.times) == pytest.approx(0.02)
+    (tmp_path / "map.yaml").write_text(chart.replace("0.00125", "-1"), encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"position.unit: must be positive, but got -1"):
+        convert_table(tmp_path / "log.csv", tmp_path / "other", tmp_path / "map.yaml")
