@@ -10,27 +10,23 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from physid_drake.convert.bag import ENDINGS, RECEIVE, STAMP, bag_files, read_bag
 from physid_drake.convert.columns import Columns
-from physid_drake.convert.cutting import Piece, pieces_of, sizes_said
+from physid_drake.convert.cutting import Piece
 from physid_drake.convert.map_reading import read_map
 from physid_drake.convert.mapping import Clock, ForceMap, Map, Offset, PoseMap, Quantity, Turn
 from physid_drake.convert.prisms import prism_of, prism_of_boxes
-from physid_drake.convert.streams import Streams, end_streams, streams_of
+from physid_drake.convert.streams import end_streams, streams_of
 from physid_drake.convert.tables import ARRAYS, TEXTS, Logs, Parts, table_logs
+from physid_drake.convert.take import push_of, reach_of, warned_pieces
 from physid_drake.errors import RecordingError
 from physid_drake.files import FileError, read_text, sha256_of
 from physid_drake.recording import (
-    Box,
     Conversion,
-    Cylinder,
-    ForceStream,
     ObjectModel,
-    Prism,
     Push,
     Recording,
     read_recording,
@@ -38,9 +34,6 @@ from physid_drake.recording import (
 )
 from physid_drake.recording.adapters.sources import source_files
 from physid_drake.wording import alike, named, shown
-
-LARGEST_REACH: Final = 1.0
-"""m: of a mesh, whose file is not read here."""
 
 
 def convert_table(source: Path, folder: Path, map_file: Path) -> Recording:
@@ -108,7 +101,8 @@ def _convert(
                 raise RecordingError(said if name in said else f"{named(name)}: {said}") from error
             for label, piece in pieces:
                 note = f"{name}{label}, from {piece.begin:.10g} s"
-                pushes.append(_push(piece, len(pushes) + 1, note, chart))
+                tare = 0.0 if chart.force is None else chart.force.tare
+                pushes.append(push_of(piece, len(pushes) + 1, note, tare))
     if not pushes:
         raise RecordingError(f"{named(source)}: no push was found; see what was left out, and the map's 'pushes:'.")
     return _written(pushes, chart, _conversion(Path(source), files, chart), folder)
@@ -152,16 +146,11 @@ def _pieces(name: str, parts: Parts) -> list[tuple[str, Piece]]:
     """Pushes of one log, each with what tells it from the others of the log."""
     found: list[tuple[str, Piece]] = []
     for label, chart, columns in parts:
-        reach = _radius(_solid(chart)) + (chart.hand.radius if chart.hand is not None else 0.0)
         # What is out of all proportion is refused by what it makes.
         with np.errstate(over="ignore", invalid="ignore"):
             streams = end_streams(columns["object"], chart) if chart.cut.by == "rows" else streams_of(columns, chart)
-        pieces, left = pieces_of(streams, chart.cut, reach)
-        if not pieces and chart.cut.by == "rest":
-            left.append(f"along x, y, z of W {sizes_said(streams)}; are units and axes right?")
-        for line in left:
-            warnings.warn(f"{name}{label}: {line}", UserWarning, stacklevel=2)
-        found.extend((label, piece) for piece in pieces)
+        reach = reach_of(_solid(chart), chart.hand)
+        found.extend((label, piece) for piece in warned_pieces(streams, chart.cut, reach, f"{name}{label}: "))
     return found
 
 
@@ -214,44 +203,9 @@ def _clock(clock: Clock, columns: Columns, chart: Map) -> Clock:
     return replace(clock, column=STAMP)
 
 
-def _push(piece: Piece, number: int, note: str, chart: Map) -> Push:
-    streams = _from_zero(piece.streams, piece.begin)
-    force = streams.force
-    if force is not None and chart.force is not None and chart.force.tare > 0.0:
-        force = _tared(force, chart.force.tare, note)
-    return Push(name=f"pushes/{number:03d}.csv", object=streams.object, hand=streams.hand, force=force, note=note)
-
-
-def _from_zero(streams: Streams, begin: float) -> Streams:
-    hand, force = streams.hand, streams.force
-    return Streams(
-        object=replace(streams.object, times=streams.object.times - begin),
-        hand=None if hand is None else replace(hand, times=hand.times - begin),
-        force=None if force is None else replace(force, times=force.times - begin),
-    )
-
-
-def _tared(force: ForceStream, seconds: float, note: str) -> ForceStream:
-    untouched = force.times < force.times[0] + seconds
-    if untouched.all():
-        raise RecordingError(f"{note}: force: tare_s, {seconds:g} s, is longer than the push.")
-    return replace(force, forces=force.forces - force.forces[untouched].mean(axis=0))
-
-
 def _solid(chart: Map) -> ObjectModel:
     assert isinstance(chart.model, ObjectModel)
     return chart.model
-
-
-def _radius(model: ObjectModel) -> float:
-    shape = model.shape
-    if isinstance(shape, Box):
-        return 0.5 * float(np.hypot(*shape.size[:2]))
-    if isinstance(shape, Cylinder):
-        return shape.radius if shape.axis == "z" else float(np.hypot(shape.radius, 0.5 * shape.length))
-    if isinstance(shape, Prism):
-        return float(np.linalg.norm(shape.polygon, axis=1).max())
-    return LARGEST_REACH
 
 
 def _conversion(source: Path, files: Sequence[Path], chart: Map) -> Conversion:
