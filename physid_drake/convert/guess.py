@@ -16,10 +16,7 @@ import numpy as np
 
 from physid_drake.convert.bag import read_whole_bag
 from physid_drake.convert.bag_reading import ENDINGS, is_packed
-from physid_drake.convert.bodies import Body, bodies_of, up_of
-from physid_drake.convert.columns import Array, Columns
-from physid_drake.convert.convert import ARRAYS, TEXTS, read_columns
-from physid_drake.convert.guess_bag import (
+from physid_drake.convert.bag_roles import (
     QUATERNION,
     frame_lines,
     in_a_map,
@@ -28,6 +25,9 @@ from physid_drake.convert.guess_bag import (
     row_of,
     unread_lines,
 )
+from physid_drake.convert.bodies import Body, bodies_of, up_of
+from physid_drake.convert.columns import Array, Columns
+from physid_drake.convert.tables import ARRAYS, TEXTS, read_columns
 from physid_drake.convert.units import FORCES, LENGTHS, TIMES
 from physid_drake.progress import Progress
 from physid_drake.recording.adapters.sources import source_files

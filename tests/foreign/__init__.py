@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from foreign.apart import control, detections, frames, rostopic, trials
 from foreign.arrays import demonstrations, lerobot, matlab, padded_npz, transforms
 from foreign.bags import mcap, odometry, only_pushes, ros1
 from foreign.by_map import by_map, map_of
@@ -27,9 +28,10 @@ from foreign.text import (
 from physid_drake.recording import Recording
 
 __all__ = [
-    "BAGS", "DESCRIPTION", "HAND", "LEFT_HANDED", "TABLES", "Log", "assert_rests_agree", "by_map", "demonstrations",
-    "german", "lerobot", "map_of", "markers", "matlab", "mcap", "motive", "motive_euler", "odometry", "only_pushes",
-    "padded_npz", "qualisys", "ros1", "rtde", "rulers", "transforms", "unity", "vicon", "video",
+    "BAGS", "DESCRIPTION", "HAND", "LEFT_HANDED", "TABLES", "Log", "assert_rests_agree", "by_map", "control",
+    "demonstrations", "detections", "frames", "german", "lerobot", "map_of", "markers", "matlab", "mcap",
+    "motive", "motive_euler", "odometry", "only_pushes", "padded_npz", "qualisys", "ros1", "rostopic", "rtde",
+    "rulers", "transforms", "trials", "unity", "vicon", "video",
 ]  # fmt: skip
 
 
@@ -63,6 +65,11 @@ TABLES = {
     "transforms.npz": Log(write=transforms, exact=True),
     "trials.mat": Log(write=matlab, exact=True, rotation="yaw"),
     "demos.h5": Log(write=demonstrations, needs="h5py", exact=True),
+    "topics": Log(write=rostopic),
+    "trials": Log(write=trials, exact=True, rotation="yaw"),
+    "detections.csv": Log(write=detections),
+    "control.csv": Log(write=control, rotation="yaw"),
+    "frames": Log(write=frames, rotation="yaw"),
     "data.parquet": Log(write=lerobot, needs="pyarrow", exact=True, rotation="yaw"),
 }
 """Tables of whole pushes; ``rulers`` knows the ends only, ``video`` has no rotation and two clocks."""

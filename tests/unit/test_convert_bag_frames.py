@@ -119,8 +119,8 @@ def test_fixed_transforms_bring_hand_and_force_to_the_object(tmp_path: Path) -> 
 
 @pytest.mark.parametrize(("axes", "count"), [("world", 1), ("hand", 0)])
 def test_a_force_in_another_frame_is_said(axes: str, count: int, tmp_path: Path) -> None:
-    chart = "object: {topic: /mug}\nhand: {topic: /mug}\nforce: {topic: /ft, axes: %s}\n"
-    _, said = converted(apart(tmp_path / "bag"), chart % axes, tmp_path)
+    chart = f"{PLAIN}force: {{topic: /ft, axes: {axes}}}\n"
+    _, said = converted(apart(tmp_path / "bag"), chart, tmp_path)
     said = [line for line in said if line.startswith("force: it is in frame 'base'")]
     assert len(said) == count
     assert all("write axes: hand if it turns with the hand" in line for line in said)
