@@ -79,14 +79,14 @@ class BagFile:
         for _ in range(MOST_MESSAGES):
             try:
                 connection, time, raw = next(messages)
-                message = read(raw, connection.msgtype)
+                message, receive = read(raw, connection.msgtype), 1e-9 * time
             except StopIteration:
                 return
             except RecordingError as error:
                 raise RecordingError(f"{named(self.file)}: {error}") from error
             except Exception as error:
                 raise RecordingError(f"{named(self.file)}: {CUT_OFF}.") from error
-            yield connection.topic, connection.msgtype, 1e-9 * time, message
+            yield connection.topic, connection.msgtype, receive, message
         raise RecordingError(
             f"{named(self.file)}: its topics have more than {MOST_MESSAGES:,} messages; cut the pushes out of it."
         )
@@ -127,6 +127,9 @@ def opened_files(source: Path) -> Iterator[BagFile]:
     """
     for file in bag_files(source):
         with _opened(file) as reader:
+            # SQLite keeps whatever is written into a column.
+            if not all(isinstance(name, str) for c in reader.connections for name in (c.topic, c.msgtype)):
+                raise RecordingError(f"{named(file)}: {CUT_OFF}.")
             yield BagFile(file=file, reader=reader)
 
 

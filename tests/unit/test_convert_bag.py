@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sqlite3
 from pathlib import Path
 
 import foreign
@@ -133,3 +134,20 @@ def test_a_file_without_a_first_line_is_not_read(tmp_path: Path, monkeypatch: py
     (tmp_path / "log.bag").write_bytes(bytes(1000))
     with pytest.raises(RecordingError, match=r"log\.bag: no bag that can be read"):
         guess_map(tmp_path / "log.bag")
+
+
+@pytest.mark.parametrize(
+    "change", ["topics SET name = x'00ff'", "topics SET type = NULL", "messages SET timestamp = x'00ff'"]
+)
+def test_columns_of_another_type(change: str, bags: Path, tmp_path: Path) -> None:
+    shutil.copy(bags / "sqlite3/sqlite3.db3", tmp_path / "log.db3")
+    with sqlite3.connect(tmp_path / "log.db3") as base:
+        base.execute("PRAGMA ignore_check_constraints = ON")
+        base.execute("PRAGMA writable_schema = ON")
+        base.execute("UPDATE sqlite_schema SET sql = replace(sql, ' NOT NULL', '')")
+    base.close()
+    with sqlite3.connect(tmp_path / "log.db3") as base:
+        base.execute(f"UPDATE {change}")
+    base.close()
+    with pytest.raises(RecordingError, match=r"log\.db3: no bag that can be read"):
+        guess_map(tmp_path / "log.db3")
