@@ -39,6 +39,7 @@ class Columns:
         units: of the columns whose header states one.
         length: the unit of all lengths, where the file's preamble states one.
         rows: (n,) the line of each row in a text, or its index, for messages.
+        sections: tables in the file, of which this is one.
         unread: what else the log holds, by name, and why it is no column.
     """
 
@@ -48,6 +49,7 @@ class Columns:
     units: Mapping[str, str] = field(default_factory=dict)
     length: str | None = None
     rows: Sequence[int] = ()
+    sections: int = 1
     unread: Mapping[str, str] = field(default_factory=dict)
 
     def find(self, name: str) -> str:
@@ -114,7 +116,7 @@ def without_marks(where: str, numbers: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def seconds_of(texts: Sequence[str]) -> Array | None:
-    """Dates and times of ISO 8601 as seconds since 1970, times of the day as seconds; None if these are none.
+    """Dates and times of ISO 8601 as seconds since 1970, times of the day as seconds; None if one is neither.
 
     Where no zone is given, it is that of Greenwich: where a clock begins does not matter. Empty ones are NaN.
     """
@@ -125,9 +127,13 @@ def seconds_of(texts: Sequence[str]) -> Array | None:
 
 
 def _second(text: str) -> float:
-    if len(text) > 2 and text[2] == ":":
-        day = time.fromisoformat(text)
-        return 3600.0 * day.hour + 60.0 * day.minute + day.second + 1e-6 * day.microsecond
+    if len(text) > 2 and ":" in text[1:3]:
+        bare, _, half = text.partition(" ")
+        day = time.fromisoformat(bare.zfill(len(bare) + (bare[1] == ":")))
+        hour = {"": day.hour, "AM": day.hour % 12, "PM": day.hour % 12 + 12}.get(half.upper())
+        if hour is None:
+            raise ValueError(half)
+        return 3600.0 * hour + 60.0 * day.minute + day.second + 1e-6 * day.microsecond
     date = datetime.fromisoformat(text)
     return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
 

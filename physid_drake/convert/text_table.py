@@ -94,7 +94,7 @@ def read_text_table(path: Path, dialect: Dialect | None = None) -> Columns:
     if dialect.header_lines is not None:
         header = header[max(0, len(header) - dialect.header_lines) :]
     names, units = _names(header, _width(where, header, body))
-    return replace(_columns(where, names, units, body, decimal), length=_length_unit(text))
+    return replace(_columns(where, names, units, body, decimal), length=_length_unit(text), sections=len(sections))
 
 
 def _width(where: str, header: list[list[str]], body: Rows) -> int:
