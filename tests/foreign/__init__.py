@@ -7,7 +7,16 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from foreign.arrays import demonstrations, lerobot, matlab, padded_npz, transforms
+from foreign.arrays import (
+    demonstrations,
+    json_lines,
+    json_pushes,
+    lerobot,
+    matlab,
+    padded_npz,
+    records,
+    transforms,
+)
 from foreign.bags import mcap, odometry, only_pushes, ros1
 from foreign.by_map import by_map, map_of
 from foreign.common import DESCRIPTION, HAND, assert_rests_agree
@@ -28,8 +37,9 @@ from physid_drake.recording import Recording
 
 __all__ = [
     "BAGS", "DESCRIPTION", "HAND", "LEFT_HANDED", "TABLES", "Log", "assert_rests_agree", "by_map", "demonstrations",
-    "german", "lerobot", "map_of", "markers", "matlab", "mcap", "motive", "motive_euler", "odometry", "only_pushes",
-    "padded_npz", "qualisys", "ros1", "rtde", "rulers", "transforms", "unity", "vicon", "video",
+    "german", "json_lines", "json_pushes", "lerobot", "map_of", "markers", "matlab", "mcap", "motive", "motive_euler",
+    "odometry", "only_pushes", "padded_npz", "qualisys", "records", "ros1", "rtde", "rulers", "transforms", "unity",
+    "vicon", "video",
 ]  # fmt: skip
 
 
@@ -63,6 +73,9 @@ TABLES = {
     "transforms.npz": Log(write=transforms, exact=True),
     "trials.mat": Log(write=matlab, exact=True, rotation="yaw"),
     "demos.h5": Log(write=demonstrations, needs="h5py", exact=True),
+    "pushes.json": Log(write=json_pushes, exact=True),
+    "samples.jsonl": Log(write=json_lines, exact=True),
+    "samples.npy": Log(write=records, exact=True),
     "data.parquet": Log(write=lerobot, needs="pyarrow", exact=True, rotation="yaw"),
 }
 """Tables of whole pushes; ``rulers`` knows the ends only, ``video`` has no rotation and two clocks."""
