@@ -39,7 +39,6 @@ class Columns:
         units: of the columns whose header states one.
         length: the unit of all lengths, where the file's preamble states one.
         rows: (n,) the line of each row in a text, or its index, for messages.
-        sections: tables in the file, of which this is one.
         unread: what else the log holds, by name, and why it is no column.
     """
 
@@ -49,7 +48,6 @@ class Columns:
     units: Mapping[str, str] = field(default_factory=dict)
     length: str | None = None
     rows: Sequence[int] = ()
-    sections: int = 1
     unread: Mapping[str, str] = field(default_factory=dict)
 
     def find(self, name: str) -> str:

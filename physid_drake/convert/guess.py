@@ -65,7 +65,8 @@ def _guess_log(source: Path, log: Log) -> Guess:
             lines += pose_lines(key, body, table.columns, doubts[id(table)], _own_lines(body, others, table, main))
     if roles.force is not None:
         table = tables[id(roles.force)]
-        own = [*table.keys, *([] if table.times is None or table is main else [f"time: {table.times.text()}"])]
+        timed = table.times is not None and table is not main and table.times != main.times
+        own = [*table.keys, *([f"time: {table.times.text()}"] if timed and table.times else [])]
         lines += force_lines(roles.force, table.columns, own)
     lines.append(_cut_line(log, main))
     lines += _not_used(log, "\n".join(lines), [tables[id(one)] for one in _there(roles)])
@@ -121,9 +122,18 @@ def _own_lines(body: Body | None, others: Sequence[str], table: Table, main: Tab
         lines.append(f"time: {own.text(', offset_s: 0.0')}   # is it the same clock?")
     elif not fits(body.position, table.columns, table.times):
         lines.append('time: {column: "?", unit: s}   # CHANGE: it has times of its own')
+    elif table.times is not None and _is_elsewhere(table, main):
+        lines.append(f"time: {table.times.text(', offset_s: 0.0')}   # CHANGE: at no time of the object's clock")
     elif table is not main and table.times != main.times:
         lines.append(_time_line(table))
     return lines
+
+
+def _is_elsewhere(table: Table, main: Table) -> bool:
+    """Whether two tables have no time in common, by the clocks that they were written by."""
+    clocks = [None if one.times is None else one.times.seconds(one.columns) for one in (table, main)]
+    spans = [(np.nanmin(clock), np.nanmax(clock)) for clock in clocks if clock is not None]
+    return len(spans) > 1 and bool(max(span[0] for span in spans) > min(span[1] for span in spans))
 
 
 def _cut_line(log: Log, main: Table) -> str:

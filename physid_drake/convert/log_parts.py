@@ -16,7 +16,7 @@ from physid_drake.convert.columns import Columns
 from physid_drake.convert.convert import ARRAYS, TEXTS, read_columns
 from physid_drake.convert.map_text import quoted
 from physid_drake.convert.names import words_of
-from physid_drake.convert.text_table import Dialect, read_text_table
+from physid_drake.convert.text_table import read_text_tables
 from physid_drake.convert.times import FRAMES, Times, times_of
 from physid_drake.errors import RecordingError
 from physid_drake.recording.adapters.sources import source_files
@@ -38,6 +38,7 @@ class Table:
         columns: of it.
         keys: what a stream of a map says to read it, as ``file: "tip.csv"``.
         label: what it is called in lists; nothing if it is the only one.
+        repeats: whether it holds what another one does at another time, so that its bodies are no others.
         times: its times.
         bodies: in it.
     """
@@ -45,13 +46,14 @@ class Table:
     columns: Columns
     keys: tuple[str, ...] = ()
     label: str = ""
+    repeats: bool = False
     times: Times | None = None
     bodies: list[Body] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Looks for times and bodies."""
         self.times = self.times or times_of(self.columns)
-        self.bodies = self.bodies or bodies_of(self.columns)
+        self.bodies = [] if self.repeats else bodies_of(self.columns)
         for body in self.bodies:
             body.name = f"{self.label} {body.name}".removesuffix(" ?") if self.label else body.name
 
@@ -90,15 +92,20 @@ def log_of(source: Path) -> Log:
 
 def _tables(file: Path) -> list[Table]:
     """The tables of one file."""
-    columns = read_columns(file)
-    tables = [Table(columns=columns, label="section 1" if columns.sections > 1 else "")]
-    for k in range(2, min(columns.sections, MOST_TABLES) + 1):
-        try:
-            other = read_text_table(file, Dialect(section=k))
-        except RecordingError:
-            continue
-        tables.append(Table(columns=other, keys=(f"section: {k}",), label=f"section {k}"))
-    if len(tables) == 1 and (tables[0].times is None or tables[0].times.unit == FRAMES):
+    texts = {} if file.suffix.lower() in ARRAYS else read_text_tables(file, MOST_TABLES)
+    if len(texts) > 1:
+        return [
+            Table(
+                columns=one,
+                keys=(f"section: {k}",) if k > 1 else (),
+                label=f"section {k}",
+                repeats=any(set(one.numbers) == set(texts[j].numbers) for j in texts if j < k),
+            )
+            for k, one in texts.items()
+        ]
+    columns = texts.get(1) or read_columns(file)
+    tables = [Table(columns=columns)]
+    if tables[0].times is None or tables[0].times.unit == FRAMES:
         return _by_id(columns) or tables
     return tables
 

@@ -23,6 +23,8 @@ class Rows:
 def _begins(rows: Rows, k: int, decimal: str) -> bool:
     """Whether a table's numbers may begin with a row: two or more, half of what is there, and more below."""
     fields = rows.fields[k]
+    if len(fields) < 2:
+        return False
     numbers, there = numbers_in(fields, decimal), len(_there(fields))
     following = rows.fields[k + 1] if k + 1 < len(rows.fields) else []
     if fields and fields[0].startswith("#") and not (following and following[0].startswith("#")):

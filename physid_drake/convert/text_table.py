@@ -7,6 +7,7 @@ another, Vicon writes names over the first column of each body and units below t
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import math
@@ -71,6 +72,43 @@ def read_text_table(path: Path, dialect: Dialect | None = None) -> Columns:
         RecordingError: if it cannot be read, or holds no table; one line that names the file.
     """
     dialect = dialect or Dialect()
+    text = _read(path, dialect)
+    if dialect.section > len(text.tables):
+        raise RecordingError(
+            f"{text.where}: has {len(text.tables)} table(s), but section {dialect.section} is asked for."
+        )
+    return _table(text, dialect.section, dialect.header_lines)
+
+
+def read_text_tables(path: Path, most: int) -> dict[int, Columns]:
+    """The tables of a file of text, by their number from 1 on; those behind the first only if they can be read.
+
+    Args:
+        path: of the file.
+        most: tables that are read.
+
+    Raises:
+        RecordingError: if the first cannot be read; one line that names the file.
+    """
+    text = _read(path, Dialect())
+    found = {1: _table(text, 1, None)}
+    for section in range(2, min(len(text.tables), most) + 1):
+        with contextlib.suppress(RecordingError):
+            found[section] = _table(text, section, None)
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Text:
+    """What a file of text holds: its name, how decimals are written, a unit of length, headers and rows."""
+
+    where: str
+    decimal: str
+    length: str | None
+    tables: list[tuple[list[list[str]], Rows]]
+
+
+def _read(path: Path, dialect: Dialect) -> _Text:
     try:
         text = _decoded(_unpacked(read_bytes(path, most=MOST_BYTES)), dialect.encoding)
     except FileError as error:
@@ -80,21 +118,24 @@ def read_text_table(path: Path, dialect: Dialect | None = None) -> Columns:
     separator = dialect.separator or _separator(text)
     decimal = dialect.decimal or ("," if separator != "," and _has_decimal_commas(text, separator) else ".")
     try:
-        sections = tables_in(_split(text, separator), decimal)
+        tables = tables_in(_split(text, separator), decimal)
     except csv.Error as error:
         raise RecordingError(f"{where}: no readable table: {one_line(error)}.") from error
-    if not sections:
+    if not tables:
         raise RecordingError(
             f"{where}: no table of numbers was found, separated by {shown(separator)}; does it hold two columns and"
             " two rows of numbers? A map's 'source:' may say how it is written."
         )
-    if dialect.section > len(sections):
-        raise RecordingError(f"{where}: has {len(sections)} table(s), but section {dialect.section} is asked for.")
-    header, body = sections[dialect.section - 1]
-    if dialect.header_lines is not None:
-        header = header[max(0, len(header) - dialect.header_lines) :]
-    names, units = _names(header, _width(where, header, body))
-    return replace(_columns(where, names, units, body, decimal), length=_length_unit(text), sections=len(sections))
+    return _Text(where=where, decimal=decimal, length=_length_unit(text), tables=tables)
+
+
+def _table(text: _Text, section: int, header_lines: int | None) -> Columns:
+    """One of the tables, of whose header so many lines count."""
+    header, body = text.tables[section - 1]
+    if header_lines is not None:
+        header = header[max(0, len(header) - header_lines) :]
+    names, units = _names(header, _width(text.where, header, body))
+    return replace(_columns(text.where, names, units, body, text.decimal), length=text.length)
 
 
 def _width(where: str, header: list[list[str]], body: Rows) -> int:
@@ -205,7 +246,7 @@ def _split(text: str, separator: str) -> Rows:
     lines: list[int] = []
     if separator == " ":
         for number, line in enumerate(text.splitlines(), 1):
-            fields.append(re.sub(r"^(\s*#+)\s+", r"\1", line).split())
+            fields.append((re.sub(r"^(\s*#+)\s+", r"\1", line) if "#" in line else line).split())
             lines.append(number)
     else:
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)

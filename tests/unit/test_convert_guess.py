@@ -292,6 +292,12 @@ class TestParts:
         said = "# not used of section 2: Frame, button ('section: 2' in a stream reads them)"
         assert said in guess_map(tmp_path / "log.csv").text
 
+    def test_sections_of_the_same_columns_are_no_other_bodies(self, tmp_path: Path) -> None:
+        table = csv({"t": TAKE["t"], **named("x_", XYZ, OBJECT)})
+        (tmp_path / "log.csv").write_text("\n".join(f"Trial {k}\n{table}" for k in range(2)))
+        text = guess_map(tmp_path / "log.csv").text
+        assert "hand:" not in text and "# not used of section 2: t, x_x" in text
+
     def write(self, folder: Path, name: str, places: np.ndarray, turns: np.ndarray, begin: float) -> None:
         head = "# timestamp tx ty tz qx qy qz qw"
         table = np.column_stack([begin + TAKE["t"], places, turns])
@@ -304,6 +310,12 @@ class TestParts:
         chart = guessed(tmp_path)
         assert chart["object"]["file"] == "beta.txt" and chart["hand"]["file"] == "alpha.txt"
         assert chart["pushes"] == {"cut": "rest"} and "time" not in chart["hand"]
+
+    def test_clocks_that_have_no_time_in_common(self, tmp_path: Path) -> None:
+        self.write(tmp_path, "mug.txt", OBJECT, TAKE["xyzw"], BEGIN)
+        (tmp_path / "robot.csv").write_text(csv({"timestamp": TAKE["t"] + 812.0, **named("tool_", XYZ, HAND)}))
+        text = guess_map(tmp_path).text
+        assert 'time: {column: "timestamp", unit: s, offset_s: 0.0}   # CHANGE: at no time of the object\'s' in text
 
     def test_files_of_each_body_and_push(self, tmp_path: Path) -> None:
         for k in range(3):
