@@ -70,7 +70,8 @@ def times_of(columns: Columns) -> Times | None:
         return Times(columns=(likely[0],), unit=_unit(likely[0], columns))
     if split:
         return Times(columns=split)
-    nameless = [name for name in rising if re.fullmatch(r"column \d+|array\[\d+\]", name)]
+    of_one = len({re.sub(r"\d+", "", name) for name in columns.numbers}) == 1
+    nameless = [name for name in rising if of_one or re.fullmatch(r"column \d+", name)]
     frames = [name for name in rising if (np.diff(columns.numbers[name]) == 1.0).mean() > 0.9]
     if nameless and nameless[0] not in frames:
         return Times(columns=(nameless[0],), unit=_unit(nameless[0], columns))
