@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from physid_drake.convert import convert_bag, convert_table, guess_map
+from physid_drake.convert import convert_bag, convert_table, guess_map, pushes_of_take
 from physid_drake.diagnose import Diagnosis, Evidence, case_of, cell_config
 from physid_drake.diagnose import diagnose as diagnose_case
 from physid_drake.model import Model
@@ -61,6 +61,7 @@ __all__ = [
     "guess_map",
     "load_model",
     "planar_poses",
+    "pushes_of_take",
     "read_recording",
     "write_recording",
 ]

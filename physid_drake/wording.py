@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Sequence
+
 MOST = 60  # characters of a value
 MOST_LINE = 1500  # characters of a message
 MOST_CAUSE = 200  # characters of another library's words
@@ -38,6 +41,22 @@ def in_one_line(message: str) -> str:
         message = f"{message[: 10 * MOST_LINE]} {message[-10 * MOST_LINE :]}"
     text = _printable(" ".join(message.split()))
     return text if len(text) <= MOST_LINE else f"{text[: MOST_LINE - 203]}...{text[-200:]}"
+
+
+def alike(lines: Iterable[str], but_for: Sequence[str] = ()) -> list[list[str]]:
+    """Lines that differ by numbers only, together, in the order of the first of each kind.
+
+    Args:
+        lines: of messages.
+        but_for: words by which they may differ, too.
+    """
+    kinds: dict[str, list[str]] = {}
+    for line in lines:
+        general = line
+        for word in but_for:
+            general = general.replace(word, "")
+        kinds.setdefault(re.sub(r"[-+.\d]+(e[-+]\d+)?", "", general), []).append(line)
+    return list(kinds.values())
 
 
 def _printable(text: str) -> str:

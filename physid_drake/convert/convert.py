@@ -5,47 +5,35 @@ from __future__ import annotations
 import hashlib
 import tempfile
 import warnings
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
-from physid_drake.convert.arrays import READERS, read_array_table
 from physid_drake.convert.bag import ENDINGS, RECEIVE, STAMP, bag_files, read_bag
 from physid_drake.convert.columns import Columns
-from physid_drake.convert.cutting import Piece, pieces_of, rows_by_value, sizes_said
+from physid_drake.convert.cutting import Piece
 from physid_drake.convert.map_reading import read_map
 from physid_drake.convert.mapping import Clock, ForceMap, Map, Offset, PoseMap, Quantity, Turn
 from physid_drake.convert.prisms import prism_of, prism_of_boxes
-from physid_drake.convert.streams import Streams, end_streams, streams_of
-from physid_drake.convert.text_table import read_text_table
+from physid_drake.convert.streams import end_streams, streams_of
+from physid_drake.convert.tables import ARRAYS, TEXTS, Logs, Parts, table_logs
+from physid_drake.convert.take import push_of, reach_of, warned_pieces
 from physid_drake.errors import RecordingError
 from physid_drake.files import FileError, read_text, sha256_of
 from physid_drake.recording import (
-    Box,
     Conversion,
-    Cylinder,
-    ForceStream,
     ObjectModel,
-    Prism,
     Push,
     Recording,
     read_recording,
     write_recording,
 )
 from physid_drake.recording.adapters.sources import source_files
-from physid_drake.wording import named, shown
-
-TEXTS: Final = (".csv", ".tsv", ".txt", ".dat", ".trc")
-ARRAYS: Final = tuple(READERS)
-LARGEST_REACH: Final = 1.0
-"""m: of a mesh, whose file is not read here."""
-
-Parts = list[tuple[str, Map, Mapping[str, Columns]]]
-"""What of a log is cut on its own: a label, the map with the columns' names in it, and the columns of each stream."""
+from physid_drake.wording import alike, named, shown
 
 
 def convert_table(source: Path, folder: Path, map_file: Path) -> Recording:
@@ -69,9 +57,7 @@ def convert_table(source: Path, folder: Path, map_file: Path) -> Recording:
     if source.is_dir() and any(file.suffix in ENDINGS for file in source.iterdir()):
         raise RecordingError(f"{named(source)}: holds a bag; use `convert bag`.")
     files = source_files(source, *TEXTS, *ARRAYS)
-    return _convert(
-        source, folder, map_file, files, lambda file, chart: _table_parts(read_columns(file, chart), chart)
-    )
+    return _convert(source, folder, map_file, files, partial(table_logs, files))
 
 
 def convert_bag(source: Path, folder: Path, map_file: Path) -> Recording:
@@ -90,18 +76,11 @@ def convert_bag(source: Path, folder: Path, map_file: Path) -> Recording:
         OutputError: if the folder cannot be written.
     """
     files = bag_files(Path(source))
-    return _convert(source, folder, map_file, files, lambda _, chart: _bag_parts(Path(source), chart), whole=True)
 
+    def logs(chart: Map) -> Logs:
+        yield files[0].name, partial(_bag_parts, Path(source), chart)
 
-def read_columns(file: Path, chart: Map | None = None) -> Columns:
-    """The columns of a table, by the kind of its file.
-
-    Raises:
-        RecordingError: if it cannot be read.
-    """
-    if file.suffix.lower() in ARRAYS:
-        return read_array_table(file)
-    return read_text_table(file, None if chart is None else chart.dialect)
+    return _convert(source, folder, map_file, files, logs)
 
 
 def _convert(
@@ -109,24 +88,41 @@ def _convert(
     folder: Path,
     map_file: Path,
     files: Sequence[Path],
-    parts: Callable[[Path, Map], Parts],
-    *,
-    whole: bool = False,
+    logs: Callable[[Map], Logs],
 ) -> Recording:
     chart = _with_prism(read_map(Path(map_file)))
     pushes: list[Push] = []
-    for file in files[:1] if whole else files:
-        try:
-            pieces = _pieces(file.name, parts(file, chart))
-        except RecordingError as error:
-            said = str(error)
-            raise RecordingError(said if file.name in said else f"{named(file)}: {said}") from error
-        for label, piece in pieces:
-            note = f"{file.name}{label}, from {piece.begin:.10g} s"
-            pushes.append(_push(piece, len(pushes) + 1, note, chart))
+    with _warned_by_kind():
+        for name, parts in logs(chart):
+            try:
+                pieces = _pieces(name, parts())
+            except RecordingError as error:
+                said = str(error)
+                raise RecordingError(said if name in said else f"{named(name)}: {said}") from error
+            for label, piece in pieces:
+                note = f"{name}{label}, from {piece.begin:.10g} s"
+                tare = 0.0 if chart.force is None else chart.force.tare
+                pushes.append(push_of(piece, len(pushes) + 1, note, tare))
     if not pushes:
         raise RecordingError(f"{named(source)}: no push was found; see what was left out, and the map's 'pushes:'.")
     return _written(pushes, chart, _conversion(Path(source), files, chart), folder)
+
+
+@contextmanager
+def _warned_by_kind() -> Iterator[None]:
+    """Of warnings that are alike but for their numbers, the first, and how many more there are."""
+    caught: list[warnings.WarningMessage] = []
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            yield
+    finally:
+        for one in caught:
+            if one.category is not UserWarning:
+                warnings.warn_explicit(one.message, one.category, one.filename, one.lineno)
+        for said in alike(str(one.message) for one in caught if one.category is UserWarning):
+            more = f" ({len(said) - 1} more like it)" if len(said) > 1 else ""
+            warnings.warn(f"{said[0]}{more}", UserWarning, stacklevel=3)
 
 
 def _with_prism(chart: Map) -> Map:
@@ -150,54 +146,12 @@ def _pieces(name: str, parts: Parts) -> list[tuple[str, Piece]]:
     """Pushes of one log, each with what tells it from the others of the log."""
     found: list[tuple[str, Piece]] = []
     for label, chart, columns in parts:
-        reach = _radius(_solid(chart)) + (chart.hand.radius if chart.hand is not None else 0.0)
         # What is out of all proportion is refused by what it makes.
         with np.errstate(over="ignore", invalid="ignore"):
             streams = end_streams(columns["object"], chart) if chart.cut.by == "rows" else streams_of(columns, chart)
-        pieces, left = pieces_of(streams, chart.cut, reach)
-        if not pieces and chart.cut.by == "rest":
-            left.append(f"along x, y, z of W {sizes_said(streams)}; are units and axes right?")
-        for line in left:
-            warnings.warn(f"{name}{label}: {line}", UserWarning, stacklevel=2)
-        found.extend((label, piece) for piece in pieces)
+        reach = reach_of(_solid(chart), chart.hand)
+        found.extend((label, piece) for piece in warned_pieces(streams, chart.cut, reach, f"{name}{label}: "))
     return found
-
-
-def _table_parts(columns: Columns, chart: Map) -> Parts:
-    """The table, or its rows by the value of a column."""
-    for key, stream in (("object", chart.object), ("hand", chart.hand_path), ("force", chart.force)):
-        if stream is not None and stream.topic is not None:
-            raise RecordingError(f"{key}: topic is of bags; give columns, or use `convert bag`.")
-    if chart.cut.by == "rows":
-        return [(f", row {row}", chart, _shared(part)) for row, part in _single_rows(columns)]
-    if chart.cut.by != "column" or chart.cut.column is None:
-        return [("", chart, _shared(columns))]
-    name = columns.find(chart.cut.column)
-    values = columns.numbers[name]
-    alike = [one for one in columns.numbers if len(columns.numbers[one]) == len(values)]
-    parts: Parts = []
-    pieces = list(rows_by_value(values))
-    for value, count in Counter(value for value, _ in pieces).items():
-        if count > 1:
-            warnings.warn(
-                f"{columns.source}: {name} {value:g} comes in {count} pieces, and each is taken for a push.",
-                UserWarning, stacklevel=2,
-            )  # fmt: skip
-    for value, rows in pieces:
-        numbers = {one: columns.numbers[one][rows] for one in alike}
-        parts.append((f", {name} {value:g}", chart, _shared(replace(columns, numbers=numbers, texts={}, rows=()))))
-    return parts
-
-
-def _single_rows(columns: Columns) -> Iterator[tuple[int, Columns]]:
-    """Each row of a table on its own, by its line."""
-    for k in range(max(map(len, columns.numbers.values()))):
-        numbers = {name: values[k : k + 1] for name, values in columns.numbers.items()}
-        yield (columns.rows[k] if columns.rows else k), replace(columns, numbers=numbers, texts={}, rows=())
-
-
-def _shared(columns: Columns) -> dict[str, Columns]:
-    return dict.fromkeys(("object", "hand", "force"), columns)
 
 
 def _bag_parts(source: Path, chart: Map) -> Parts:
@@ -249,44 +203,9 @@ def _clock(clock: Clock, columns: Columns, chart: Map) -> Clock:
     return replace(clock, column=STAMP)
 
 
-def _push(piece: Piece, number: int, note: str, chart: Map) -> Push:
-    streams = _from_zero(piece.streams, piece.begin)
-    force = streams.force
-    if force is not None and chart.force is not None and chart.force.tare > 0.0:
-        force = _tared(force, chart.force.tare, note)
-    return Push(name=f"pushes/{number:03d}.csv", object=streams.object, hand=streams.hand, force=force, note=note)
-
-
-def _from_zero(streams: Streams, begin: float) -> Streams:
-    hand, force = streams.hand, streams.force
-    return Streams(
-        object=replace(streams.object, times=streams.object.times - begin),
-        hand=None if hand is None else replace(hand, times=hand.times - begin),
-        force=None if force is None else replace(force, times=force.times - begin),
-    )
-
-
-def _tared(force: ForceStream, seconds: float, note: str) -> ForceStream:
-    untouched = force.times < force.times[0] + seconds
-    if untouched.all():
-        raise RecordingError(f"{note}: force: tare_s, {seconds:g} s, is longer than the push.")
-    return replace(force, forces=force.forces - force.forces[untouched].mean(axis=0))
-
-
 def _solid(chart: Map) -> ObjectModel:
     assert isinstance(chart.model, ObjectModel)
     return chart.model
-
-
-def _radius(model: ObjectModel) -> float:
-    shape = model.shape
-    if isinstance(shape, Box):
-        return 0.5 * float(np.hypot(*shape.size[:2]))
-    if isinstance(shape, Cylinder):
-        return shape.radius if shape.axis == "z" else float(np.hypot(shape.radius, 0.5 * shape.length))
-    if isinstance(shape, Prism):
-        return float(np.linalg.norm(shape.polygon, axis=1).max())
-    return LARGEST_REACH
 
 
 def _conversion(source: Path, files: Sequence[Path], chart: Map) -> Conversion:

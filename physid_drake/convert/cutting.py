@@ -16,6 +16,7 @@ from physid_drake.convert.streams import Streams
 from physid_drake.errors import RecordingError
 from physid_drake.recording import ForceStream, PoseStream
 from physid_drake.recording.rests import rests_of
+from physid_drake.recording.screening import find_repeats
 
 _Stream = TypeVar("_Stream", PoseStream, ForceStream)
 
@@ -87,16 +88,27 @@ def _between_gaps(times: Array, gap: float) -> list[tuple[float, float]]:
 
 def _between_rests(stream: PoseStream, cut: Cut) -> list[tuple[float, float]]:
     """From a while before the object moves until a while after it rests, of every motion between two rests."""
+    stream = _seen_once(stream)
     rests = [(float(stream.times[r.start]), float(stream.times[r.stop - 1])) for r in rests_of(stream)]
     rests = [(begin, end) for begin, end in rests if end - begin >= cut.still]
     if len(rests) < 2:
+        lasts, usual = float(np.ptp(stream.times)), float(np.median(np.diff(stream.times)))
         raise RecordingError(
-            f"pushes: the object is not seen to rest twice for {cut.still:g} s; make still_s smaller or cut by times."
+            f"pushes: the object is not seen to rest twice for {cut.still:g} s in a log of {lasts:.3g} s with poses"
+            f" {usual:.3g} s apart; correct the unit of time if it is another, make still_s smaller, or cut by times."
         )
     return [
         (max(before[0], before[1] - cut.lead), min(after[1], after[0] + cut.tail))
         for before, after in pairwise(rests)
     ]
+
+
+def _seen_once(stream: PoseStream) -> PoseStream:
+    """Without the repeats of a tracker that is slower than the log: in steps, nothing seems to rest or to move."""
+    once = ~find_repeats(stream.positions, stream.quaternions)
+    return replace(
+        stream, times=stream.times[once], positions=stream.positions[once], quaternions=stream.quaternions[once]
+    )
 
 
 def _within(streams: Streams, begin: float, end: float) -> Streams | None:

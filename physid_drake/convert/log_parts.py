@@ -13,9 +13,9 @@ import numpy as np
 
 from physid_drake.convert.bodies import Body, bodies_of, rises
 from physid_drake.convert.columns import Columns
-from physid_drake.convert.convert import ARRAYS, TEXTS, read_columns
 from physid_drake.convert.map_text import quoted
 from physid_drake.convert.names import words_of
+from physid_drake.convert.tables import ARRAYS, TEXTS, read_columns
 from physid_drake.convert.text_table import read_text_tables
 from physid_drake.convert.times import FRAMES, Times, times_of
 from physid_drake.errors import RecordingError

@@ -25,6 +25,7 @@ from physid_drake.convert.mapping import (
     Offset,
     PoseMap,
     Quantity,
+    Rows,
     Stated,
     Turn,
     World,
@@ -47,6 +48,7 @@ from physid_drake.wording import shown
 Array = NDArray[np.float64]
 _T = TypeVar("_T")
 
+_ROWS_KEYS: Final = ("file", "section", "where")
 _TOP_KEYS: Final = ("format", "recording", "source", "world", "time", "object", "hand", "force", "pushes")
 
 
@@ -120,6 +122,8 @@ def _check_rows(top: Section, body: PoseMap, path: PoseMap | None, force: ForceM
             raise top.refuse(key, f"{rule}; correct one of them.")
     if cut.by == "rows" and path is not None and path.speed is None:
         raise top.refuse("hand", "needs speed [m/s], or its column: nobody could tell how fast the push was.")
+    if cut.by == "rows" and path is not None and path.rows != body.rows:
+        raise top.refuse("hand", "and object are of one table with cut: rows; remove file, section and where.")
     if cut.by == "rows" and force is not None:
         raise top.refuse("force", "is of logs with times; leave it out with cut: rows.")
 
@@ -206,23 +210,30 @@ def _as_axes(value: object) -> list[str] | None:
 
 
 def _clock(section: Section) -> Clock:
-    section.check_keys("column", "unit", "rate_hz", "offset_s")
+    section.check_keys("column", "columns", "unit", "rate_hz", "offset_s")
     if section.has("unit") and section.has("rate_hz"):
         raise section.refuse("rate_hz", "is of frames that are numbered, which have no unit; remove one of them.")
     unit = section.text("unit") if section.has("unit") else None
     if unit is not None:
         with section.naming("unit"):
             factor(unit, TIMES, "times")
-    column = section.text("column") if section.has("column") else None
+    column, fine = section.text("column") if section.has("column") else None, None
+    if section.has("columns"):
+        if column is not None or unit is not None or section.has("rate_hz"):
+            raise section.refuse(
+                "columns", "are of seconds and nanoseconds; nothing else says how times are written."
+            )
+        column, fine = _names(section, (2,))
+        unit = "s"
     rate = positive(section, "rate_hz", 1.0) if section.has("rate_hz") else None
-    return Clock(column=column, unit=unit, rate=rate, offset=section.maybe_number("offset_s") or 0.0)
+    return Clock(column=column, fine=fine, unit=unit, rate=rate, offset=section.maybe_number("offset_s") or 0.0)
 
 
 def _pose(section: Section) -> PoseMap:
     """One body; where a row is a push, what it is at first, with what it is at last."""
     if not section.has("start"):
         return _one_pose(section)
-    section.check_keys("start", "end", "speed", "world")
+    section.check_keys("start", "end", "speed", "world", *_ROWS_KEYS)
     first, last = (_one_pose(cast(Section, section.section(key))) for key in ("start", "end"))
     speed: Quantity | float | None = None
     if isinstance(section.values.get("speed"), dict):
@@ -230,11 +241,11 @@ def _pose(section: Section) -> PoseMap:
     elif section.has("speed"):
         speed = positive(section, "speed", 1.0)
     world = _maybe(section, "world", _world)
-    return replace(first, end=replace(last, world=world), speed=speed, world=world)
+    return replace(first, end=replace(last, world=world), speed=speed, world=world, rows=_rows(section))
 
 
 def _one_pose(section: Section) -> PoseMap:
-    section.check_keys("topic", "frame", "time", "position", "rotation", "offset", "height_m", "world")
+    section.check_keys("topic", "frame", *_ROWS_KEYS, "time", "position", "rotation", "offset", "height_m", "world")
     position = _maybe(section, "position", lambda inner: _quantity(inner, LENGTHS, (2, 3)))
     topic = section.text("topic") if section.has("topic") else None
     if position is None and topic is None:
@@ -242,6 +253,7 @@ def _one_pose(section: Section) -> PoseMap:
     return PoseMap(
         topic=topic,
         frame=section.text("frame") if section.has("frame") else None,
+        rows=_rows(section),
         clock=_maybe(section, "time", _clock) or Clock(),
         position=position or Quantity(),
         turn=_turn(section),
@@ -249,6 +261,25 @@ def _one_pose(section: Section) -> PoseMap:
         height=section.maybe_number("height_m"),
         world=_maybe(section, "world", _world),
     )
+
+
+def _rows(section: Section) -> Rows:
+    """Which rows of a source's tables are a stream's."""
+    if any(section.has(key) for key in _ROWS_KEYS) and section.has("topic"):
+        raise section.refuse("topic", f"is of bags, and {', '.join(_ROWS_KEYS)} are of tables; remove one of them.")
+    where = section.get("where", "columns, each with a number or a text", _as_values) if section.has("where") else ()
+    return Rows(
+        file=section.text("file") if section.has("file") else None,
+        section=_whole(section, "section", 1) if section.has("section") else None,
+        where=where,
+    )
+
+
+def _as_values(value: object) -> tuple[tuple[str, float | str], ...] | None:
+    if not isinstance(value, dict) or not value:
+        return None
+    good = all(isinstance(k, str) and isinstance(v, str | int | float) for k, v in value.items())
+    return tuple((name, one if isinstance(one, str) else float(one)) for name, one in value.items()) if good else None
 
 
 def _turn(section: Section) -> Turn | None:
@@ -282,11 +313,14 @@ def _bad_order(order: str) -> bool:
 
 
 def _force(section: Section) -> ForceMap:
-    section.check_keys("topic", "time", "columns", "unit", "axes", "offset", "acts_on", "weight_n", "tare_s", "world")
+    section.check_keys(
+        "topic", *_ROWS_KEYS, "time", "columns", "unit", "axes", "offset", "acts_on", "weight_n", "tare_s", "world"
+    )
     topic = section.text("topic") if section.has("topic") else None
     columns = _names(section, (2, 3)) if topic is None or section.has("columns") else ()
     return ForceMap(
         topic=topic,
+        rows=_rows(section),
         clock=_maybe(section, "time", _clock) or Clock(),
         force=Quantity(columns=columns, unit=unit_of(section, FORCES, "forces")),
         in_hand=section.has("axes") and section.choice("axes", "world", "hand") == "hand",
@@ -301,6 +335,8 @@ def _force(section: Section) -> ForceMap:
 def _quantity(section: Section, kind: Mapping[str, float], counts: tuple[int, ...]) -> Quantity:
     section.check_keys("columns", "unit")
     columns = _names(section, counts) if section.has("columns") else ()
+    if isinstance(section.values.get("unit"), int | float):
+        return Quantity(columns=columns, size=positive(section, "unit", 1.0))
     return Quantity(columns=columns, unit=unit_of(section, kind, "it"))
 
 

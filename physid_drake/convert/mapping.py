@@ -34,10 +34,26 @@ COUNTS: Final[Mapping[str, tuple[int, ...]]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """Columns of one kind: where they are, and what turns them into SI units."""
+    """Columns of one kind, and what turns them into SI units: a unit's name, or the size of one that has none."""
 
     columns: tuple[str, ...] = ()
     unit: str | None = None
+    size: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rows:
+    """Which rows of a source's tables are a stream's.
+
+    Attributes:
+        file: name or pattern of its file, or files, in the source's folder; None where each file holds every stream.
+        section: which of several tables in one text; None: the one that the dialect says.
+        where: names of columns, and the number or text that they must hold.
+    """
+
+    file: str | None = None
+    section: int | None = None
+    where: tuple[tuple[str, float | str], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,13 +61,15 @@ class Clock:
     """Of one stream.
 
     Attributes:
-        column: of its times, or of its frames' numbers.
+        column: of its times, or of its frames' numbers; None where rows come at ``rate``.
+        fine: column of nanoseconds beside one of seconds.
         unit: of the times.
         rate: of the frames [Hz], where they are numbered.
         offset: what is added [s] to get the common clock.
     """
 
     column: str | None = None
+    fine: str | None = None
     unit: str | None = None
     rate: float | None = None
     offset: float = 0.0
@@ -133,6 +151,7 @@ class PoseMap:
     Attributes:
         topic: of a bag.
         frame: of a bag's transforms: the child frame that is followed.
+        rows: of tables.
         clock: of its own, where it has one.
         position: columns of x, y and z, or of x and y.
         turn: None where the rotation was not measured.
@@ -145,6 +164,7 @@ class PoseMap:
 
     topic: str | None = None
     frame: str | None = None
+    rows: Rows = field(default_factory=Rows)
     clock: Clock = field(default_factory=Clock)
     position: Quantity = field(default_factory=Quantity)
     turn: Turn | None = None
@@ -161,6 +181,7 @@ class ForceMap:
 
     Attributes:
         topic: of a bag.
+        rows: of tables.
         clock: of its own, where it has one.
         force: columns of x, y and z, or of x and y.
         in_hand: whether its axes turn with the hand.
@@ -172,6 +193,7 @@ class ForceMap:
     """
 
     topic: str | None = None
+    rows: Rows = field(default_factory=Rows)
     clock: Clock = field(default_factory=Clock)
     force: Quantity = field(default_factory=Quantity)
     in_hand: bool = False

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
+from physid_drake.convert.clocks import increasing
 from physid_drake.convert.columns import Array, Columns
 from physid_drake.convert.conventions import (
     forces_in_world,
@@ -21,7 +21,7 @@ from physid_drake.convert.conventions import (
     with_offset,
     wxyz_of,
 )
-from physid_drake.convert.mapping import Clock, ForceMap, Map, PoseMap, Quantity, Turn, World
+from physid_drake.convert.mapping import Clock, ForceMap, Map, PoseMap, Quantity, Rows, Turn, World
 from physid_drake.convert.units import ANGLES, FORCES, LENGTHS, SPEEDS, TIMES, factor
 from physid_drake.errors import RecordingError
 from physid_drake.recording import ForceStream, PoseStream
@@ -63,11 +63,21 @@ def streams_of(columns: Mapping[str, Columns], chart: Map) -> Streams:
     hand = force = None
     if chart.hand_path is not None:
         with _naming("hand"):
+            if _is_the_same(columns, chart.object, chart.hand_path):
+                raise RecordingError("its columns are those of the object; nothing pushes itself.")
             hand = _poses(columns["hand"], chart.hand_path, chart)
     if chart.force is not None:
         with _naming("force"):
             force = _forces(columns["force"], chart.force, hand, chart)
     return Streams(object=body, hand=hand, force=force)
+
+
+def _is_the_same(columns: Mapping[str, Columns], body: PoseMap, hand: PoseMap) -> bool:
+    """Whether the hand's places are read from the object's columns, in the same rows."""
+    if columns["hand"] is not columns["object"]:
+        return False
+    names = [list(map(columns["object"].find, pose.position.columns)) for pose in (body, hand)]
+    return names[0] == names[1]
 
 
 def end_streams(columns: Columns, chart: Map) -> Streams:
@@ -134,7 +144,8 @@ def _naming(key: str) -> Iterator[None]:
 
 
 def _poses(columns: Columns, pose: PoseMap, chart: Map) -> PoseStream:
-    return _placed(columns, pose, _times(columns, pose.clock, chart), chart)
+    times = _times(columns, pose.clock, chart, pose.rows, len(columns.stack(pose.position.columns)))
+    return _placed(columns, pose, times, chart)
 
 
 def _placed(columns: Columns, pose: PoseMap, times: Array, chart: Map) -> PoseStream:
@@ -149,25 +160,26 @@ def _placed(columns: Columns, pose: PoseMap, times: Array, chart: Map) -> PoseSt
             np.isfinite(turn).all(axis=1))  # fmt: skip
     if not seen.any():
         raise RecordingError("no row has all of its columns filled.")
-    times, place = times[seen], place[seen]
+    rows = np.flatnonzero(seen)[increasing(times[seen], columns, seen)]
+    times, place = times[rows], place[rows]
     rotation = (
-        None if pose.turn is None or turn is None else _rotation(columns, pose.turn, turn[seen], chart.world_of(pose))
+        None if pose.turn is None or turn is None else _rotation(columns, pose.turn, turn[rows], chart.world_of(pose))
     )
-    return pose_stream(times, place, rotation, pose, chart)
+    return _pose_stream(times, place, rotation, pose, chart)
 
 
-def pose_stream(times: Array, place: Array, rotation: Rotation | None, pose: PoseMap, chart: Map) -> PoseStream:
+def _pose_stream(times: Array, place: Array, rotation: Rotation | None, pose: PoseMap, chart: Map) -> PoseStream:
     """A body's stream in W.
 
     Args:
-        times: (n,) [s] by the common clock.
+        times: (n,) [s] by the common clock, which increase.
         place: (n, 3), or (n, 2) where no height was measured [m], in the log's world.
         rotation: n of them in the log's world; None where none was measured.
         pose: what the map says of the body.
         chart: the map.
 
     Raises:
-        RecordingError: if the clock steps back, or an offset turns with a rotation that was not measured.
+        RecordingError: if an offset turns with a rotation that was not measured.
     """
     kind: RotationKind = "full"
     if rotation is None:
@@ -181,44 +193,50 @@ def pose_stream(times: Array, place: Array, rotation: Rotation | None, pose: Pos
     if pose.height is not None:
         positions[:, 2] = pose.height
     quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1)) if turned is None else wxyz_of(turned)
-    order = _order(times)
-    return PoseStream(times=times[order], positions=positions[order], quaternions=quaternions[order], rotation=kind)
+    return PoseStream(times=times, positions=positions, quaternions=quaternions, rotation=kind)
 
 
 def _forces(columns: Columns, force: ForceMap, hand: PoseStream | None, chart: Map) -> ForceStream:
     if not force.force.columns:
         raise RecordingError("it needs columns; a topic is a bag's.")
-    times = _times(columns, force.clock, chart)
     world = chart.world_of(force)
     values = in_space(_scaled(columns, force.force, FORCES, "N"), World() if force.in_hand else world)
+    times = _times(columns, force.clock, chart, force.rows, len(values))
     seen = np.isfinite(values).all(axis=1) & np.isfinite(times)
     if not seen.any():
         raise RecordingError("no row has all of its columns filled.")
-    times, values = times[seen], values[seen]
-    order = _order(times)
-    times, values = times[order], values[order]
+    rows = np.flatnonzero(seen)[increasing(times[seen], columns, seen)]
+    times, values = times[rows], values[rows]
     turns = _turns_at(times, hand) if force.in_hand and hand is not None else None
     return ForceStream(times=times, forces=forces_in_world(values, force, turns, world))
 
 
-def _times(columns: Columns, clock: Clock, chart: Map) -> Array:
-    """Times (n,) [s] by the common clock."""
-    column = clock.column or chart.clock.column
-    if column is None:
-        raise RecordingError("there are no times; name their column in time.column.")
-    name = columns.find(column)
-    own = clock if clock.column is not None else chart.clock
+def _times(columns: Columns, clock: Clock, chart: Map, rows: Rows, count: int) -> Array:
+    """Times (n,) [s] by the common clock, of so many rows."""
+    own = clock if clock.column is not None or clock.rate is not None else chart.clock
+    offset = clock.offset or chart.clock.offset
+    if own.column is None:
+        if own.rate is None:
+            raise RecordingError("there are no times; name their column in time.column, or give rate_hz.")
+        if rows.where:
+            raise RecordingError("rows that are picked come at no rate; name a column of times, or one that counts.")
+        return np.arange(count) / own.rate + offset
+    name = columns.find(own.column)
     stated = columns.unit_of(name)
     if own.unit is not None and stated in TIMES and own.unit != stated:
         raise RecordingError(f"the map says {own.unit}, but times in column {shown(name)} are in {stated}.")
     unit = own.unit or stated or "s"
     scale = factor(unit, TIMES, f"times in column {shown(name)}") if own.rate is None else 1.0 / own.rate
-    times: Array = columns.numbers[name] * scale + (clock.offset or chart.clock.offset)
+    times: Array = columns.numbers[name] * scale + offset
+    if own.fine is not None:
+        times = times + 1e-9 * columns.stack([own.fine])[:, 0]
     return times
 
 
 def _scaled(columns: Columns, quantity: Quantity, kind: Mapping[str, float], default: str) -> Array:
     values = columns.stack(quantity.columns)
+    if quantity.size is not None:
+        return quantity.size * values
     stated = {unit for unit in map(columns.unit_of, quantity.columns) if unit is not None}
     if kind is LENGTHS and not stated and columns.length is not None:
         stated = {columns.length}
@@ -255,19 +273,3 @@ def _turns_at(times: Array, hand: PoseStream) -> Rotation:
     if len(hand) < 2:
         return Rotation.concatenate([rotations] * len(times))
     return Slerp(hand.times, rotations)(np.clip(times, hand.times[0], hand.times[-1]))
-
-
-def _order(times: Array) -> NDArray[np.intp]:
-    """Indices of increasing times (n,), the first of those that are equal.
-
-    Raises:
-        RecordingError: if a clock steps back.
-    """
-    back = np.flatnonzero(np.diff(times) < 0.0)
-    if len(back):
-        one, other = float(times[back[0]]), float(times[back[0] + 1])
-        raise RecordingError(
-            f"its clock steps back from {one:.6g} to {other:.6g} s; if it begins anew with every push, cut by a"
-            " column that counts them, or give a folder with one file for each."
-        )
-    return np.flatnonzero(np.diff(times, prepend=-np.inf) > 0.0)

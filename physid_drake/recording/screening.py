@@ -132,7 +132,7 @@ def screen_poses(
         lost_rows = [rows[k] for k in np.flatnonzero(lost).tolist()]
         warnings.append(f"{what}: {describe_rows(lost_rows)}: track lost (all zeros), left out.")
     tracked = np.flatnonzero(~lost)
-    repeats = _find_repeats(positions[tracked], quaternions[tracked])
+    repeats = find_repeats(positions[tracked], quaternions[tracked])
     if repeats.any():
         shown = len(repeats) / float((~repeats).sum())
         warnings.append(
@@ -303,7 +303,7 @@ def _way(positions: Array, quaternions: Array) -> float:
     return float(np.linalg.norm(travel)) + 2.0 * _ARM * math.acos(min(1.0, abs(float(first @ last))))
 
 
-def _find_repeats(positions: Array, quaternions: Array) -> Flags:
+def find_repeats(positions: Array, quaternions: Array) -> Flags:
     """Samples (n,) that repeat the one before because the tracker is slower than the log; none of other repeats.
 
     A slower clock shows all its poses about equally often while the body moves. Rounded noise repeats as chance has

@@ -18,6 +18,7 @@ from physid_drake.recording.statistics import NoiseEstimate, PushSummary, estima
 from physid_drake.recording.values import Array, Recording
 from physid_drake.report.outline import outline_of, shape_in_words
 from physid_drake.report.terminal import narrow_table, numbers, words
+from physid_drake.wording import alike
 
 MOST_KINDS = 8
 """Lines of warnings for a recording."""
@@ -80,13 +81,9 @@ def warnings_by_kind(recording: Recording) -> list[str]:
 
 def alike_as_one(lines: Sequence[str], pushes: Sequence[str]) -> list[str]:
     """Lines that are alike but for a push's name and numbers, as the first of them and how many more there are."""
-    kinds: dict[str, list[str]] = {}
-    for line in lines:
-        general = line
-        for push in pushes:
-            general = general.replace(push, "")
-        kinds.setdefault(re.sub(r"[-+.\d]+(e[-+]\d+)?", "", general), []).append(line)
-    return [said[0] if len(said) == 1 else f"{said[0]} (and {len(said) - 1} more pushes)" for said in kinds.values()]
+    return [
+        said[0] if len(said) == 1 else f"{said[0]} (and {len(said) - 1} more pushes)" for said in alike(lines, pushes)
+    ]
 
 
 def draw_pushes(recording: Recording) -> Figure:

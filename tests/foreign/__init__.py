@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from foreign.apart import control, detections, frames, rostopic, trials
 from foreign.arrays import (
     demonstrations,
     json_lines,
@@ -36,10 +37,10 @@ from foreign.text import (
 from physid_drake.recording import Recording
 
 __all__ = [
-    "BAGS", "DESCRIPTION", "HAND", "LEFT_HANDED", "TABLES", "Log", "assert_rests_agree", "by_map", "demonstrations",
-    "german", "json_lines", "json_pushes", "lerobot", "map_of", "markers", "matlab", "mcap", "motive", "motive_euler",
-    "odometry", "only_pushes", "padded_npz", "qualisys", "records", "ros1", "rtde", "rulers", "transforms", "unity",
-    "vicon", "video",
+    "BAGS", "DESCRIPTION", "HAND", "LEFT_HANDED", "TABLES", "Log", "assert_rests_agree", "by_map", "control",
+    "demonstrations", "detections", "frames", "german", "json_lines", "json_pushes", "lerobot", "map_of", "markers",
+    "matlab", "mcap", "motive", "motive_euler", "odometry", "only_pushes", "padded_npz", "qualisys", "records",
+    "ros1", "rostopic", "rtde", "rulers", "transforms", "trials", "unity", "vicon", "video",
 ]  # fmt: skip
 
 
@@ -76,6 +77,11 @@ TABLES = {
     "pushes.json": Log(write=json_pushes, exact=True),
     "samples.jsonl": Log(write=json_lines, exact=True),
     "samples.npy": Log(write=records, exact=True),
+    "topics": Log(write=rostopic),
+    "trials": Log(write=trials, exact=True, rotation="yaw"),
+    "detections.csv": Log(write=detections),
+    "control.csv": Log(write=control, rotation="yaw"),
+    "frames": Log(write=frames, rotation="yaw"),
     "data.parquet": Log(write=lerobot, needs="pyarrow", exact=True, rotation="yaw"),
 }
 """Tables of whole pushes; ``rulers`` knows the ends only, ``video`` has no rotation and two clocks."""
