@@ -145,17 +145,19 @@ def _kinds(files: Sequence[Path]) -> Mapping[str, list[Path]]:
     by_name: dict[str, list[Path]] = {}
     for file in files:
         by_name.setdefault(re.sub(r"\d+", "0", file.name), []).append(file)
-    if len({len(group) for group in by_name.values()}) != 1 or not 1 < len(by_name) <= MOST_TABLES:
+    most = max(map(len, by_name.values()))
+    # A file of notes beside many of pushes is none of them.
+    groups = [group for group in by_name.values() if len(group) == most or most == 1]
+    if sum(map(len, groups)) < len(files) - most or not 1 < len(groups) <= MOST_TABLES:
         return {}
-    groups = list(by_name.values())
     numbers = {tuple(tuple(re.findall(r"\d+", file.name)) for file in group) for group in groups}
     if len(groups[0]) > 1 and len(numbers) == 1:
-        return _patterns(groups)
+        return _patterns(groups, files)
     if len(groups[0]) > 1:
         return {}
     columns = [read_columns(group[0]) for group in groups]
     if len({frozenset(one.numbers) for one in columns}) == len(columns) or _overlap(columns):
-        return _patterns(groups)
+        return _patterns(groups, files)
     return {}
 
 
@@ -174,9 +176,8 @@ def _overlap(columns: Sequence[Columns]) -> bool:
     return begin < end and min(span[0] for span in spans) > max(last - first for first, last in spans)
 
 
-def _patterns(groups: Sequence[list[Path]]) -> dict[str, list[Path]]:
+def _patterns(groups: Sequence[list[Path]], files: Sequence[Path]) -> dict[str, list[Path]]:
     """A name for one file, a pattern for several; none if a pattern takes in other files."""
-    files = [file for group in groups for file in group]
     found: dict[str, list[Path]] = {}
     for group in groups:
         pattern = group[0].name if len(group) == 1 else re.sub(r"\d+", "*", group[0].name)

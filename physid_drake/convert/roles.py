@@ -1,6 +1,6 @@
 """Which of the bodies of a log is the object, which the hand, and which sensor holds the force.
 
-Names tell first. Where they do not, the motion does: a hand moves while the object rests, not the other way round.
+Names tell first. Where they do not, the motion does: a hand moves before the object, and while it rests.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ LEAST_ALONE: Final = 3
 """Pieces in which a body must move alone to be told from the other."""
 
 CLEARLY: Final = 2.0
-"""So many times as often must one body move alone as the other, to be the hand."""
+"""So many times as often must one body move first, or alone, as the other, to be the hand."""
 
 DOUBT: Final = "   # CHANGE? neither names nor motion tell object and hand apart"
 
@@ -134,7 +134,7 @@ def _places(body: Body, columns: Columns) -> Array:
 def _by_motion(
     body: Body, hand: Body, columns: Callable[[Body], Columns], times: Callable[[Body], Array | None]
 ) -> tuple[Body, Body]:
-    """Object and hand, the other way round if the one that is taken for the object moves alone."""
+    """Object and hand, the other way round if the one that is taken for the object moves first, or alone."""
     places = [_places(one, columns(one)) for one in (body, hand)]
     clocks = [times(one) for one in (body, hand)]
     known = [clock for clock in clocks if clock is not None and np.isfinite(clock).any()]
@@ -147,12 +147,23 @@ def _by_motion(
     count = min(WINDOWS, max(1, min(map(len, places)) // 4))
     edges = np.linspace(begin, end, count + 1)
     moves = _moves([_steps(one, clock, edges) for one, clock in zip(places, known, strict=True)])
-    object_alone, hand_alone = (moves[0] & ~moves[1]).sum(), (moves[1] & ~moves[0]).sum()
-    if object_alone > max(CLEARLY * hand_alone, LEAST_ALONE):
-        return hand, body
-    if hand_alone <= max(CLEARLY * object_alone, LEAST_ALONE):
-        hand.doubt = hand.doubt or DOUBT
+    alone = [float((moves[k] & ~moves[1 - k]).sum()) for k in (0, 1)]
+    for votes, least in ((_begun(moves), 0.0), (alone, LEAST_ALONE)):
+        object_votes, hand_votes = votes
+        if object_votes > max(CLEARLY * hand_votes, least):
+            return hand, body
+        if hand_votes > max(CLEARLY * object_votes, least):
+            return body, hand
+    hand.doubt = hand.doubt or DOUBT
     return body, hand
+
+
+def _begun(moves: Sequence[NDArray[np.bool_]]) -> tuple[int, int]:
+    """Of the pieces that follow one another and in which one of two bodies moves, how often each was the first."""
+    padded = np.concatenate([[False], moves[0] | moves[1]])
+    onsets = np.flatnonzero(padded[1:] & ~padded[:-1])
+    first, second = moves[0][onsets], moves[1][onsets]
+    return int((first & ~second).sum()), int((second & ~first).sum())
 
 
 def _steps(places: Array, times: Array, edges: Array) -> Array:

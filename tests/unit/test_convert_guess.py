@@ -164,6 +164,18 @@ def test_what_moves_alone_is_the_hand(first: str, tmp_path: Path) -> None:
     )  # fmt: skip
 
 
+def test_what_moves_first_is_the_hand_though_the_object_slides_on(tmp_path: Path) -> None:
+    t = 0.01 * np.arange(300)
+    hand = np.interp(t, [0.5, 1.0, 1.5], [-0.1, 0.0, 0.1])
+    slid = np.interp(t, [1.0, 1.5, 2.9], [0.05, 0.15, 0.3])
+    flat = np.zeros((300, 2))
+    columns = {"t": t, **named("a_", XYZ, np.column_stack([slid, flat])),
+               **named("b_", XYZ, np.column_stack([hand, flat]))}  # fmt: skip
+    (tmp_path / "log.csv").write_text(csv(columns))
+    chart = guessed(tmp_path / "log.csv")
+    assert chart["hand"]["position"]["columns"] == ["b_x", "b_y", "b_z"]
+
+
 def test_bodies_that_move_alike_are_doubted(tmp_path: Path) -> None:
     apart = OBJECT + np.column_stack([ZEROS, 0.05 * np.sin(TAKE["t"]) + 0.3, ZEROS])
     columns = {"time": TAKE["t"], **named("one_", XYZ, apart), **named("two_", XYZ, apart[:, [1, 0, 2]])}
@@ -321,6 +333,7 @@ class TestParts:
         for k in range(3):
             self.write(tmp_path, f"push_{k}_tip.txt", HAND, STILL, 0.0)
             self.write(tmp_path, f"push_{k}_mug.txt", OBJECT, TAKE["xyzw"], 0.0)
+        (tmp_path / "a_note.csv").write_text("t,temperature\n0,21\n1,21\n2,22\n")
         chart = guessed(tmp_path)
         assert chart["object"]["file"] == "push_*_mug.txt" and chart["hand"]["file"] == "push_*_tip.txt"
         assert chart["pushes"] == {"cut": "whole"}
