@@ -1,4 +1,4 @@
-"""Reads archives of plain arrays: a header's claims are held against what is there before memory is taken."""
+"""Reads plain arrays, and archives of them: what a header claims is held against what is there first."""
 
 from __future__ import annotations
 
@@ -49,12 +49,34 @@ def read_arrays(path: Path | str) -> dict[str, NDArray[Any]]:
         raise FileError(f"cannot be read: no npz file, or a damaged one ({one_line(error)})") from error
 
 
+def read_array(path: Path | str) -> NDArray[Any]:
+    """The array of an npy file, which may be structured.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        MissingFileError: if it is not there.
+        FileError: if it is no npy file, is damaged, holds what is no plain array, or is larger than 1 GB.
+    """
+    content = read_bytes(path, most=MOST_UNPACKED)
+    try:
+        return _of_npy(io.BytesIO(content), "it", structured=True)
+    except FileError:
+        raise
+    except _BROKEN as error:
+        raise FileError(f"cannot be read: no npy file, or a damaged one ({one_line(error)})") from error
+
+
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
     where = f"its member '{named(member.filename)}'"
     if member.compress_type not in _METHODS:
         raise FileError(f"cannot be read: {where} is packed in a way that NumPy never packs")
     with archive.open(member) as packed:
-        stream = io.BytesIO(packed.read(member.file_size))
+        return _of_npy(io.BytesIO(packed.read(member.file_size)), where)
+
+
+def _of_npy(stream: io.BytesIO, where: str, *, structured: bool = False) -> NDArray[Any]:
     version = np.lib.format.read_magic(stream)
     if version not in ((1, 0), (2, 0)):
         raise FileError(f"cannot be read: {where} is of another version of npy, {version}")
@@ -63,7 +85,7 @@ def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray[Any]:
         shape, by_columns, dtype = header(stream)
     except _BROKEN as error:  # NumPy's words may name objects of Python's own grammar
         raise FileError(f"cannot be read: {where} has no header as NumPy writes it") from error
-    if dtype.kind not in _KINDS:
+    if not (dtype.kind in _KINDS or (structured and dtype.names and not dtype.hasobject)):
         raise FileError(f"cannot be read: {where} holds no numbers and no text")
     rest = stream.read()
     count = 1

@@ -1,7 +1,7 @@
-"""Tables of arrays: npz, HDF5, MATLAB and Parquet, in the layouts in which robots' logs are kept.
+"""Tables of arrays: npz, npy, HDF5, MATLAB, Parquet and JSON, in the layouts in which robots' logs are kept.
 
 An array (n, k) becomes k columns ``name[0]`` to ``name[k-1]``; one of three axes (pushes, n, k) becomes the same with
-its pushes one after the other, counted in ``[push]``. So do groups of an HDF5 file that hold the same, one each.
+its pushes one after the other, counted in ``[push]``. So do groups of a file that hold the same, one each.
 Matrices (n, 3, 3), (n, 3, 4) or (n, 4, 4) become ``name[row,column]``. Dates and durations become seconds.
 """
 
@@ -11,24 +11,26 @@ import importlib
 import io
 import zlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
 import scipy.io
 
-from physid_drake.convert.columns import Array, Columns
+from physid_drake.convert.columns import Array, Columns, seconds_of, without_marks
+from physid_drake.convert.groups import MATRICES, PUSH, Unread, joined
+from physid_drake.convert.json_table import read_json, read_json_lines
 from physid_drake.errors import RecordingError
 from physid_drake.files import FileError, read_bytes
-from physid_drake.npz import read_arrays
+from physid_drake.npz import read_array, read_arrays
 from physid_drake.wording import named, one_line
 
-PUSH: Final = "[push]"
 MOST_BYTES: Final = 1_000_000_000
 MOST_NUMBERS: Final = 40_000_000
 MOST_COLUMNS: Final = 64
 """Of one array: an image is no column."""
+MOST_ARRAYS: Final = 50_000
+"""Of hundreds of pushes with dozens of arrays each."""
 MOST_AXES: Final = 4
 """Of pushes of matrices."""
 
@@ -47,15 +49,8 @@ _BROKEN: Final = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Unread:
-    """What a file holds and no column can be made of, and why."""
-
-    why: str
-
-
 def read_array_table(path: Path) -> Columns:
-    """The columns of an npz, HDF5, MATLAB or Parquet file; what is no number, no time and no text is passed over.
+    """The columns of a file of arrays; what is no number, no time and no text is passed over.
 
     Args:
         path: of the file; its ending says what it is.
@@ -79,11 +74,16 @@ def read_array_table(path: Path) -> Columns:
     unread: dict[str, str] = {}
     units: dict[str, str] = {}
     for name, array in arrays.items():
-        if not isinstance(array, _Unread) and array.dtype.kind in "UO" and array.ndim == 1:
-            texts[name] = [str(value) for value in array[:MOST_NUMBERS]]
+        if not isinstance(array, Unread) and array.dtype.kind in "UO" and array.ndim == 1:
+            words = [str(value) for value in array[:MOST_NUMBERS]]
+            times = seconds_of(words)
+            if times is None:
+                texts[name] = words
+            else:
+                numbers[name], units[name] = times, "s"
             continue
         found = _columns(name, array)
-        if isinstance(found, _Unread):
+        if isinstance(found, Unread):
             unread[name] = found.why
             continue
         numbers |= found
@@ -93,9 +93,8 @@ def read_array_table(path: Path) -> Columns:
         raise RecordingError(f"{named(path)}: holds no columns of numbers; its arrays are {_shapes(arrays)}.")
     if sum(map(len, numbers.values())) > MOST_NUMBERS:
         raise RecordingError(f"{named(path)}: has more than {MOST_NUMBERS:,} numbers; cut the pushes out of it.")
-    return Columns(
-        source=named(path.name), numbers=_without_empty_rows(numbers), texts=texts, units=units, unread=unread
-    )
+    numbers = _without_empty_rows(without_marks(named(path.name), numbers))
+    return Columns(source=named(path.name), numbers=numbers, texts=texts, units=units, unread=unread)
 
 
 def _without_empty_rows(numbers: Mapping[str, Array]) -> dict[str, Array]:
@@ -111,14 +110,14 @@ def _why(error: Exception) -> str:
     return "it claims more than it holds" if isinstance(error, MemoryError) else one_line(error)
 
 
-def _columns(name: str, array: Any) -> dict[str, Array] | _Unread:
+def _columns(name: str, array: Any) -> dict[str, Array] | Unread:
     """What an array's columns are, or why it has none."""
-    if not isinstance(array, _Unread) and array.dtype.kind in "mM":
+    if not isinstance(array, Unread) and array.dtype.kind in "mM":
         array = _seconds(array)
-    if isinstance(array, _Unread):
+    if isinstance(array, Unread):
         return array
     why = _no_columns(array)
-    return _Unread(why=why) if why else _columns_of_numbers(name, array)
+    return Unread(why=why) if why else _columns_of_numbers(name, array)
 
 
 def _no_columns(array: Any) -> str:
@@ -128,10 +127,17 @@ def _no_columns(array: Any) -> str:
     if array.ndim == 0:
         return "it is a single number"
     if array.ndim > 1 and array.shape[-1] > MOST_COLUMNS:
-        return _too_wide(array.shape[-1])
+        return _is_turned(array.shape) or _too_wide(array.shape[-1])
     if array.ndim > MOST_AXES or (array.ndim == MOST_AXES and not _holds_matrices(array)):
         return f"it has {array.ndim} axes, as images have"
     return ""
+
+
+def _is_turned(shape: tuple[int, ...]) -> str:
+    """What to do about an array whose samples lie along its second axis; nothing where they do not."""
+    if len(shape) != 2 or not 1 < shape[0] <= MOST_COLUMNS:
+        return ""
+    return f"its shape is {shape}: transposed? A column needs the samples along the first axis; save it as array.T"
 
 
 def _too_wide(width: int) -> str:
@@ -151,7 +157,7 @@ def _columns_of_numbers(name: str, array: Any) -> dict[str, Array]:
 
 
 def _holds_matrices(array: Any) -> bool:
-    return array.ndim >= 3 and array.shape[-2:] in ((3, 3), (3, 4), (4, 4))
+    return array.ndim >= 3 and array.shape[-2:] in MATRICES
 
 
 def _matrices(name: str, array: Any) -> dict[str, Array]:
@@ -167,7 +173,7 @@ def _seconds(array: Any) -> Any:
     """Dates as seconds since 1970, durations as seconds; NaN where there is none."""
     unit, count = np.datetime_data(array.dtype)
     if unit not in _SECONDS:
-        return _Unread(why=f"it holds {array.dtype}, which is no time in seconds")
+        return Unread(why=f"it holds {array.dtype}, which is no time in seconds")
     return np.where(np.isnat(array), np.nan, array.astype(np.int64) * (count * _SECONDS[unit]))
 
 
@@ -179,7 +185,7 @@ def _floats(array: Any) -> Array:
 
 def _shapes(arrays: Mapping[str, Any]) -> str:
     def said(array: Any) -> str:
-        return f"({array.why})" if isinstance(array, _Unread) else str(array.shape)
+        return f"({array.why})" if isinstance(array, Unread) else str(array.shape)
 
     return ", ".join(f"{named(name)} {said(array)}" for name, array in list(arrays.items())[:8]) or "none"
 
@@ -203,14 +209,14 @@ def _read_hdf5(path: Path, *, turned: bool = False) -> dict[str, Any]:
         found: dict[str, Any] = {}
         _collect(h5py, opened, "", found, depth=0)
     if turned:
-        found = {n: array if isinstance(array, _Unread) else array.T.squeeze() for n, array in found.items()}
-    return _joined(found)
+        found = {n: array if isinstance(array, Unread) else array.T.squeeze() for n, array in found.items()}
+    return joined(_columns_only(found))
 
 
 def _collect(h5py: Any, group: Any, prefix: str, found: dict[str, Any], depth: int) -> None:
     """Plain arrays of this very file: links are not followed, so that nothing is read from elsewhere."""
-    if depth > 8 or len(found) > 10_000:
-        raise RecordingError("it nests deeper, or holds more arrays, than a log does")
+    if depth > 8 or len(found) > MOST_ARRAYS:
+        raise FileError("it nests deeper, or holds more arrays, than a log does")
     for name in group:
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
             continue
@@ -218,7 +224,19 @@ def _collect(h5py: Any, group: Any, prefix: str, found: dict[str, Any], depth: i
         if isinstance(item, h5py.Group):
             _collect(h5py, item, f"{prefix}{name}/", found, depth + 1)
         elif isinstance(item, h5py.Dataset):
-            found[f"{prefix}{name}"] = item[()] if _is_plain(item) else _Unread(why=_no_plain(item))
+            found[f"{prefix}{name}"] = item[()] if _is_plain(item) else Unread(why=_no_plain(item))
+
+
+def _columns_only(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Arrays, but why there are no columns where there are none: images of all pushes are not joined."""
+
+    def column(array: Any) -> Any:
+        if isinstance(array, Unread) or (array.dtype.kind in "UO" and array.ndim == 1):
+            return array
+        why = _no_columns(array)
+        return Unread(why=why) if why else array
+
+    return {name: column(array) for name, array in found.items()}
 
 
 def _is_plain(item: Any) -> bool:
@@ -235,30 +253,6 @@ def _no_plain(item: Any) -> str:
     return f"it has the shape {item.shape}, which is no column's"
 
 
-def _joined(found: dict[str, Any]) -> dict[str, Any]:
-    """Groups at the top that hold the same arrays, one after the other: robots' logs keep one for each push."""
-    unread = {name: array for name, array in found.items() if isinstance(array, _Unread)}
-    arrays = {name: array for name, array in found.items() if name not in unread}
-    return unread | _joined_groups(arrays)
-
-
-def _joined_groups(found: dict[str, Any]) -> dict[str, Any]:
-    groups: dict[str, dict[str, Any]] = {}
-    for name, array in found.items():
-        head, _, rest = name.partition("/")
-        groups.setdefault(head, {})[rest] = array
-    sets = {frozenset(arrays) for arrays in groups.values()}
-    if len(groups) < 2 or len(sets) != 1 or "" in next(iter(sets)):
-        return found
-    lengths = [{len(array) for array in arrays.values()} for arrays in groups.values()]
-    if any(len(one) != 1 for one in lengths):
-        return found
-    heads = sorted(groups, key=lambda head: (len(head), head))
-    joined = {name: np.concatenate([groups[head][name] for head in heads]) for name in groups[heads[0]]}
-    counts = [len(next(iter(groups[head].values()))) for head in heads]
-    return joined | {PUSH: np.repeat(np.arange(len(heads), dtype=np.float64), counts)}
-
-
 def _read_matlab(path: Path) -> dict[str, Any]:
     """Variables and fields of structures; of 7.3, which is HDF5 with the axes the other way round."""
     content = read_bytes(path, most=MOST_BYTES)
@@ -271,18 +265,18 @@ def _read_matlab(path: Path) -> dict[str, Any]:
     for name, value in scipy.io.loadmat(stream, squeeze_me=True, struct_as_record=True).items():
         if not name.startswith("__"):
             _fields(name, value, found, depth=0)
-    return _joined(found)
+    return joined(_columns_only(found))
 
 
 def _fields(name: str, value: Any, found: dict[str, Any], depth: int) -> None:
-    if depth > 8 or len(found) > 10_000:
-        raise RecordingError("it nests deeper, or holds more arrays, than a log does")
+    if depth > 8 or len(found) > MOST_ARRAYS:
+        raise FileError("it nests deeper, or holds more arrays, than a log does")
     if not isinstance(value, np.ndarray):
         return
     if value.dtype.names is None:
         if value.ndim >= 1:
             plain = value.dtype.kind in "biufU"
-            found[name] = value if plain else _Unread(why="it holds cells or objects, which are no numbers")
+            found[name] = value if plain else Unread(why="it holds cells or objects, which are no numbers")
         return
     # One structure, or an array of them: one for each push.
     for k, one in enumerate(np.atleast_1d(value)[:1000]):
@@ -304,7 +298,7 @@ def _check_unpacked(content: bytes) -> None:
                 total += len(unpack.decompress(packed, _PIECE))
                 packed = unpack.unconsumed_tail
                 if total > MOST_BYTES:
-                    raise RecordingError(f"it unpacks to more than {MOST_BYTES / 1e6:g} MB")
+                    raise FileError(f"it unpacks to more than {MOST_BYTES / 1e6:g} MB")
         at += 8 + size
 
 
@@ -332,7 +326,7 @@ def _of_arrow(column: Any) -> Any:
         or types.is_string(kind) or types.is_large_string(kind)
     ):  # fmt: skip
         return column.to_numpy()
-    return _Unread(why=f"it holds {named(kind)}, which is no number")
+    return Unread(why=f"it holds {named(kind)}, which is no number")
 
 
 def _of_lists(column: Any) -> Any:
@@ -340,10 +334,33 @@ def _of_lists(column: Any) -> Any:
     widths = {0 if row is None else len(row) for row in rows}
     width = min(widths, default=0)
     if width == 0 or len(widths) > 1:
-        return _Unread(why="its lists are not equally long")
-    return np.array(rows) if width <= MOST_COLUMNS else _Unread(why=_too_wide(width))
+        return Unread(why="its lists are not equally long")
+    return np.array(rows) if width <= MOST_COLUMNS else Unread(why=_too_wide(width))
+
+
+def _read_npy(path: Path) -> dict[str, Any]:
+    """One array, which has no name, or the fields of a structured one."""
+    found: dict[str, Any] = {}
+    _structure("", read_array(path), found, depth=0)
+    return found
+
+
+def _structure(name: str, array: Any, found: dict[str, Any], depth: int) -> None:
+    if depth > 8 or len(found) > MOST_ARRAYS:
+        raise FileError("it nests deeper, or holds more arrays, than a log does")
+    if array.dtype.names is None:
+        found[name or "array"] = array
+        return
+    for field in array.dtype.names:
+        _structure(f"{name}/{field}" if name else field, array[field], found, depth + 1)
+
+
+def _joined(read: Callable[[Path], dict[str, Any]]) -> Callable[[Path], dict[str, Any]]:
+    """A reader that joins groups as well."""
+    return lambda path: joined(_columns_only(read(path)))
 
 
 READERS: Final[Mapping[str, Callable[[Path], dict[str, Any]]]] = {
-    ".npz": read_arrays, ".h5": _read_hdf5, ".hdf5": _read_hdf5, ".mat": _read_matlab, ".parquet": _read_parquet,
+    ".npz": read_arrays, ".npy": _read_npy, ".h5": _read_hdf5, ".hdf5": _read_hdf5, ".mat": _read_matlab,
+    ".parquet": _read_parquet, ".json": _joined(read_json), ".jsonl": _joined(read_json_lines),
 }  # fmt: skip

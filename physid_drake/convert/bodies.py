@@ -1,12 +1,7 @@
-"""What the columns of a table seem to be, by their names and numbers: places, rotations and forces of bodies.
-
-A name ends in an axis (``x``, ``qw``, ``Rot[4]``, ``pose_3``, ``T[0,3]``) and perhaps a unit; before it stands a
-word for what is measured (position, rotation, force) and the body's name.
-"""
+"""What the columns of a table seem to be, by their names and numbers: places, rotations and forces of bodies."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
@@ -15,7 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from physid_drake.convert.columns import Array, Columns
-from physid_drake.convert.units import ANGLES, FORCES, LENGTHS
+from physid_drake.convert.names import axis_of, is_wanted, parts_of, unit_of, words_of
+from physid_drake.convert.units import ANGLES, FORCES
 
 MOST_TURNS: Final = 2000
 """Rotations that are looked at."""
@@ -29,24 +25,10 @@ FLAT: Final = 0.2
 UNIT: Final = 0.02
 """What a quaternion's norm, or a matrix' rows, may be off by the rounding of text."""
 
-_AXIS: Final = re.compile(
-    r"^(?P<stem>.*?)[\s_./\-:]*"
-    r"(?P<axis>q[wxyz]|[rtf][xyz]|[xyzw](?=\d*$)|roll|pitch|yaw|phi|theta|heading|\[\d+\]|\[\d,\d\]|(?<=_)\d+)"
-    r"(?P<digit>\d*)$",
-    re.IGNORECASE,
-)
-_UNIT: Final = re.compile(
-    r"^(?P<name>.*?)[\s_]*(?:[\[(](?P<bracketed>{0})[\])]|(?<=[\s_])(?P<bare>{0}))$".format(
-        "|".join(sorted([*LENGTHS, *ANGLES, *FORCES], key=len, reverse=True))
-    )
-)
-_QUANTITIES: Final[Sequence[tuple[str, str]]] = (
-    ("force", r"force|wrench|ft"),
-    ("turn", r"rotation|rot|orientation|quat\w*|euler\w*|rpy"),
-    ("place", r"position|pos|translation|place|xyz"),
-    ("pose", r"pose|transform|state"),
-)
-"""What a name's last word before the axis says is measured."""
+MOST_OF_ONE: Final = 7
+"""Columns of one array that is the whole log, and holds no more than one body's place and rotation."""
+
+FORCE_WORDS: Final = frozenset(("f", "fext", "ft", "force", "forces", "wrench", "netft", "loadcell", "fts"))
 
 _Found = dict[str, str]
 """Columns by their axis."""
@@ -62,7 +44,11 @@ class Body:
         kind: how the rotation is written, as in a map.
         order: of Euler angles.
         sure: whether the kind is.
+        named: whether the order of a quaternion's columns is, by their names.
         unit: of the position, if the header states one.
+        wanted: whether it is where something was to be, and was not measured.
+        where: column and value of the rows that are its own; None if all are.
+        doubt: what may be wrong, as a comment.
     """
 
     name: str
@@ -71,14 +57,21 @@ class Body:
     kind: str = "wxyz"
     order: str = "ZYX"
     sure: bool = True
+    named: bool = False
     force: list[str] = field(default_factory=list)
     unit: str | None = None
+    wanted: bool = False
+    where: tuple[str, str] | None = None
+    doubt: str = ""
 
 
 def bodies_of(columns: Columns) -> list[Body]:
     """Bodies that have a place, sensors of a force, and a rotation without a name, in the order of the columns."""
     bodies: dict[str, Body] = {}
-    for (owner, quantity), axes in _groups(columns).items():
+    groups = _groups(columns)
+    if len(groups) == 1 and len(next(iter(groups.values()))) == len(columns.numbers) > MOST_OF_ONE:
+        return _nameless(columns)
+    for (owner, quantity), axes in groups.items():
         body = bodies.setdefault(owner, Body(name=owner or "?"))
         found = _read(owner, quantity, axes, columns)
         body.position = body.position or found.position
@@ -86,56 +79,56 @@ def bodies_of(columns: Columns) -> list[Body]:
         body.unit = body.unit or found.unit
         # A quaternion or a matrix needs no convention of angles.
         if found.rotation and (not body.rotation or len(found.rotation) > len(body.rotation)):
-            body.rotation, body.kind, body.order, body.sure = found.rotation, found.kind, found.order, found.sure
+            body.rotation, body.kind, body.order = found.rotation, found.kind, found.order
+            body.sure, body.named = found.sure, found.named
     for body in bodies.values():
-        if len(body.rotation) == 4:
-            body.kind, body.sure = _order_of(body.rotation, body.position, columns)
+        if len({len(columns.numbers[name]) for name in body.position}) > 1:
+            body.position = []
     nameless = bodies.get("")
-    return [body for body in bodies.values() if body.position or body.force or (body is nameless and body.rotation)]
+    kept = [body for body in bodies.values() if body.position or body.force or (body is nameless and body.rotation)]
+    for body in kept:
+        if len(body.rotation) == 4 and not body.named:
+            body.kind, body.sure = _order_of(body.rotation, body.position, columns)
+        body.wanted = is_wanted(body.name, [other.name for other in kept])
+    return kept or _nameless(columns)
 
 
 def up_of(place: Sequence[str], columns: Columns) -> int | None:
     """The axis along which a body hardly moves, or that is missing between two; None if that is not known."""
     if len(place) < 3:
-        letters = [match["axis"].lower()[-1] for name in place if (match := _AXIS.match(_unit_of(name, columns)[0]))]
-        missing = set("xyz") - set(letters)
+        missing = set("xyz") - {(axis_of(name, columns) or "?")[-1] for name in place}
         return "xyz".index(missing.pop()) if len(missing) == 1 else None
-    values = _filled(place, columns)
+    values = filled(place, columns)
     return int(np.argmin(_ways(values))) if len(values) else None
+
+
+def filled(names: Sequence[str], columns: Columns) -> Array:
+    """Columns (n, k) side by side, without rows in which one is empty; none if they are not equally long."""
+    if len({len(columns.numbers[name]) for name in names}) != 1:
+        return np.empty((0, len(names)))
+    values = np.column_stack([columns.numbers[name] for name in names])
+    return np.asarray(values[np.isfinite(values).all(axis=1)])
+
+
+def rises(values: Array) -> bool:
+    """Whether numbers go up from almost every row to the next."""
+    seen = values[np.isfinite(values)]
+    return len(seen) > 2 and float(np.mean(np.diff(seen) > 0.0)) > 0.9
 
 
 def _groups(columns: Columns) -> dict[tuple[str, str], _Found]:
     """Columns of one body and quantity."""
     found: dict[tuple[str, str], _Found] = {}
-    for name in columns.numbers:
-        bare, _ = _unit_of(name, columns)
-        match = _AXIS.match(bare)
-        if match is None:
-            continue
-        axis, stem = match["axis"].lower(), match["stem"] + match["digit"]
-        owner, quantity = stem, ""
-        for kind, words in _QUANTITIES:
-            split = re.match(rf"^(?P<owner>.*?)[\s_./\-:]*\b(?:{words})$", stem.replace("_", " "), re.IGNORECASE)
-            if split:
-                owner, quantity = stem[: len(split["owner"])], kind
-                break
-        found.setdefault((owner, quantity), {}).setdefault(axis.strip("[]"), name)
+    for name, part in parts_of(columns).items():
+        found.setdefault((part.owner, part.quantity), {}).setdefault(part.axis, name)
     return found
-
-
-def _unit_of(name: str, columns: Columns) -> tuple[str, str | None]:
-    """A column's name without its unit, and the unit, of a line of its own or of the name."""
-    match = _UNIT.match(name)
-    stated = columns.units.get(name)
-    if match is None:
-        return name, stated
-    return match["name"], stated or match["bracketed"] or match["bare"]
 
 
 def _read(owner: str, quantity: str, axes: _Found, columns: Columns) -> Body:
     """What one group of columns is."""
     body = Body(name=owner)
     numbered = _in_order(axes, [str(k) for k in range(len(axes))])
+    quantity = _by_unit(next(iter(axes.values())), columns) or quantity
     if "0,0" in axes:
         _read_matrix(body, axes)
     elif numbered:
@@ -143,8 +136,17 @@ def _read(owner: str, quantity: str, axes: _Found, columns: Columns) -> Body:
     else:
         _read_named(body, quantity, axes, columns)
     if body.position:
-        body.unit = _unit_of(body.position[0], columns)[1]
+        body.unit = unit_of(body.position[0], columns)[1]
     return body
+
+
+def _by_unit(name: str, columns: Columns) -> str:
+    """What a column without a word for it must be by its unit; nothing if it may be a place."""
+    unit = unit_of(name, columns)[1]
+    part = axis_of(name, columns)
+    if part not in ("x", "0"):
+        return ""
+    return "turn" if unit in ANGLES else "force" if unit in FORCES else ""
 
 
 def _read_matrix(body: Body, axes: _Found) -> None:
@@ -155,49 +157,140 @@ def _read_matrix(body: Body, axes: _Found) -> None:
 
 def _read_numbered(body: Body, quantity: str, names: list[str], columns: Columns) -> None:
     count = len(names)
-    if quantity == "force":
+    called_force = quantity == "force" or bool(FORCE_WORDS & set(words_of(body.name)))
+    if quantity == "force" or (called_force and count == 6):
         body.force = names[:3] if count in (3, 6) else []
     elif count == 4 and _is_quaternion(names, columns):
         body.rotation = names
     elif count == 9 and _is_matrix(names, columns):
         body.rotation, body.kind, body.sure = names, "matrix", False
-    elif quantity == "turn":
+    elif quantity == "vector" and count == 3:
+        body.rotation, body.kind = names, "rotation_vector"
+    elif quantity in ("turn", "vector", "q"):
         return
-    elif count == 7 and _is_quaternion(names[3:], columns):
-        body.position, body.rotation = names[:3], names[3:]
+    elif count in (12, 16) and (found := _transform(names, columns)):
+        body.rotation, body.position, body.kind = found[0], found[1], "matrix"
+    elif count > 6 and (found := _with_quaternion(names, columns)):
+        body.rotation, body.position = found
     elif count == 6 and quantity == "pose":
         body.position, body.rotation, body.kind = names[:3], names[3:], "rotation_vector"
     elif count == 3 and quantity != "place" and not _has_height(names, columns):
         body.position, body.rotation, body.kind = names[:2], names[2:], "yaw"
     elif count in (2, 3):
         body.position = names
-    elif count == 6:
-        body.force = names[:3]
 
 
 def _read_named(body: Body, quantity: str, axes: _Found, columns: Columns) -> None:
     letters = _in_order(axes, "xyz") or _in_order(axes, "xy")
-    four = _in_order(axes, "xyzw")
     body.force = letters if quantity == "force" else _in_order(axes, ("fx", "fy", "fz"))
     if quantity == "force":
         return
+    four = _in_order(axes, "xyzw")
     if four and _is_quaternion(four, columns):
-        body.rotation = _by_column(four, columns)
+        _set_quaternion(body, four, columns)
         return
-    if quantity == "turn":
-        body.rotation, body.kind, body.order = (letters if len(letters) == 3 else []), "euler", "XYZ"
+    if quantity in ("turn", "vector"):
+        body.rotation = letters if len(letters) == 3 else _angles(axes)
+        body.kind, body.order = ("euler", "XYZ" if letters else "ZYX") if quantity == "turn" else (
+            "rotation_vector", "ZYX",
+        )  # fmt: skip
         return
-    body.position = letters or _in_order(axes, ("tx", "ty", "tz")) or _in_order(axes, "xz")
-    for kind, wanted in (
-        ("wxyz", ("qx", "qy", "qz", "qw")),
+    # Beside forces, T is for torque.
+    shifts = [] if body.force else _in_order(axes, ("tx", "ty", "tz"))
+    body.position = letters or shifts or _in_order(axes, "xz")
+    _read_turn(body, axes, columns)
+
+
+def _read_turn(body: Body, axes: _Found, columns: Columns) -> None:
+    """The rotation that stands beside a place, each axis with a letter of its own."""
+    for wanted in (("qx", "qy", "qz", "qw"), ("qx", "qy", "qz", "q0")):
+        four = _in_order(axes, wanted)
+        if four and _is_quaternion(four, columns):
+            _set_quaternion(body, four, columns)
+            return
+    four = _in_order(axes, ("q0", "q1", "q2", "q3"))
+    if four and _is_quaternion(four, columns):
+        body.rotation = four
+        return
+    for kind, names in (
         ("euler", ("yaw", "pitch", "roll")),
+        ("euler", "abc" if body.position else ()),
         ("rotation_vector", ("rx", "ry", "rz")),
         *(("yaw", (name,)) for name in ("yaw", "theta", "phi", "heading")),
     ):
-        found = _in_order(axes, wanted)
+        found = _in_order(axes, names)
         if found:
-            body.rotation, body.kind = (_by_column(found, columns) if kind == "wxyz" else found), kind
+            body.rotation, body.kind = found, kind
             return
+
+
+def _angles(axes: _Found) -> list[str]:
+    return _in_order(axes, ("yaw", "pitch", "roll"))
+
+
+def _set_quaternion(body: Body, names: Sequence[str], columns: Columns) -> None:
+    """Of columns x, y, z, w: from w on if it stands in front."""
+    places = list(columns.numbers)
+    front = min(names, key=places.index) == names[3]
+    body.rotation = [names[3], *names[:3]] if front else list(names)
+    body.kind, body.named = "wxyz" if front else "xyzw", True
+
+
+def _nameless(columns: Columns) -> list[Body]:
+    """Bodies of columns that have no names, by their numbers: quaternions with a place before or behind, triples."""
+    names = [name for name, values in columns.numbers.items() if not rises(values)]
+    bodies: list[Body] = []
+    found = _transform(names, columns) if len(names) in (12, 16) else None
+    if found:
+        bodies.append(Body(name="?", position=found[1], rotation=found[0], kind="matrix"))
+        names = []
+    while found := _with_quaternion(names, columns):
+        turn, place = found
+        kind, sure = _order_of(turn, place, columns)
+        bodies.append(Body(name="?", position=place, rotation=turn, kind=kind, sure=sure))
+        names = [name for name in names if name not in turn + place]
+    for run in _runs(names, list(columns.numbers)) if bodies else ():
+        if len(run) in (2, 3):
+            bodies.append(Body(name="?", position=run))
+    for body in bodies:
+        body.doubt = "   # CHANGE? taken by its numbers alone: the columns have no names"
+    return bodies
+
+
+def _runs(names: Sequence[str], order: Sequence[str]) -> list[list[str]]:
+    """Names that follow one another in the table."""
+    runs: list[list[str]] = []
+    for name in names:
+        if runs and order.index(name) == order.index(runs[-1][-1]) + 1:
+            runs[-1].append(name)
+        else:
+            runs.append([name])
+    return runs
+
+
+def _with_quaternion(names: list[str], columns: Columns) -> tuple[list[str], list[str]] | None:
+    """Four columns of norm 1 and the three before them, or behind them if there are none."""
+    for k in range(len(names) - 3):
+        turn = names[k : k + 4]
+        place = names[k - 3 : k] if k >= 3 else names[k + 4 : k + 7]
+        if len(place) == 3 and _is_quaternion(turn, columns):
+            return turn, place
+    return None
+
+
+def _transform(names: Sequence[str], columns: Columns) -> tuple[list[str], list[str]] | None:
+    """Rotation, row by row, and place of twelve or sixteen columns of a transform, by rows or by columns."""
+    by_rows = [list(names[4 * i : 4 * i + 3]) for i in range(3)], [names[3], names[7], names[11]]
+    across = [[names[i + 4 * j] for j in range(3)] for i in range(3)], list(names[12:15])
+    by_columns = [across] if len(names) == 16 else [
+        ([[names[i + 3 * j] for j in range(3)] for i in range(3)], list(names[9:12]))
+    ]  # fmt: skip
+    for rows, place in (by_rows, *by_columns):
+        rotation = [name for row in rows for name in row]
+        values = filled(place, columns)
+        if _is_matrix(rotation, columns) and (len(names) == 12 or np.ptp(values, axis=0).any() or values.any()):
+            return rotation, place
+    return None
 
 
 def _in_order(axes: Mapping[str, str], wanted: Sequence[str]) -> list[str]:
@@ -206,25 +299,13 @@ def _in_order(axes: Mapping[str, str], wanted: Sequence[str]) -> list[str]:
     return found if len(found) == len(wanted) else []
 
 
-def _by_column(names: Sequence[str], columns: Columns) -> list[str]:
-    """Of a quaternion x, y, z, w: from w on if it stands in front."""
-    places = list(columns.numbers)
-    first = min(names, key=places.index)
-    return [names[3], *names[:3]] if first == names[3] else list(names)
-
-
-def _filled(names: Sequence[str], columns: Columns) -> Array:
-    values = np.column_stack([columns.numbers[name] for name in names])
-    return np.asarray(values[np.isfinite(values).all(axis=1)])
-
-
 def _ways(values: Array) -> Array:
     """How far each of some columns (n, k) goes, but for its ends."""
     return np.asarray(np.quantile(values, 0.95, axis=0) - np.quantile(values, 0.05, axis=0))
 
 
 def _has_height(names: Sequence[str], columns: Columns) -> bool:
-    values = _filled(names, columns)
+    values = filled(names, columns)
     if not len(values):
         return True
     ways = np.sort(_ways(values))
@@ -232,26 +313,19 @@ def _has_height(names: Sequence[str], columns: Columns) -> bool:
 
 
 def _is_quaternion(names: Sequence[str], columns: Columns) -> bool:
-    if len({len(columns.numbers[name]) for name in names}) > 1:
-        return False
-    values = _filled(names, columns)
+    values = filled(names, columns)
     return len(values) > 0 and bool(np.median(np.abs(np.linalg.norm(values, axis=1) - 1.0)) < UNIT)
 
 
 def _is_matrix(names: Sequence[str], columns: Columns) -> bool:
-    values = _filled(names, columns).reshape(-1, 3, 3)
+    values = filled(names, columns).reshape(-1, 3, 3)
     off = np.abs(values @ values.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
     return len(values) > 0 and bool(np.median(off) < UNIT)
 
 
 def _order_of(names: Sequence[str], place: Sequence[str], columns: Columns) -> tuple[str, bool]:
-    """The order of a quaternion, and whether that is sure."""
-    last = re.sub(r"[\[(].*", "", names[0]).lower()
-    if last.endswith("x") and not re.search(r"\d\]?$", names[0]):
-        return "xyzw", True
-    if last.endswith("w"):
-        return "wxyz", True
-    values = _filled(names, columns)
+    """The order of a quaternion by its numbers, and whether that is sure."""
+    values = filled(names, columns)
     values = values[(values != 0.0).any(axis=1)][:: max(1, len(values) // MOST_TURNS)]
     up = up_of(place, columns)
     if len(values) < 2 or up is None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import difflib
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime, time
 from typing import Final
 
 import numpy as np
@@ -20,6 +22,10 @@ Array = NDArray[np.float64]
 _BRACKETED: Final = re.compile(r"[\[(]([^\[\]()]+)[\])]\s*$")
 MOST_NAMED = 3
 """Names offered where one is unknown."""
+
+NO_MEASUREMENT: Final = 1e20
+"""Nothing is measured to be so large in any unit, times in ns since 1970 included: programs write such numbers, as
+the largest that a float can hold, where there was no sample."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,6 +97,43 @@ class Columns:
         if close:
             return f"did you mean {_listed(close)}?"
         return f"its columns are {_listed(known)}." if known else "it has none."
+
+
+def without_marks(where: str, numbers: Mapping[str, Array]) -> dict[str, Array]:
+    """Columns in which the marks of lost samples are empty, which a ``UserWarning`` says."""
+    marked = {name: np.abs(values) > NO_MEASUREMENT for name, values in numbers.items()}
+    marked = {name: there for name, there in marked.items() if there.any()}
+    if marked:
+        count = sum(int(there.sum()) for there in marked.values())
+        warnings.warn(
+            f"{where}: {count} numbers beyond {NO_MEASUREMENT:g} in {_listed(list(marked))} stand for samples that"
+            " were lost, and are taken for empty.",
+            stacklevel=2,
+        )
+    return {name: np.where(marked[name], np.nan, v) if name in marked else v for name, v in numbers.items()}
+
+
+def seconds_of(texts: Sequence[str]) -> Array | None:
+    """Dates and times of ISO 8601 as seconds since 1970, times of the day as seconds; None if one is neither.
+
+    Where no zone is given, it is that of Greenwich: where a clock begins does not matter. Empty ones are NaN.
+    """
+    try:
+        return np.array([_second(text) if text else np.nan for text in texts]) if any(texts) else None
+    except (ValueError, OverflowError):
+        return None
+
+
+def _second(text: str) -> float:
+    if len(text) > 2 and ":" in text[1:3]:
+        bare, _, half = text.partition(" ")
+        day = time.fromisoformat(bare.zfill(len(bare) + (bare[1] == ":")))
+        hour = {"": day.hour, "AM": day.hour % 12, "PM": day.hour % 12 + 12}.get(half.upper())
+        if hour is None:
+            raise ValueError(half)
+        return 3600.0 * hour + 60.0 * day.minute + day.second + 1e-6 * day.microsecond
+    date = datetime.fromisoformat(text)
+    return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
 
 
 def _listed(names: Sequence[str], most: int = 8) -> str:

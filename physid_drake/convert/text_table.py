@@ -7,10 +7,12 @@ another, Vicon writes names over the first column of each body and units below t
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import math
 import re
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,8 +20,8 @@ from typing import Final
 
 import numpy as np
 
-from physid_drake.convert.columns import Array, Columns
-from physid_drake.convert.units import UNITS
+from physid_drake.convert.columns import Array, Columns, seconds_of, without_marks
+from physid_drake.convert.text_sections import Rows, number_of, states_units, tables_in, unit_said
 from physid_drake.errors import RecordingError
 from physid_drake.files import FileError, read_bytes
 from physid_drake.wording import named, one_line, shown
@@ -59,14 +61,6 @@ class Dialect:
     skip_lines: int = 0
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Rows:
-    """Fields of the lines of a table, and each line's number in the file."""
-
-    fields: list[list[str]]
-    lines: list[int]
-
-
 def read_text_table(path: Path, dialect: Dialect | None = None) -> Columns:
     """The columns of a file of text.
 
@@ -78,8 +72,45 @@ def read_text_table(path: Path, dialect: Dialect | None = None) -> Columns:
         RecordingError: if it cannot be read, or holds no table; one line that names the file.
     """
     dialect = dialect or Dialect()
+    text = _read(path, dialect)
+    if dialect.section > len(text.tables):
+        raise RecordingError(
+            f"{text.where}: has {len(text.tables)} table(s), but section {dialect.section} is asked for."
+        )
+    return _table(text, dialect.section, dialect.header_lines)
+
+
+def read_text_tables(path: Path, most: int) -> dict[int, Columns]:
+    """The tables of a file of text, by their number from 1 on; those behind the first only if they can be read.
+
+    Args:
+        path: of the file.
+        most: tables that are read.
+
+    Raises:
+        RecordingError: if the first cannot be read; one line that names the file.
+    """
+    text = _read(path, Dialect())
+    found = {1: _table(text, 1, None)}
+    for section in range(2, min(len(text.tables), most) + 1):
+        with contextlib.suppress(RecordingError):
+            found[section] = _table(text, section, None)
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Text:
+    """What a file of text holds: its name, how decimals are written, a unit of length, headers and rows."""
+
+    where: str
+    decimal: str
+    length: str | None
+    tables: list[tuple[list[list[str]], Rows]]
+
+
+def _read(path: Path, dialect: Dialect) -> _Text:
     try:
-        text = _decoded(read_bytes(path, most=MOST_BYTES), dialect.encoding)
+        text = _decoded(_unpacked(read_bytes(path, most=MOST_BYTES)), dialect.encoding)
     except FileError as error:
         raise RecordingError(f"{named(path)}: {error}.") from error
     where = named(path.name)
@@ -87,29 +118,71 @@ def read_text_table(path: Path, dialect: Dialect | None = None) -> Columns:
     separator = dialect.separator or _separator(text)
     decimal = dialect.decimal or ("," if separator != "," and _has_decimal_commas(text, separator) else ".")
     try:
-        sections = _sections(_split(text, separator), decimal)
+        tables = tables_in(_split(text, separator), decimal)
     except csv.Error as error:
         raise RecordingError(f"{where}: no readable table: {one_line(error)}.") from error
-    if not sections:
+    if not tables:
         raise RecordingError(
             f"{where}: no table of numbers was found, separated by {shown(separator)}; does it hold two columns and"
             " two rows of numbers? A map's 'source:' may say how it is written."
         )
-    if dialect.section > len(sections):
-        raise RecordingError(f"{where}: has {len(sections)} table(s), but section {dialect.section} is asked for.")
-    header, body = sections[dialect.section - 1]
-    if dialect.header_lines is not None:
-        header = header[max(0, len(header) - dialect.header_lines) :]
+    return _Text(where=where, decimal=decimal, length=_length_unit(text), tables=tables)
+
+
+def _table(text: _Text, section: int, header_lines: int | None) -> Columns:
+    """One of the tables, of whose header so many lines count."""
+    header, body = text.tables[section - 1]
+    if header_lines is not None:
+        header = header[max(0, len(header) - header_lines) :]
+    names, units = _names(header, _width(text.where, header, body))
+    return replace(_columns(text.where, names, units, body, text.decimal), length=text.length)
+
+
+def _width(where: str, header: list[list[str]], body: Rows) -> int:
+    """How many columns a table has.
+
+    Raises:
+        RecordingError: if the header names more or fewer than the rows have fields, but for empty ones at their end:
+            which name is which column's is then anybody's guess.
+    """
     widths = [len(row) for row in body.fields]
-    width = max([max(set(widths), key=widths.count), *map(len, header)])
-    names, units = _names(header, width)
-    return replace(_columns(where, names, units, body, decimal), length=_length_unit(text))
+    width = max(set(widths), key=widths.count)
+    filled = max(len(_filled(row)) for row in body.fields)
+    names = max((len(_filled(line)) for line in header), default=width)
+    given = max(map(len, header), default=width)
+    if given < min(filled, width) or names > width:
+        raise RecordingError(
+            f"{where}: row {body.lines[0]}: has {width} fields, but the header above it names {names} columns;"
+            " correct the header, or give 'header_lines: 0' in the map's 'source:', which calls them column 1 to"
+            f" column {width}."
+        )
+    return max(width, given)
+
+
+def _filled(fields: list[str]) -> list[str]:
+    """Fields without the empty ones at their end."""
+    last = max((k for k, field in enumerate(fields) if field), default=-1)
+    return fields[: last + 1]
 
 
 def _length_unit(text: str) -> str | None:
     """What a preamble says of lengths, as Motive does: ``Length Units,Millimeters``."""
     said = re.search(r"length\s+units?\W+(milli|centi)?met(?:er|re)s?\b", text[:HEAD], re.IGNORECASE)
     return None if said is None else {"milli": "mm", "centi": "cm"}.get((said[1] or "").lower(), "m")
+
+
+def _unpacked(content: bytes) -> bytes:
+    """What gzip packed, if it did."""
+    if content[:2] != b"\x1f\x8b":
+        return content
+    unpack = zlib.decompressobj(zlib.MAX_WBITS | 16)
+    try:
+        text = unpack.decompress(content, MOST_BYTES)
+    except zlib.error as error:
+        raise FileError(f"cannot be read: it begins like gzip, but is not ({one_line(error)})") from error
+    if not unpack.eof:
+        raise FileError(f"cannot be read: it is cut off, or unpacks to more than {MOST_BYTES / 1e6:g} MB")
+    return text
 
 
 def _decoded(content: bytes, encoding: str | None) -> str:
@@ -124,7 +197,10 @@ def _decoded(content: bytes, encoding: str | None) -> str:
         except UnicodeDecodeError as error:
             raise FileError("cannot be read: it begins like UTF-16, but is not") from error
     if b"\0" in content[:4096]:
-        raise FileError("cannot be read: it is no text; it is a spreadsheet's or a program's own file")
+        raise FileError(
+            "cannot be read: it is no text; it is a spreadsheet's or a program's own file: save it as CSV, or from"
+            " Python as npz"
+        )
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -154,23 +230,23 @@ def _fields(line: str, separator: str) -> list[str]:
 
 
 def _numeric(fields: Sequence[str], decimals: str) -> int:
-    return sum(any(math.isfinite(_number(field, decimal)) for decimal in decimals) for field in fields)
+    return sum(any(math.isfinite(number_of(field, decimal)) for decimal in decimals) for field in fields)
 
 
 def _has_decimal_commas(text: str, separator: str) -> bool:
     head = text[:200_000].splitlines()[:LOOKED_AT]
     fields = [field for line in head for field in _fields(line, separator)]
-    commas = sum(field.count(",") == 1 and math.isfinite(_number(field, ",")) for field in fields)
-    points = sum(field.count(".") == 1 and math.isfinite(_number(field, ".")) for field in fields)
+    commas = sum(field.count(",") == 1 and math.isfinite(number_of(field, ",")) for field in fields)
+    points = sum(field.count(".") == 1 and math.isfinite(number_of(field, ".")) for field in fields)
     return commas > points
 
 
-def _split(text: str, separator: str) -> _Rows:
+def _split(text: str, separator: str) -> Rows:
     fields: list[list[str]] = []
     lines: list[int] = []
     if separator == " ":
         for number, line in enumerate(text.splitlines(), 1):
-            fields.append(line.split())
+            fields.append((re.sub(r"^(\s*#+)\s+", r"\1", line) if "#" in line else line).split())
             lines.append(number)
     else:
         reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
@@ -179,86 +255,13 @@ def _split(text: str, separator: str) -> _Rows:
             lines.append(reader.line_num)
     if sum(map(len, fields)) > MOST_CELLS:
         raise csv.Error(f"it has more than {MOST_CELLS:,} fields; cut the pushes out of it")
-    return _Rows(fields=fields, lines=lines)
-
-
-def _numbers_in(fields: Sequence[str], decimal: str) -> int:
-    return sum(math.isfinite(_number(field, decimal)) for field in fields)
-
-
-def _begins(rows: _Rows, k: int, decimal: str) -> bool:
-    """Whether a table's numbers may begin with a row: two or more, half of what is there, and more below."""
-    fields = rows.fields[k]
-    numbers, there = _numbers_in(fields, decimal), len(_there(fields))
-    following = rows.fields[k + 1] if k + 1 < len(rows.fields) else []
-    return numbers >= 2 and 2 * numbers >= there and _numbers_in(following, decimal) > 0
-
-
-def _sections(rows: _Rows, decimal: str) -> list[tuple[list[list[str]], _Rows]]:
-    """Header lines and body of every table in the file: a body lasts until a line with one word."""
-    found: list[tuple[list[list[str]], _Rows]] = []
-    k, bottom = 0, 0
-    while k < len(rows.fields):
-        if not _begins(rows, k, decimal):
-            k += 1
-            continue
-        below = first = _below_header(rows, k, bottom)
-        while first > bottom and _is_header(rows.fields[first - 1], len(rows.fields[k]), decimal):
-            first -= 1
-        bottom = _end(rows, k, decimal)
-        kept = [j for j in range(k, bottom) if _there(rows.fields[j])]
-        body = _Rows(fields=[rows.fields[j] for j in kept], lines=[rows.lines[j] for j in kept])
-        found.append((rows.fields[first:below], body))
-        k = bottom
-    return found
-
-
-def _below_header(rows: _Rows, k: int, bottom: int) -> int:
-    """Index behind the header of the numbers from row ``k`` on: TRC files leave a line between."""
-    blank = k - 1 > bottom and not _there(rows.fields[k - 1])
-    return k - 1 if blank and len(_there(rows.fields[k - 2])) > 1 and _as_wide(rows, k - 2, k) else k
-
-
-def _as_wide(rows: _Rows, j: int, k: int) -> bool:
-    """Whether two rows have equally many fields, but for a separator at the end."""
-    return abs(len(rows.fields[j]) - len(rows.fields[k])) <= 1
-
-
-def _is_header(fields: Sequence[str], width: int, decimal: str) -> bool:
-    """Whether a line is one of a header, and not of the preamble's pairs of a key and its value above it."""
-    there = len(_there(fields))
-    if len(fields) == width or (len(fields) == width - 1 and there > 1):
-        return there > 0
-    # Names over the first column of each body may end before the table does.
-    carried = not fields or not fields[0]
-    return there > 0 and not _numbers_in(fields, decimal) and (carried or 2 * len(fields) >= width)
-
-
-def _end(rows: _Rows, start: int, decimal: str) -> int:
-    """Index behind the last row of a table; a blank line within it is none of its rows."""
-    width, k = len(rows.fields[start]), start
-    while k < len(rows.fields):
-        fields = rows.fields[k]
-        if not _there(fields):
-            after = next((j for j in range(k, len(rows.fields)) if _there(rows.fields[j])), len(rows.fields))
-            if after == len(rows.fields) or len(rows.fields[after]) != width:
-                return k
-            k = after if _numbers_in(rows.fields[after], decimal) else len(rows.fields)
-            continue
-        if len(_there(fields)) == 1 and not _numbers_in(fields, decimal):
-            return k
-        k += 1
-    return k
-
-
-def _there(fields: Sequence[str]) -> list[str]:
-    return [field for field in fields if field]
+    return Rows(fields=fields, lines=lines)
 
 
 def _names(header: list[list[str]], width: int) -> tuple[list[str], dict[str, str]]:
     """A name for every column, of all header lines, and the units that one of them states."""
     lines = [(line + [""] * width)[:width] for line in header]
-    stated = [k for k, line in enumerate(lines) if _there(line) and all(_unit(f) in UNITS for f in _there(line))]
+    stated = [k for k, line in enumerate(lines) if states_units(line)]
     unit_line = lines.pop(stated[-1]) if stated and len(lines) > 1 else [""] * width
     for k, line in enumerate(lines[:-1]):
         lines[k] = _carried(line)
@@ -267,11 +270,7 @@ def _names(header: list[list[str]], width: int) -> tuple[list[str], dict[str, st
         parts = [line[column] for line in lines if line[column]]
         name = "/".join(parts) or f"column {column + 1}"
         names.append(name if name not in names else f"{name} (column {column + 1})")
-    return names, {name: _unit(unit) for name, unit in zip(names, unit_line, strict=True) if unit}
-
-
-def _unit(field: str) -> str:
-    return field.strip("()[] ")
+    return names, {name: unit_said(unit) for name, unit in zip(names, unit_line, strict=True) if unit}
 
 
 def _carried(line: list[str]) -> list[str]:
@@ -289,7 +288,7 @@ def _carried(line: list[str]) -> list[str]:
     return carried
 
 
-def _columns(where: str, names: Sequence[str], units: dict[str, str], body: _Rows, decimal: str) -> Columns:
+def _columns(where: str, names: Sequence[str], units: dict[str, str], body: Rows, decimal: str) -> Columns:
     numbers: dict[str, Array] = {}
     texts: dict[str, list[str]] = {}
     width = len(names)
@@ -298,10 +297,14 @@ def _columns(where: str, names: Sequence[str], units: dict[str, str], body: _Row
         raise RecordingError(f"{where}: row {body.lines[longer]}: has more fields than the table has columns.")
     for k, name in enumerate(names):
         fields = [row[k] if k < len(row) else "" for row in body.fields]
-        values = np.array([_number(field, decimal) for field in fields])
+        values = np.array([number_of(field, decimal) for field in fields])
         wrong = [j for j, field in enumerate(fields) if not math.isfinite(values[j]) and field.lower() not in EMPTY]
         if 2 * len(wrong) > len(fields):
-            texts[name] = fields
+            times = seconds_of(fields)
+            if times is None:
+                texts[name] = fields
+            else:
+                numbers[name], units[name] = times, "s"
             continue
         if wrong:
             raise RecordingError(
@@ -309,19 +312,5 @@ def _columns(where: str, names: Sequence[str], units: dict[str, str], body: _Row
                 f" {shown(fields[wrong[0]])}; leave the field empty if there is no sample."
             )
         numbers[name] = values
+    numbers = without_marks(where, numbers)
     return Columns(source=where, numbers=numbers, texts=texts, units=units, rows=body.lines)
-
-
-def _number(field: str, decimal: str) -> float:
-    """A field's number; NaN where it holds none. Python alone reads 1_000 and other scripts' digits."""
-    if decimal == ",":
-        if "." in field and "," in field:
-            field = field.replace(".", "")
-        field = field.replace(",", ".")
-    if not field or "_" in field or not field.isascii():
-        return math.nan
-    try:
-        value = float(field)
-    except ValueError:
-        return math.nan
-    return value if math.isfinite(value) else math.nan

@@ -8,7 +8,16 @@ from functools import partial
 from pathlib import Path
 
 from foreign.apart import control, detections, frames, rostopic, trials
-from foreign.arrays import demonstrations, lerobot, matlab, padded_npz, transforms
+from foreign.arrays import (
+    demonstrations,
+    json_lines,
+    json_pushes,
+    lerobot,
+    matlab,
+    padded_npz,
+    records,
+    transforms,
+)
 from foreign.bags import mcap, odometry, only_pushes, ros1
 from foreign.by_map import by_map, map_of
 from foreign.common import DESCRIPTION, HAND, assert_rests_agree
@@ -29,9 +38,9 @@ from physid_drake.recording import Recording
 
 __all__ = [
     "BAGS", "DESCRIPTION", "HAND", "LEFT_HANDED", "TABLES", "Log", "assert_rests_agree", "by_map", "control",
-    "demonstrations", "detections", "frames", "german", "lerobot", "map_of", "markers", "matlab", "mcap",
-    "motive", "motive_euler", "odometry", "only_pushes", "padded_npz", "qualisys", "ros1", "rostopic", "rtde",
-    "rulers", "transforms", "trials", "unity", "vicon", "video",
+    "demonstrations", "detections", "frames", "german", "json_lines", "json_pushes", "lerobot", "map_of", "markers",
+    "matlab", "mcap", "motive", "motive_euler", "odometry", "only_pushes", "padded_npz", "qualisys", "records",
+    "ros1", "rostopic", "rtde", "rulers", "transforms", "trials", "unity", "vicon", "video",
 ]  # fmt: skip
 
 
@@ -65,6 +74,9 @@ TABLES = {
     "transforms.npz": Log(write=transforms, exact=True),
     "trials.mat": Log(write=matlab, exact=True, rotation="yaw"),
     "demos.h5": Log(write=demonstrations, needs="h5py", exact=True),
+    "pushes.json": Log(write=json_pushes, exact=True),
+    "samples.jsonl": Log(write=json_lines, exact=True),
+    "samples.npy": Log(write=records, exact=True),
     "topics": Log(write=rostopic),
     "trials": Log(write=trials, exact=True, rotation="yaw"),
     "detections.csv": Log(write=detections),

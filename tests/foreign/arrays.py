@@ -1,7 +1,8 @@
-"""Tables of arrays: npz, HDF5, MATLAB, Parquet."""
+"""Tables of arrays: npz, npy, HDF5, MATLAB, Parquet, JSON."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -191,3 +192,72 @@ hand:
 pushes: {cut: column, column: "[push]"}
 """
     )
+
+
+def _samples(recording: Recording) -> list[dict[str, np.ndarray]]:
+    """Of each push times, poses and places of the tip."""
+    found = []
+    for push in recording.pushes:
+        assert push.hand is not None
+        found.append(
+            {
+                "t": push.object.times,
+                "position": push.object.positions,
+                "xyzw": np.roll(push.object.quaternions, -1, axis=1),
+                "tip": at(push.object.times, push.hand.times, push.hand.positions),
+            }
+        )
+    return found
+
+
+def _map(names: str, turn: str, tip: str, cut: str, time: str = "t") -> str:
+    def columns(name: str, count: int) -> str:
+        return "[" + ", ".join(f'"{name}[{k}]"' for k in range(count)) + "]"
+
+    return (
+        DESCRIPTION.format(name="mug")
+        + HAND
+        + f"""\
+time: {{column: {time}}}
+object:
+  position: {{columns: {columns(names, 3)}}}
+  rotation: {{columns: {columns(turn, 4)}, as: xyzw}}
+hand:
+  position: {{columns: {columns(tip, 3)}}}
+  rotation: none
+pushes: {{cut: column, column: "{cut}"}}
+"""
+    )
+
+
+def json_pushes(recording: Recording, file: Path) -> str:
+    """A list of pushes, each with lists of its samples."""
+    pushes = [{name: values.tolist() for name, values in one.items()} for one in _samples(recording)]
+    file.write_text(json.dumps({"date": "2026-03-01", "pushes": pushes}))
+    return _map("position", "xyzw", "tip", "[push]")
+
+
+def json_lines(recording: Recording, file: Path) -> str:
+    """A sample in each line, with dates; of some, the tip was not seen."""
+    lines = []
+    for k, one in enumerate(_samples(recording)):
+        for j, t in enumerate(one["t"]):
+            stamp = np.datetime64("2026-03-01T10:00:00", "ns") + np.timedelta64(round(1e9 * (1e3 * k + t)), "ns")
+            body = {"position": one["position"][j].tolist(), "xyzw": one["xyzw"][j].tolist()}
+            tip = {} if j % 50 == 3 else {"tip": one["tip"][j].tolist()}
+            lines.append(json.dumps({"when": f"{stamp}Z", "trial": k, "mug": body, "user": "me"} | tip))
+    file.write_text("\n".join(lines) + "\n")
+    return _map("mug/position", "mug/xyzw", "tip", "trial", "when")
+
+
+def records(recording: Recording, file: Path) -> str:
+    """A structured array of NumPy."""
+    kind = [("t", "f8"), ("trial", "i4"), ("mug", [("p", "f8", 3), ("xyzw", "f8", 4)]), ("tip", "f8", 3)]
+    rows = []
+    for k, one in enumerate(_samples(recording)):
+        array = np.zeros(len(one["t"]), dtype=kind)
+        array["t"], array["trial"], array["tip"] = one["t"] + 1e3 * k, k, one["tip"]
+        array["mug"]["p"], array["mug"]["xyzw"] = one["position"], one["xyzw"]
+        rows.append(array)
+    np.save(file, np.concatenate(rows))
+    return _map("mug/p", "mug/xyzw", "tip", "trial")

@@ -50,7 +50,7 @@ def make(rng: Random, folder: Path) -> Case:
     what = rng.random()
     if what < 0.55:
         victim = rng.choice(list(changed))
-        text = victim.endswith((".csv", ".txt", ".tsv", ".trc")) and rng.random() < 0.6
+        text = victim.endswith((".csv", ".txt", ".tsv", ".trc", ".json", ".jsonl")) and rng.random() < 0.6
         changed[victim] = _other_fields(rng, changed[victim]) if text else damaged(rng, changed[victim])
     if what > 0.45:
         chart = _other_map(rng, chart)
