@@ -30,6 +30,8 @@ MOST_BYTES: Final = 256_000_000
 MOST_CELLS: Final = 40_000_000
 """Of a table: an hour of thirty columns at 360 Hz."""
 
+MOST_COLUMNS: Final = 10_000
+
 SEPARATORS: Final = (",", ";", "\t", "|", " ")
 HEAD: Final = 20_000
 """Characters at the head of a file, in which its preamble is."""
@@ -150,13 +152,17 @@ def _width(where: str, header: list[list[str]], body: Rows) -> int:
     filled = max(len(_filled(row)) for row in body.fields)
     names = max((len(_filled(line)) for line in header), default=width)
     given = max(map(len, header), default=width)
-    if given < min(filled, width) or names > width:
+    if given < min(filled, width) or names > max(widths):
         raise RecordingError(
             f"{where}: row {body.lines[0]}: has {width} fields, but the header above it names {names} columns;"
             " correct the header, or give 'header_lines: 0' in the map's 'source:', which calls them column 1 to"
             f" column {width}."
         )
-    return max(width, given)
+    if max(width, names) > MOST_COLUMNS:
+        raise RecordingError(
+            f"{where}: row {body.lines[0]}: has more than {MOST_COLUMNS:,} columns, which no log has."
+        )
+    return max(width, names if header else 0)
 
 
 def _filled(fields: list[str]) -> list[str]:
@@ -265,12 +271,12 @@ def _names(header: list[list[str]], width: int) -> tuple[list[str], dict[str, st
     unit_line = lines.pop(stated[-1]) if stated and len(lines) > 1 else [""] * width
     for k, line in enumerate(lines[:-1]):
         lines[k] = _carried(line)
-    names: list[str] = []
+    names: dict[str, None] = {}
     for column in range(width):
         parts = [line[column] for line in lines if line[column]]
         name = "/".join(parts) or f"column {column + 1}"
-        names.append(name if name not in names else f"{name} (column {column + 1})")
-    return names, {name: unit_said(unit) for name, unit in zip(names, unit_line, strict=True) if unit}
+        names[name if name not in names else f"{name} (column {column + 1})"] = None
+    return list(names), {name: unit_said(unit) for name, unit in zip(names, unit_line, strict=True) if unit}
 
 
 def _carried(line: list[str]) -> list[str]:

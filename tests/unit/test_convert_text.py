@@ -63,6 +63,17 @@ class TestHeaders:
         found = read(text, tmp_path).numbers
         assert found["x"].tolist() == [1.0] * 3 and found["y"].tolist() == [2.0] * 3
 
+    def test_rows_may_end_before_the_header_does(self, tmp_path: Path) -> None:
+        found = read("t,x,y\n0,1\n1,2,3\n2,3\n3,4\n", tmp_path).numbers
+        assert np.isnan(found["y"]).tolist() == [True, False, True, True]
+
+    def test_more_columns_than_a_log_has(self, tmp_path: Path) -> None:
+        wide = ",".join("1" * 20_000)
+        with pytest.raises(RecordingError, match="more than 10,000 columns"):
+            read(f"{wide}\n{wide}\n", tmp_path)
+        found = read("x,y" + "," * 100_000 + "\n" + "1,2\n" * 3, tmp_path).numbers
+        assert list(found) == ["x", "y"]
+
 
 class TestTimes:
     @pytest.mark.parametrize(
