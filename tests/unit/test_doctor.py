@@ -12,9 +12,10 @@ import pytest
 from physid_drake.convert import convert_table
 from physid_drake.doctor import examined
 from physid_drake.doctor.convention import Convention
-from physid_drake.doctor.conventions import conventions_of, gap_of, pairs_of
+from physid_drake.doctor.conventions import conventions_of, pairs_of
 from physid_drake.doctor.examination import _simplest
 from physid_drake.doctor.forces import conventions_of_forces
+from physid_drake.doctor.gaps import gap_of
 from physid_drake.recording import Box, Cylinder, ForceStream, Push, Recording, read_recording
 
 RECORDINGS = Path(__file__).parents[2] / "recordings"
