@@ -292,7 +292,7 @@ def _orders(stated: Stated | None) -> Iterator[Reading]:
             if order != turn.order:
                 yield Reading(
                     order=order,
-                    says=f"the columns of its Euler angles are about {', '.join(order.lower())}",
+                    says=f"the columns of the object's Euler angles are about {', '.join(order.lower())}",
                     remedy=f"{stated.place('object.rotation')}: order: {order}",
                 )
         return

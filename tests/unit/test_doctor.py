@@ -277,7 +277,7 @@ BY_MAP = {
     "Euler angles in another order": (
         {"world": f"{{{ORIGIN}}}", "rotation": "{columns: [q0, q1, q2], as: euler, order: ZYX, unit: deg}"},
         {"rotation": "{columns: [q0, q1, q2], as: euler, order: XYZ, unit: deg}"},
-        "the columns of its Euler angles are about z, y, x", "map line 6: object.rotation: order: ZYX",
+        "the columns of the object's Euler angles are about z, y, x", "map line 6: object.rotation: order: ZYX",
     ),
     "left-handed": (
         {"world": "{axes: [x, z, y], left_handed: true}"}, {"world": "{axes: [x, y, z]}"},
