@@ -40,13 +40,18 @@ def angles_of(recording: Recording) -> Iterator[Convention]:
         return
     frame = source_frame(stated, None if stated is None else stated.object)
     for unit, factor in FACTORS.items():
-        if unit != turn.unit:
+        if unit != turn.unit and (unit == "rad" or turn.kind != "yaw" or _spins(recording)):
             yield Convention(
                 says=f"the object's {ANGLES[turn.kind]} in {'degrees' if unit == 'deg' else unit}",
                 remedy=f"{place_in_map(stated, 'object.rotation')}: unit: {unit}"
                 + ("; or object_yaw_rad in rad" if stated is None else ""),
                 recording=_scaled(recording, turn, frame, factor),
             )
+
+
+def _spins(recording: Recording) -> bool:
+    """Whether the object turns by more than a full turn in some push: in degrees that are called rad it soon does."""
+    return max(float(np.ptp(push.object.planar[:, 2])) for push in recording.pushes) > 2.0 * math.pi
 
 
 def _scaled(recording: Recording, turn: Turn, frame: SourceFrame, factor: float) -> Recording:

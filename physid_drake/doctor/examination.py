@@ -11,7 +11,7 @@ import numpy as np
 from physid_drake.doctor.convention import Convention
 from physid_drake.doctor.conventions import conventions_of, pairs_of
 from physid_drake.doctor.forces import conventions_of_forces, without_forces
-from physid_drake.doctor.gaps import NEAR, gap_of, gaps_by_most
+from physid_drake.doctor.gaps import NEAR, elsewhere, gap_of, gaps_of, reading_by_most
 from physid_drake.doctor.rough_fit import Left, left_by
 from physid_drake.progress import Progress
 from physid_drake.pushes.plausible import some_names
@@ -60,10 +60,10 @@ class Finding:
     asked: int = 0
 
     @property
-    def explained(self) -> bool:
-        """Whether the pushes fit, as they are or by another convention."""
+    def left(self) -> float:
+        """What is left at last, as the pushes are or by another convention; infinite where they are refused."""
         left = self.before if self.after is None else self.after
-        return left is not None and left < FAR
+        return np.inf if left is None else left
 
     def lines(self) -> list[str]:
         """One line for each convention, and one of what is no push; none where pushes speak for what is said."""
@@ -111,15 +111,26 @@ def examined(recording: Recording, progress: Progress | None = None) -> Finding:
     here = left_by(few)
     if here[0] is not None and here[0].of_all < FAR:
         return Finding(before=here[0].of_all)
-    gaps = gaps_by_most(_read_otherwise(moving))
-    near, elsewhere = np.flatnonzero(gaps < NEAR), np.flatnonzero(gaps >= NEAR)
-    if not len(elsewhere) or len(near) < max(2, DRIVEN * len(gaps)):
+    near, astray = _driven(moving)
+    if not astray or len(near) < max(2, DRIVEN * len(moving.pushes)):
         return _compared(few, *here, progress)
-    few = _few(moving.subset(near.tolist()), MANY_PUSHES)
+    few = _few(moving.subset(near), MANY_PUSHES)
     found = _compared(few, *left_by(few), progress)
-    if not found.explained:
+    if not found.left < (FAR if here[0] is None else max(FAR, here[0].of_all / MUCH)):
         return found
-    return replace(found, elsewhere=tuple(moving.pushes[k].name for k in elsewhere), asked=len(gaps))
+    return replace(found, elsewhere=astray, asked=len(moving.pushes))
+
+
+def _driven(recording: Recording) -> tuple[list[str], tuple[str, ...]]:
+    """Names of pushes in which the tip is at the object as that is driven, and of those in which it is elsewhere.
+
+    That is so by the convention by which it drives most. Of others, nobody knows.
+    """
+    if recording.hand is None:
+        return [], ()
+    reading = reading_by_most(_read_otherwise(recording))
+    near = [push.name for push, gap in zip(reading.pushes, gaps_of(reading), strict=True) if gap < NEAR]
+    return near, tuple(push.name for push in reading.pushes if elsewhere(reading, push))
 
 
 def _read_otherwise(recording: Recording) -> Iterator[Recording]:

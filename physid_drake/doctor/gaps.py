@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -37,12 +38,24 @@ def gaps_of(recording: Recording) -> Array:
     return np.array([gap_of(recording.subset([k])) for k in range(len(recording.pushes))])
 
 
-def gaps_by_most(readings: Iterable[Recording]) -> Array:
-    """The same by that reading of a recording by which the tip drives most pushes; the first of several.
+def elsewhere(recording: Recording, push: Push) -> bool:
+    """Whether something other than the tip moves the object: that is away as it sets out, or its middle is inside.
+
+    A tip that strikes is at the object at first, one that gives way goes less deep.
+    """
+    assert recording.hand is not None
+    gaps = gaps_at(replace(recording, pushes=(push,)), [driven_samples(push)])
+    if not len(gaps) or float(np.median(np.abs(gaps))) < NEAR:
+        return False
+    return bool(gaps[0] >= NEAR or gaps.min() < -recording.hand.radius)
+
+
+def reading_by_most(readings: Iterable[Recording]) -> Recording:
+    """That reading of a recording by which the tip is at the object in most pushes; the first of several.
 
     Where an object is carried as well, no reading brings the tip to it: those are no pushes.
     """
-    return max(map(gaps_of, readings), key=lambda gaps: int(np.count_nonzero(gaps < NEAR)))
+    return max(readings, key=lambda one: int(np.count_nonzero(gaps_of(one) < NEAR)))
 
 
 def gaps_at(recording: Recording, rows: Sequence[NDArray[np.intp]], late: float = 0.0) -> Array:
