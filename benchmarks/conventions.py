@@ -165,7 +165,9 @@ def judged(recording, names, own=()):
     found = f"{finding.before and round(finding.before, 1)} -> {finding.after and round(finding.after, 1)} {said[:3]}"
     of_its_own = bool(said) and any(word in s for word in own for s in said)
     if not names:
-        return ("left alone" if not said or of_its_own else "wrong"), found, took
+        # Pushes that are called none are doubted, too.
+        quiet = not finding.elsewhere and (not said or of_its_own)
+        return ("left alone" if quiet else "wrong"), found, took
     if not said:
         small = finding.before is not None and finding.before < 5.0
         return ("too small to see" if small else "not found"), found, took

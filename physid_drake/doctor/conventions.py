@@ -7,7 +7,7 @@ everything alike cannot be told, since the physics of pushes is the same in a mi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Final
@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from physid_drake.cell.solid import solid_of
-from physid_drake.cell.touch import Tip
 from physid_drake.convert.map_reading import stated_in
 from physid_drake.convert.source_frame import SourceFrame, source_frame
+from physid_drake.doctor.angles import angles_of
 from physid_drake.doctor.convention import Convention, each_push
+from physid_drake.doctor.gaps import driven_samples, gaps_at
 from physid_drake.doctor.units import origins_of, units_of
 from physid_drake.pushes.standing import Reading, likelier_reading, mirrored, place_in_map, read_as, readings_of
 from physid_drake.recording import (
@@ -31,7 +31,6 @@ from physid_drake.recording import (
     Push,
     Recording,
     Shape,
-    planar_poses,
 )
 from physid_drake.recording.planar import turned
 
@@ -40,8 +39,6 @@ Array = NDArray[np.float64]
 LATEST: Final = 1.0
 """s between the clocks of hand and object, at most, that are looked for; in steps of ``TICK``."""
 TIME_STEP: Final = 0.01
-MOVING: Final = 0.02
-"""m/s of the object: faster, and the hand is at it, or has let go."""
 LEAST_LATE: Final = 0.015
 LEAST_SHIFT: Final = 2e-3
 """s, m: clocks and frames that differ by less are physics (lag, offset), or noise."""
@@ -72,23 +69,23 @@ def _kinds(recording: Recording) -> list[Callable[[Recording], Iterator[Conventi
     if recording.hand is None:
         return [_rotations, _ups, _sizes_of_object]
     # What is of the log's numbers goes before what is of the frame that its map gives it.
-    return [units_of, _rotations, _ups, origins_of, _axes, _sizes_of_object, _sizes_of_tip, _clocks, _shifts]
-
-
-def gap_of(recording: Recording) -> float:
-    """How far the tip is from the outline while something pushes the object [m], the median; NaN if nothing does.
-
-    It takes milliseconds, and tells most of what is wrong with frames apart.
-    """
-    if recording.hand is None:
-        return math.nan
-    gaps = _gaps(recording, [_driven(push) for push in recording.pushes])
-    return float(np.median(np.abs(gaps))) if len(gaps) else math.nan
+    return [
+        units_of,
+        _rotations,
+        _ups,
+        origins_of,
+        _axes,
+        _sizes_of_object,
+        _sizes_of_tip,
+        _clocks,
+        _shifts,
+        _exchanged,
+    ]
 
 
 def _rotations(recording: Recording) -> Iterator[Convention]:
     kinds = {push.object.rotation for push in recording.pushes}
-    for reading in readings_of(recording, turned=False):
+    for reading in _different(recording):
         yield _by_reading(recording, reading)
     if kinds & {"full", "yaw"}:
         stated = stated_in(recording.conversion)
@@ -99,12 +96,7 @@ def _rotations(recording: Recording) -> Iterator[Convention]:
             " or world.left_handed",
             recording=each_push(recording, partial(_inverted, frame=frame)),
         )
-    if "yaw" in kinds:
-        yield Convention(
-            says="the object's yaw is in degrees",
-            remedy="map: object.rotation: unit: deg; or object_yaw_rad in rad",
-            recording=each_push(recording, _yaw_from_degrees),
-        )
+    yield from angles_of(recording)
     if kinds & {"full", "yaw"}:
         for degrees in (90, 180, 270):
             yield Convention(
@@ -112,6 +104,21 @@ def _rotations(recording: Recording) -> Iterator[Convention]:
                 remedy=f"map: object.offset: yaw_deg: {degrees}",
                 recording=each_push(recording, partial(_turned_in_itself, turn=math.radians(degrees))),
             )
+
+
+def _different(recording: Recording) -> Iterator[Reading]:
+    """Readings of its rotations; of Euler angles one for each column that may be about the vertical.
+
+    Of an object that stands, others are alike.
+    """
+    stated = stated_in(recording.conversion)
+    up = 2 if stated is None else int(np.argmax(np.abs(source_frame(stated, stated.object).world.axes[2])))
+    seen = set()
+    for reading in readings_of(recording, turned=False):
+        column = None if reading.order is None else reading.order.lower().index("xyz"[up])
+        if column is None or column not in seen:
+            yield reading
+        seen.add(column)
 
 
 def _with_turn(push: Push, quaternions: Array) -> Push:
@@ -139,13 +146,6 @@ def _turned_in_itself(push: Push, turn: float) -> Push:
     c, s = math.cos(0.5 * turn), math.sin(0.5 * turn)
     w, x, y, z = push.object.quaternions.T
     return _with_turn(push, np.column_stack([w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s]))
-
-
-def _yaw_from_degrees(push: Push) -> Push:
-    planar = push.object.planar.copy()
-    planar[:, 2] = np.radians(planar[:, 2])
-    height = float(np.median(push.object.positions[:, 2]))
-    return replace(push, object=planar_poses(push.object.times, planar, height, "yaw"))
 
 
 def _axes(recording: Recording) -> Iterator[Convention]:
@@ -235,10 +235,10 @@ def _other_shapes(shape: Shape) -> Iterator[tuple[str, Shape]]:
 def _clocks(recording: Recording) -> Iterator[Convention]:
     """The clock of the hand's stream beside the object's, which brings the tip to the object as that moves."""
     lates = np.arange(-LATEST, LATEST + TIME_STEP, TIME_STEP)
-    rows = [_driven(push) for push in recording.pushes]
+    rows = [driven_samples(push) for push in recording.pushes]
     if not sum(map(len, rows)):
         return
-    costs = [float(np.median(np.abs(_gaps(recording, rows, float(late))))) for late in lates]
+    costs = [float(np.median(np.abs(gaps_at(recording, rows, float(late))))) for late in lates]
     late = float(lates[int(np.nanargmin(costs))])
     if abs(late) >= LEAST_LATE:
         yield Convention(
@@ -256,32 +256,6 @@ def _later(push: Push, late: float) -> Push:
         hand=replace(push.hand, times=push.hand.times + late),
         force=None if force is None else replace(force, times=force.times + late),
     )
-
-
-def _gaps(recording: Recording, rows: Sequence[NDArray[np.intp]], late: float = 0.0) -> Array:
-    """Between tip and outline [m] at some samples of each push, of all pushes."""
-    assert recording.hand is not None
-    tip = Tip(solid_of(recording.object.shape).outline, recording.hand.radius)
-    found = [np.zeros(0)]
-    for push, chosen in zip(recording.pushes, rows, strict=True):
-        if push.hand is not None and len(chosen):
-            times, planar = push.object.times[chosen], push.object.planar[chosen]
-            at = [np.interp(times - late, push.hand.times, column) for column in push.hand.positions[:, :2].T]
-            states = np.column_stack([planar, *at]).tolist()
-            found.append(np.array([tip.gap(*state)[0] for state in states]))
-    return np.concatenate(found)
-
-
-def _driven(push: Push) -> NDArray[np.intp]:
-    """Up to forty samples in which the object moves and does not slow down: something pushes it."""
-    times, planar = push.object.times, push.object.planar
-    if len(times) < 10:
-        return np.zeros(0, dtype=np.intp)
-    stride = max(1, len(times) // 40)
-    t, p = times[::stride], planar[::stride, :2]
-    speed = np.linalg.norm(np.gradient(p, t, axis=0), axis=1)
-    fast = (speed > max(MOVING, 0.3 * float(speed.max()))) & (np.gradient(speed, t) > -0.5 * float(speed.max()))
-    return np.asarray(np.flatnonzero(fast) * stride)
 
 
 def _shifts(recording: Recording) -> Iterator[Convention]:
@@ -313,14 +287,37 @@ def _recentred(push: Push, shift: Array) -> Push:
     return replace(push, object=replace(push.object, positions=positions))
 
 
+def _exchanged(recording: Recording) -> Iterator[Convention]:
+    """The hand for the object: what is pushed does not move before what pushes it."""
+    pairs = [(push.object, push.hand) for push in recording.pushes if push.hand is not None]
+    leads = [_sets_out(hand) - _sets_out(body) for body, hand in pairs]
+    if len(pairs) == len(recording.pushes) and float(np.median(leads)) > 0.0:
+        yield Convention(
+            says="object and hand are exchanged",
+            remedy="map: columns or topics of object and hand",
+            recording=each_push(recording, _with_exchanged),
+        )
+
+
+def _sets_out(stream: PoseStream) -> float:
+    """When a body has left its first place by a tenth of its way in the plane [s]."""
+    ways = np.linalg.norm(stream.positions[:, :2] - stream.positions[0, :2], axis=1)
+    return float(stream.times[int(np.argmax(ways > 0.1 * ways.max()))])
+
+
+def _with_exchanged(push: Push) -> Push:
+    assert push.hand is not None
+    return replace(push, object=push.hand, hand=push.object)
+
+
 def _shift(recording: Recording, change: Callable[..., Push]) -> Array | None:
     """The shift (2,) that brings the tip to the outline; None where no gap is seen."""
-    rows = [_driven(push) for push in recording.pushes]
+    rows = [driven_samples(push) for push in recording.pushes]
     if sum(map(len, rows)) < 3:
         return None
 
     def gaps(shift: Array) -> Array:
-        return _gaps(each_push(recording, partial(change, shift=shift)), rows)
+        return gaps_at(each_push(recording, partial(change, shift=shift)), rows)
 
     found = least_squares(gaps, np.zeros(2), loss="soft_l1", f_scale=2e-3, x_scale=0.01, max_nfev=12)
     return np.asarray(found.x)

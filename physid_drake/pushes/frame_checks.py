@@ -257,7 +257,6 @@ def unseen_motion(recording: Recording, sigma: float) -> tuple[str, ...]:
         "the object already moves in the first poses, as if it had been pushed before": _already_moving,
         "the hand's stream ends while it moves, or has a gap in which it brakes"
         " (poses after that are left out where it may push)": _hand_lost,
-        "nothing moves at first, and no hand is recorded that moves it later": _moved_by_nothing,
     }
     return tuple(
         f"{what}: {', '.join(names)}"
@@ -271,11 +270,29 @@ def _already_moving(push: Push, sigma: float) -> bool:
     return push.hand is not None and way is not None and way > SURE * sigma
 
 
-def _moved_by_nothing(push: Push, sigma: float) -> bool:
-    soon, ever = _way(push, SOON), _way(push, np.inf)
-    if push.hand is not None or soon is None or ever is None:
-        return False
-    return soon < SURE * sigma < ever - MOVED
+def check_moved_by_something(recording: Recording, sigma: float) -> None:
+    """Refuses objects that all set out from rest by themselves: a hand that was not recorded, or not as one.
+
+    Args:
+        recording: the pushes.
+        sigma: standard deviation of the object's place [m].
+    """
+    moving = [push for push in recording.pushes if moves(push)]
+    if moving and len(moved_by_nothing(recording, sigma)) == len(moving):
+        raise RecordingError(
+            f"recording '{recording.name}': the pushes have no hand, but their object starts from rest and moves;"
+            " is the hand's stream missing, or read as another push?"
+        )
+
+
+def moved_by_nothing(recording: Recording, sigma: float) -> tuple[str, ...]:
+    """Names of pushes in which no hand is recorded, and an object that rests at first moves later."""
+    found = []
+    for push in recording.pushes:
+        soon, ever = _way(push, SOON), _way(push, np.inf)
+        if push.hand is None and moves(push) and soon is not None and ever is not None:
+            found += [push.name] if soon < SURE * sigma < ever - MOVED else []
+    return tuple(found)
 
 
 def _way(push: Push, within: float) -> float | None:

@@ -9,7 +9,13 @@ import numpy as np
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.errors import RecordingError
-from physid_drake.pushes.frame_checks import check_clocks, check_standing, checks_of, push_checks_of
+from physid_drake.pushes.frame_checks import (
+    check_clocks,
+    check_moved_by_something,
+    check_standing,
+    checks_of,
+    push_checks_of,
+)
 from physid_drake.pushes.hand_stream import beside_object
 from physid_drake.pushes.noise import noise_of
 from physid_drake.pushes.tracker_noise import TrackerNoise, tracker_noise
@@ -44,16 +50,17 @@ def refusals(recording: Recording) -> tuple[str, ...]:
 
 
 def check_motion(recording: Recording, noise: TrackerNoise) -> None:
-    """Refuse a recording whose object stays where it is.
+    """Refuse a recording whose object stays where it is, or is moved by nothing.
 
     Raises:
-        RecordingError: if it does so in all pushes.
+        RecordingError: if that is so in all pushes.
     """
     if max(_way(push, noise) for push in recording.pushes) < LEAST_MOTION:
         raise RecordingError(
             f"recording '{recording.name}': the object never moves by more than the tracker's noise"
             f" ({1e3 * noise.position:.2g} mm); there is nothing to diagnose."
         )
+    check_moved_by_something(recording, noise.position)
 
 
 def _way(push: Push, noise: TrackerNoise) -> float:

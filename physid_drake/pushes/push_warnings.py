@@ -8,11 +8,12 @@ from scipy.spatial import ConvexHull
 
 from physid_drake.cell.solid import solid_of
 from physid_drake.pushes.force_windows import WINDOW, too_seldom
-from physid_drake.pushes.frame_checks import AT_A_TIME, SELDOM, UNSEEN_WAY, depths_at_touch
+from physid_drake.pushes.frame_checks import AT_A_TIME, SELDOM, UNSEEN_WAY, depths_at_touch, moved_by_nothing, moves
 from physid_drake.pushes.hand_stream import touching_radius
 from physid_drake.pushes.plausible import implausible, some_names
 from physid_drake.pushes.standing import LEANS, RISES, misread, standing_of
 from physid_drake.pushes.stated import too_loud
+from physid_drake.pushes.tracker_noise import tracker_noise
 from physid_drake.recording import Cylinder, MeshShape, Push, Recording
 from physid_drake.recording.mesh_outline import prism_outline
 from physid_drake.recording.obj import read_obj
@@ -32,6 +33,7 @@ def doubts(recording: Recording) -> tuple[str, ...]:
         *_beside_the_tip(recording),
         *_sparse_forces(recording),
         *_hand_seldom_seen(recording),
+        *_moved_by_nothing(recording),
         *_notched_mesh(recording),
         *implausible(recording),
         *too_loud(recording),
@@ -108,6 +110,19 @@ def _hand_seldom_seen(recording: Recording) -> tuple[str, ...]:
     return (
         f"the hand is sampled less often than every {SELDOM:g} s and moves more than {1e3 * UNSEEN_WAY:.0f} mm in"
         f" between: {some_names(names)}; the times of contact and of braking are uncertain; record it at 100 Hz",
+    )
+
+
+def _moved_by_nothing(recording: Recording) -> tuple[str, ...]:
+    """Objects that set out by themselves in some pushes; where they do in all, that is refused."""
+    if all(push.hand is not None for push in recording.pushes):
+        return ()
+    names = moved_by_nothing(recording, tracker_noise(recording)[0].position)
+    if not names or len(names) == sum(map(moves, recording.pushes)):
+        return ()
+    return (
+        f"some pushes have no hand, but their object starts from rest and moves: {some_names(names)}; is the hand's"
+        " stream missing, or read as another push?",
     )
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,10 @@ UPS: Final = {
 """Which axes of a right-handed log are W's x, y and z, by the one that is up."""
 ORDERS: Final = {1: ("x, y, z, w", "xyzw"), -1: ("w, x, y, z", "wxyz")}
 """Of quaternions that were taken for the other order, by how far they have to be rolled."""
+EULER: Final = (
+    "xyz", "ZYX", "XYZ", "zyx", "zxy", "ZXY", "yxz", "YXZ", "yzx", "YZX", "xzy", "XZY",
+)  # fmt: skip
+"""Orders of Euler angles, the usual ones first: near the upright, several are alike."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,12 +65,14 @@ class Reading:
     Attributes:
         axes: (3, 3) of the world, as in a map; None if they are as they were read.
         roll: of quaternions, by which they come in the order w, x, y, z.
+        order: of Euler angles, as in a map; None if it is as they were read.
         says: what is so, if it is right.
         remedy: what to write, and where.
     """
 
     axes: Array | None = None
     roll: int = 0
+    order: str | None = None
     says: str
     remedy: str
 
@@ -79,7 +85,6 @@ class Standing:
         flat: (n,) the pushes in which it moves in the table's plane.
         upright: (n,) those in which it stays on its face, and turns about the vertical.
         tipped: whether it leans by so much that it is refused, in any push.
-        turned: how far it turns in the push in which it turns most [degrees].
         upside_down: whether its z axis points down.
         off: how far its middle is from where it is as it stands on the table, as pushes begin [m].
     """
@@ -87,7 +92,6 @@ class Standing:
     flat: Flags
     upright: Flags
     tipped: bool
-    turned: float
     upside_down: bool
     off: float
 
@@ -101,26 +105,21 @@ class Standing:
         """Whether that is not so in more than some of the pushes: objects tip, and are lifted."""
         return bool(np.mean(~self.stands) > SOME)
 
-    @property
-    def on_its_head(self) -> bool:
-        """Whether it is upside down and is not seen to turn, which would show that it is."""
-        return self.upside_down and self.turned < TURNED
-
 
 def likelier_reading(recording: Recording) -> Reading | None:
     """By which the object stands on the table in many pushes in which it does not as it is read.
 
     None where there is none, or nothing is odd. One by which it stands on its feet is likelier than one by which it
-    stands on its head, unless it is seen to turn.
+    stands on its head: nobody gives it a frame that way.
     """
     here = standing_of(recording)
-    if not (here.seldom or here.on_its_head):
+    if not (here.seldom or here.upside_down):
         return None
     found = []
     for reading in readings_of(recording, turned=bool(np.mean(~here.flat) > SOME)):
         other = _standing_by(recording, reading)
         if other is not None and _is_likelier(other, here):
-            changes = (reading.axes is not None) + (reading.roll != 0)
+            changes = (reading.axes is not None) + (reading.roll != 0 or reading.order is not None)
             found.append((float(other.stands.mean()), (changes, other.upside_down, other.off), reading))
     most = max((share for share, _, _ in found), default=0.0)
     alike = [(rank, reading) for share, rank, reading in found if share > most - LITTLE]
@@ -144,12 +143,14 @@ def misread(recording: Recording) -> str:
     reading = likelier_reading(recording)
     if reading is None:
         return ""
-    instead = f"stands on the table if {reading.says} ({reading.remedy})"
+    instead = f"if {reading.says} ({reading.remedy})"
     if reading.axes is not None:
-        return f"the object moves in a vertical plane; it moves in the table's plane and {instead}"
+        return (
+            f"the object moves in a vertical plane; it moves in the table's plane and stands on the table {instead}"
+        )
     if standing_of(recording).seldom:
-        return f"the object leans, or turns about other axes than the vertical; it {instead}"
-    return f"the object stands on its head and hardly turns; it {instead}"
+        return f"the object leans, or turns about other axes than the vertical; it stands on the table {instead}"
+    return f"the object stands on its head; it stands on its feet {instead}"
 
 
 def readings_of(recording: Recording, *, turned: bool = True) -> Iterator[Reading]:
@@ -162,7 +163,7 @@ def readings_of(recording: Recording, *, turned: bool = True) -> Iterator[Readin
         yield axes
         for order in orders:
             says, remedy = f"{axes.says}, and {order.says}", f"{axes.remedy}; {order.remedy}"
-            yield Reading(axes=axes.axes, roll=order.roll, says=says, remedy=remedy)
+            yield replace(order, axes=axes.axes, says=says, remedy=remedy)
 
 
 def mirrored(reading: Reading) -> Reading | None:
@@ -171,9 +172,9 @@ def mirrored(reading: Reading) -> Reading | None:
         return None
     axes = reading.axes[[1, 0, 2]]
     left = bool(np.linalg.det(axes) < 0.0)
-    return Reading(
+    return replace(
+        reading,
         axes=axes,
-        roll=reading.roll,
         says=f"{reading.says}, and its axes are {'left' if left else 'right'}-handed",
         remedy=reading.remedy.replace(_names(reading.axes), f"{_names(axes)}, left_handed: {str(left).lower()}"),
     )
@@ -188,6 +189,7 @@ def read_as(recording: Recording, reading: Reading) -> Recording:
     stated = stated_in(recording.conversion)
     body, hand = (None, None) if stated is None else (stated.object, stated.hand)
     frame = source_frame(stated, body)
+    written = "" if body is None or body.turn is None else body.turn.order
     # A hand in a frame of its own has axes of its own.
     shared = stated is None or (hand is not None and stated.world_of(hand) is stated.world_of(stated.object))
 
@@ -196,7 +198,7 @@ def read_as(recording: Recording, reading: Reading) -> Recording:
         if path is not None and reading.axes is not None and shared:
             path = _with_axes(path, source_frame(stated, hand), reading.axes)
         force = push.force if reading.axes is None else None
-        return replace(push, object=_read_as(push.object, frame, reading), hand=path, force=force)
+        return replace(push, object=_read_as(push.object, frame, reading, written), hand=path, force=force)
 
     with np.errstate(over="ignore", invalid="ignore"):
         return replace(recording, pushes=tuple(map(change, recording.pushes)))
@@ -216,7 +218,6 @@ def standing_of(recording: Recording) -> Standing:
         flat=np.array([_is_flat(stream) for stream in streams]),
         upright=np.array(upright),
         tipped=any(s and float(np.quantile(lean, 0.95)) > TIPPED for s, lean in zip(seen, leans, strict=True)),
-        turned=max(math.hypot(*turn) for turn in turns),
         upside_down=any(seen) and float(np.median([np.median(_cosines(stream)) for stream in streams])) < 0.0,
         off=float(np.median(np.abs(begins - 0.5 * solid_of(shape).height))),
     )
@@ -266,10 +267,13 @@ def _turns(stream: PoseStream) -> tuple[float, float]:
     return abs(z), math.hypot(x, y)
 
 
-def _read_as(stream: PoseStream, frame: SourceFrame, reading: Reading) -> PoseStream:
+def _read_as(stream: PoseStream, frame: SourceFrame, reading: Reading, written: str) -> PoseStream:
     if reading.roll and stream.rotation == "full":
-        written = np.roll(frame.rotations(stream).as_quat(), 1 + reading.roll, axis=1)
-        stream = frame.with_rotations(stream, Rotation.from_quat(np.roll(written, -1, axis=1)))
+        numbers = np.roll(frame.rotations(stream).as_quat(), 1 + reading.roll, axis=1)
+        stream = frame.with_rotations(stream, Rotation.from_quat(np.roll(numbers, -1, axis=1)))
+    if reading.order is not None and stream.rotation == "full":
+        angles = frame.rotations(stream).as_euler(cast(Any, written))
+        stream = frame.with_rotations(stream, Rotation.from_euler(cast(Any, reading.order), angles))
     return stream if reading.axes is None else _with_axes(stream, frame, reading.axes)
 
 
@@ -281,8 +285,17 @@ def _with_axes(stream: PoseStream, frame: SourceFrame, axes: Array) -> PoseStrea
 
 
 def _orders(stated: Stated | None) -> Iterator[Reading]:
-    """Other orders of the object's quaternions; none where its rotation was not written as one."""
+    """Other orders of the object's quaternions, or of its Euler angles, whichever its rotation was written as."""
     turn = None if stated is None else stated.object.turn
+    if stated is not None and turn is not None and turn.kind == "euler":
+        for order in EULER:
+            if order != turn.order:
+                yield Reading(
+                    order=order,
+                    says=f"the columns of the object's Euler angles are about {', '.join(order.lower())}",
+                    remedy=f"{stated.place('object.rotation')}: order: {order}",
+                )
+        return
     if turn is None or not turn.columns:
         rolls: tuple[int, ...] = (1, -1)
     else:

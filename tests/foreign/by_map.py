@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from scipy.spatial.transform import Rotation
 
 from foreign.common import at
 from physid_drake.convert.map_reading import stated_in
+from physid_drake.convert.mapping import Turn
 from physid_drake.convert.source_frame import source_frame
-from physid_drake.convert.units import LENGTHS
+from physid_drake.convert.units import ANGLES, LENGTHS
 from physid_drake.recording import Conversion, Recording
 
 COLUMNS = "push,t,x,y,z,q0,q1,q2,q3,hx,hy,hz"
@@ -64,10 +66,21 @@ def by_map(recording: Recording, file: Path, text: str) -> None:
             quaternions=np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 1)),
             rotation="none",
         )
-        turns = body.rotations(push.object).as_quat()
-        turns = (
-            turns if stated.object.turn is None or stated.object.turn.kind == "xyzw" else np.roll(turns, 1, axis=1)
-        )
+        turns = _written(body.rotations(push.object), stated.object.turn, body.world.axes[2])
         numbers = [body.places(push.object) / units[0], turns, tip.places(hand) / units[1]]
         tables.append(np.column_stack([np.full(len(times), k), times, *numbers]))
     np.savetxt(file, np.vstack(tables), delimiter=",", header=COLUMNS, comments="", fmt="%.12g")
+
+
+def _written(rotations: Rotation, turn: Turn | None, up: np.ndarray) -> np.ndarray:
+    """Rotations (n) as a map says, in four columns (n, 4), of which angles leave the last ones empty."""
+    kind = "wxyz" if turn is None else turn.kind
+    if turn is None or kind in ("wxyz", "xyzw"):
+        return np.roll(rotations.as_quat(), 1 if kind == "wxyz" else 0, axis=1)
+    if kind == "euler":
+        angles = np.unwrap(rotations.as_euler(turn.order), axis=0)
+    elif kind == "yaw":
+        angles = np.unwrap(rotations.as_rotvec() @ up)[:, None]
+    else:
+        angles = rotations.as_rotvec()
+    return np.pad(angles / ANGLES[turn.unit or "rad"], ((0, 0), (0, 4 - angles.shape[1])))

@@ -12,9 +12,10 @@ import pytest
 from physid_drake.convert import convert_table
 from physid_drake.doctor import examined
 from physid_drake.doctor.convention import Convention
-from physid_drake.doctor.conventions import conventions_of, gap_of, pairs_of
+from physid_drake.doctor.conventions import conventions_of, pairs_of
 from physid_drake.doctor.examination import _simplest
 from physid_drake.doctor.forces import conventions_of_forces
+from physid_drake.doctor.gaps import gap_of
 from physid_drake.recording import Box, Cylinder, ForceStream, Push, Recording, read_recording
 
 RECORDINGS = Path(__file__).parents[2] / "recordings"
@@ -262,6 +263,21 @@ BY_MAP = {
         {"world": "{axes: [z, x, y], origin: [0.4, 0.75, -0.3]}", "order": "xyzw"},
         {"world": "{origin: [0.4, 0.75, -0.3]}"},
         "the log's y axis is up", "map line 10: world: axes: [z, x, y]",
+    ),
+    "Euler angles in rad": (
+        {"world": UP, "offset": OFFSET, "rotation": "{columns: [q0, q1, q2], as: euler, order: ZYX, unit: rad}"},
+        {"rotation": "{columns: [q0, q1, q2], as: euler, order: ZYX, unit: deg}"},
+        "the object's Euler angles are in rad", "map line 6: object.rotation: unit: rad",
+    ),
+    "rotation vectors in rad": (
+        {"world": POSE, "rotation": "{columns: [q0, q1, q2], as: rotation_vector, unit: rad}"},
+        {"rotation": "{columns: [q0, q1, q2], as: rotation_vector, unit: deg}"},
+        "the object's rotation vectors are in rad", "map line 6: object.rotation: unit: rad",
+    ),
+    "Euler angles in another order": (
+        {"world": f"{{{ORIGIN}}}", "rotation": "{columns: [q0, q1, q2], as: euler, order: ZYX, unit: deg}"},
+        {"rotation": "{columns: [q0, q1, q2], as: euler, order: XYZ, unit: deg}"},
+        "the columns of the object's Euler angles are about z, y, x", "map line 6: object.rotation: order: ZYX",
     ),
     "left-handed": (
         {"world": "{axes: [x, z, y], left_handed: true}"}, {"world": "{axes: [x, y, z]}"},

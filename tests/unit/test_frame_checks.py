@@ -9,8 +9,16 @@ from problems import QUIET
 from runs import shipped_pushes
 
 from physid_drake.errors import RecordingError
-from physid_drake.pushes.frame_checks import check_one_push, hand_seen_until, unseen_motion
+from physid_drake.pushes.frame_checks import (
+    check_moved_by_something,
+    check_one_push,
+    hand_seen_until,
+    moved_by_nothing,
+    unseen_motion,
+)
 from physid_drake.pushes.problem import problems_of
+from physid_drake.pushes.push_checks import refusals
+from physid_drake.pushes.push_warnings import doubts
 from physid_drake.recording import PoseStream
 
 SIGMA = 3e-4
@@ -102,8 +110,31 @@ def test_a_gap_in_which_the_hand_brakes_ends_what_is_compared(recording):
 
 def test_without_a_hand_nothing_sets_a_resting_object_moving(recording):
     bare = replace(recording, hand=None, pushes=tuple(replace(push, hand=None) for push in recording.pushes))
-    (said,) = unseen_motion(bare, SIGMA)
-    assert said.startswith("nothing moves at first")
+    assert moved_by_nothing(bare, SIGMA) == tuple(push.name for push in bare.pushes)
+    line = "the pushes have no hand, but their object starts from rest and moves; is the hand's stream missing"
+    with pytest.raises(RecordingError, match=line):
+        check_moved_by_something(bare, SIGMA)
+    assert (
+        len(refusals(bare)) == 1 and line in refusals(bare)[0] and not any("no hand" in one for one in doubts(bare))
+    )
+
+
+def test_one_that_slides_from_the_beginning_was_pushed_before(recording):
+    """Of several, those that start from rest are doubted: a push that nobody recorded may be among others."""
+
+    def sliding(push):
+        way = np.linalg.norm(push.object.positions[:, :2] - push.object.positions[0, :2], axis=1)
+        return replace(push, object=cut(push.object, way > 0.3 * way.max()))
+
+    bare = replace(recording, hand=None, pushes=tuple(replace(push, hand=None) for push in recording.pushes))
+    free = replace(bare, pushes=tuple(map(sliding, bare.pushes)))
+    assert moved_by_nothing(free, SIGMA) == () and not any("hand" in one for one in (*refusals(free), *doubts(free)))
+    mixed = replace(free, pushes=(bare.pushes[0], *free.pushes[1:]))
+    (said,) = [one for one in doubts(mixed) if "hand" in one]
+    assert said.startswith(
+        "some pushes have no hand, but their object starts from rest and moves: pushes/001.csv; is the hand's stream"
+    )
+    assert refusals(mixed) == ()
 
 
 def a_log_of(count, push):
