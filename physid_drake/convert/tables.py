@@ -71,6 +71,7 @@ def table_logs(files: Sequence[Path], chart: Map) -> Logs:
     if len({len(some) for some in matched.values()}) > 1:
         said = listed([f"{key} has {len(some)}" for key, some in matched.items()])
         raise RecordingError(f"streams need equally many files, the first of each with the first, but {said}.")
+    _check_pairs({key: stream.rows.file for key, stream in streams.items()}, matched)
     left = [file.name for file in files if not any(file in some for some in matched.values())]
     if left:
         warnings.warn(f"no stream is in {named(left[0])}{_more(left)}: left out.", UserWarning, stacklevel=2)
@@ -85,10 +86,29 @@ def _streams(chart: Map) -> dict[str, PoseMap | ForceMap]:
 
 
 def _matching(files: Sequence[Path], key: str, pattern: str | None) -> list[Path]:
-    found = [file for file in files if pattern is None or fnmatchcase(file.name, pattern)]
+    found = [file for file in files if pattern is None or pattern == file.name or fnmatchcase(file.name, pattern)]
     if not found:
         raise RecordingError(f"{key}: no file of the source is called {shown(pattern)}; it holds {_names(files)}.")
     return found
+
+
+def _check_pairs(patterns: Mapping[str, str | None], matched: Mapping[str, Sequence[Path]]) -> None:
+    """Warns where files that are taken together differ in what stands for the pattern's ``*``."""
+    for files in zip(*matched.values(), strict=True):
+        middles = {_middle(file.name, pattern) for file, pattern in zip(files, patterns.values(), strict=True)}
+        if len(middles) > 1 and len(set(files)) > 1:
+            said = listed([named(file.name) for file in dict.fromkeys(files)])
+            warnings.warn(
+                f"files are taken together in the order of their names, such as {said}; do they belong together?",
+                UserWarning, stacklevel=3,
+            )  # fmt: skip
+            return
+
+
+def _middle(name: str, pattern: str | None) -> str:
+    """What stands for the ``*`` of a pattern; nothing where that has not just one."""
+    before, star, after = (pattern or "").partition("*")
+    return name[len(before) : len(name) - len(after)] if star and "*" not in after else ""
 
 
 def _names(files: Sequence[Path]) -> str:

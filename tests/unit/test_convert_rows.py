@@ -64,6 +64,15 @@ def test_a_file_that_is_no_streams_is_said(sealed: Recording, tmp_path: Path) ->
         changed("trials", sealed, tmp_path)
 
 
+def test_files_of_other_trials_are_said_to_be_taken_together(sealed: Recording, tmp_path: Path) -> None:
+    text = foreign.TABLES["trials"].write(sealed, tmp_path / "trials")
+    (tmp_path / "map.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "trials" / "03_mug.csv").unlink()
+    (tmp_path / "trials" / "05_robot.csv").unlink()
+    with pytest.warns(UserWarning, match=r"such as 04_mug.csv and 03_robot.csv; do they belong together\?"):
+        convert_table(tmp_path / "trials", tmp_path / "recording", tmp_path / "map.yaml")
+
+
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_rows_are_picked_by_a_text_too(sealed: Recording, tmp_path: Path) -> None:
     found = changed("detections.csv", sealed, tmp_path)
