@@ -12,14 +12,14 @@ import io
 import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
-import scipy.io
 
 from physid_drake.convert.columns import Array, Columns, seconds_of, without_marks
 from physid_drake.convert.groups import MATRICES, PUSH, Unread, joined
 from physid_drake.convert.json_table import read_json, read_json_lines
+from physid_drake.convert.matlab import read_matlab
 from physid_drake.errors import RecordingError
 from physid_drake.files import FileError, read_bytes
 from physid_drake.npz import read_array, read_arrays
@@ -34,18 +34,14 @@ MOST_ARRAYS: Final = 50_000
 MOST_AXES: Final = 4
 """Of pushes of matrices."""
 
-_PACKED: Final = 15
-"""MATLAB's code of an element that is packed by zlib."""
-_PIECE: Final = 1 << 20
-
 _SECONDS: Final = {
     "W": 604800.0, "D": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "ps": 1e-12,
 }  # fmt: skip
 """Of NumPy's units of dates and durations; a month has no length."""
 
 _BROKEN: Final = (
-    OSError, ValueError, TypeError, RuntimeError, MemoryError, OverflowError, AttributeError, LookupError,
-    zlib.error, scipy.io.matlab.MatReadError,
+    OSError, ValueError, TypeError, RuntimeError, MemoryError, ArithmeticError, AttributeError, LookupError,
+    zlib.error,
 )  # fmt: skip
 
 
@@ -258,48 +254,7 @@ def _read_matlab(path: Path) -> dict[str, Any]:
     content = read_bytes(path, most=MOST_BYTES)
     if b"MATLAB 7.3" in content[:128]:
         return _read_hdf5(path, turned=True)
-    _check_unpacked(content)
-    found: dict[str, Any] = {}
-    # It reads streams, too; the stubs know of paths alone.
-    stream: Any = io.BytesIO(content)
-    for name, value in scipy.io.loadmat(stream, squeeze_me=True, struct_as_record=True).items():
-        if not name.startswith("__"):
-            _fields(name, value, found, depth=0)
-    return joined(_columns_only(found))
-
-
-def _fields(name: str, value: Any, found: dict[str, Any], depth: int) -> None:
-    if depth > 8 or len(found) > MOST_ARRAYS:
-        raise FileError("it nests deeper, or holds more arrays, than a log does")
-    if not isinstance(value, np.ndarray):
-        return
-    if value.dtype.names is None:
-        if value.ndim >= 1:
-            plain = value.dtype.kind in "biufU"
-            found[name] = value if plain else Unread(why="it holds cells or objects, which are no numbers")
-        return
-    # One structure, or an array of them: one for each push.
-    for k, one in enumerate(np.atleast_1d(value)[:1000]):
-        for field in value.dtype.names:
-            prefix = name if value.ndim == 0 else f"{name}[{k}]"
-            _fields(f"{prefix}/{field}", one[field], found, depth + 1)
-
-
-def _check_unpacked(content: bytes) -> None:
-    """Of MATLAB's elements that are packed, each is unpacked in pieces: none may be more than a log is."""
-    order: Literal["little", "big"] = "little" if content[126:128] == b"IM" else "big"
-    at, total = 128, 0
-    while at + 8 <= len(content):
-        kind = int.from_bytes(content[at : at + 4], order)
-        size = int.from_bytes(content[at + 4 : at + 8], order)
-        if kind == _PACKED:
-            unpack, packed = zlib.decompressobj(), content[at + 8 : at + 8 + size]
-            while packed and not unpack.eof:
-                total += len(unpack.decompress(packed, _PIECE))
-                packed = unpack.unconsumed_tail
-                if total > MOST_BYTES:
-                    raise FileError(f"it unpacks to more than {MOST_BYTES / 1e6:g} MB")
-        at += 8 + size
+    return joined(_columns_only(read_matlab(content)))
 
 
 def _read_parquet(path: Path) -> dict[str, Any]:

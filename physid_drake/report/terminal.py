@@ -7,6 +7,7 @@ from typing import Final
 from rich import box
 from rich.console import Console
 from rich.table import Column, Table
+from rich.text import Text
 
 NARROWEST: Final = 120  # columns of a file or a pipe: tables are legible there
 
@@ -28,8 +29,10 @@ def numbers(header: str) -> Column:
 
 
 def narrow_table(title: str, *columns: Column, caption: str | None = None, header: bool = True) -> Table:
-    """A table without lines between columns."""
+    """A table without lines between columns; nothing in its title or caption is taken for markup."""
+    named = Text(title, style="table.title")
+    below = None if caption is None else Text(caption, style="table.caption")
     return Table(
-        *columns, title=title, title_justify="left", caption=caption, caption_justify="left", show_header=header,
+        *columns, title=named, title_justify="left", caption=below, caption_justify="left", show_header=header,
         box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), collapse_padding=True,
     )  # fmt: skip

@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import physid_drake
 from fuzz.case import MARK, NUMBER, Case
+from physid_drake.convert import matlab_process
 from physid_drake.resources import shipped
 
 SYSTEM: Final = ("/proc/", "/sys/devices/system/", "/sys/fs/cgroup/", "/dev/urandom", "/dev/null", "/etc/localtime",
@@ -113,7 +114,9 @@ class Watch:
             self._note(arguments[1], "written", follows=event in _FOLLOWING)
         elif event in _READS:
             self._note(arguments[0], "read")
-        elif event in _NEVER and not (event == "ctypes.dlopen" and arguments[0] is None):
+        elif (
+            event in _NEVER and not (event == "ctypes.dlopen" and arguments[0] is None) and not _is_reader(arguments)
+        ):
             self._seen.append(f"{event}{tuple(map(str, arguments))!r:.200}")
 
     def _note(self, path: Any, how: str, *, follows: bool = True) -> None:
@@ -129,6 +132,13 @@ class Watch:
         if how == "read" and (real in self._readable or real.startswith(self._system)):
             return
         self._seen.append(f"{how} outside: {os.fsdecode(path)!r:.200}")
+
+
+def _is_usual(event: str, arguments: tuple[Any, ...]) -> bool:
+    """Whether this program's own symbols are looked up, or a process starts that is sent a MATLAB file to read."""
+    if event == "ctypes.dlopen":
+        return arguments[0] is None
+    return len(arguments) > 1 and list(arguments[1] or ()) == [sys.executable, "-P", matlab_process.__file__]
 
 
 class _Opened:

@@ -10,7 +10,7 @@ import pytest
 import scipy.io
 from scipy.spatial.transform import Rotation
 
-from physid_drake.convert import arrays, guess_map
+from physid_drake.convert import guess_map, matlab
 from physid_drake.convert.arrays import PUSH, read_array_table
 from physid_drake.convert.conventions import rotation_of
 from physid_drake.convert.mapping import Turn, World
@@ -65,12 +65,23 @@ class TestMatlab:
         assert numbers["t"].tolist() == [0.0, 1.0, 2.0, 3.0] and numbers["x[1]"].tolist() == [4.0, 5.0, 6.0, 7.0]
 
     def test_what_unpacks_to_more_than_a_log_is(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(arrays, "MOST_BYTES", 10_000_000)
+        monkeypatch.setattr(matlab, "MOST_UNPACKED", 10_000_000)
         packed = zlib.compress(bytes(11_000_000))
         head = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
         element = (15).to_bytes(4, "little") + len(packed).to_bytes(4, "little") + packed
         (tmp_path / "log.mat").write_bytes(head + element)
         with pytest.raises(RecordingError, match="unpacks to more than 10 MB"):
+            read_array_table(tmp_path / "log.mat")
+
+    @pytest.mark.parametrize("at", [128, 152, 168, 184])
+    def test_a_code_that_matlab_does_not_have(self, at: int, tmp_path: Path) -> None:
+        """SciPy takes what lies beside its table of types for one of them, which may end the process that reads."""
+        scipy.io.savemat(tmp_path / "log.mat", {"times": np.arange(9.0)[:, None]})
+        content = bytearray((tmp_path / "log.mat").read_bytes())
+        assert int.from_bytes(content[at : at + 4], "little") in (14, 5, 0x50001, 9, 1)
+        content[at : at + 4] = (77).to_bytes(4, "little")
+        (tmp_path / "log.mat").write_bytes(content)
+        with pytest.raises(RecordingError, match=r"log\.mat: cannot be read: damaged|log\.mat: holds no columns"):
             read_array_table(tmp_path / "log.mat")
 
     @pytest.mark.parametrize(
