@@ -114,9 +114,7 @@ class Watch:
             self._note(arguments[1], "written", follows=event in _FOLLOWING)
         elif event in _READS:
             self._note(arguments[0], "read")
-        elif (
-            event in _NEVER and not (event == "ctypes.dlopen" and arguments[0] is None) and not _is_reader(arguments)
-        ):
+        elif event in _NEVER and not _is_usual(event, arguments):
             self._seen.append(f"{event}{tuple(map(str, arguments))!r:.200}")
 
     def _note(self, path: Any, how: str, *, follows: bool = True) -> None:
