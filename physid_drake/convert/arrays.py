@@ -29,6 +29,8 @@ MOST_BYTES: Final = 1_000_000_000
 MOST_NUMBERS: Final = 40_000_000
 MOST_COLUMNS: Final = 64
 """Of one array: an image is no column."""
+MOST_BODIES: Final = 16
+"""Side by side in one array of a log."""
 MOST_ARRAYS: Final = 50_000
 """Of hundreds of pushes with dozens of arrays each."""
 MOST_AXES: Final = 4
@@ -69,6 +71,7 @@ def read_array_table(path: Path) -> Columns:
     texts: dict[str, list[str]] = {}
     unread: dict[str, str] = {}
     units: dict[str, str] = {}
+    clocks = {len(one) for one in arrays.values() if not isinstance(one, Unread) and one.ndim == 1}
     for name, array in arrays.items():
         if not isinstance(array, Unread) and array.dtype.kind in "UO" and array.ndim == 1:
             words = [str(value) for value in array[:MOST_NUMBERS]]
@@ -78,7 +81,7 @@ def read_array_table(path: Path) -> Columns:
             else:
                 numbers[name], units[name] = times, "s"
             continue
-        found = _columns(name, array)
+        found = _by_body(name, array) if _holds_bodies(array, clocks) else _columns(name, array)
         if isinstance(found, Unread):
             unread[name] = found.why
             continue
@@ -150,6 +153,20 @@ def _columns_of_numbers(name: str, array: Any) -> dict[str, Array]:
     pushes, rows, count = array.shape
     columns = {f"{name}[{k}]": _floats(array[:, :, k].ravel()) for k in range(count)}
     return columns | {PUSH: np.repeat(np.arange(pushes, dtype=np.float64), rows)}
+
+
+def _holds_bodies(array: Any, clocks: set[int]) -> bool:
+    """Whether the middle axis of an array counts bodies: it is short, and some plain array is as long as the first."""
+    if isinstance(array, Unread) or array.ndim != 3 or array.dtype.kind not in "biuf" or _holds_matrices(array):
+        return False
+    samples, bodies, width = array.shape
+    return samples in clocks and bodies <= MOST_BODIES < samples and width <= MOST_COLUMNS
+
+
+def _by_body(name: str, array: Any) -> dict[str, Array]:
+    """Columns of each body: ``name[body,k]``."""
+    _, bodies, width = array.shape
+    return {f"{name}[{j},{k}]": _floats(array[:, j, k]) for j in range(bodies) for k in range(width)}
 
 
 def _holds_matrices(array: Any) -> bool:

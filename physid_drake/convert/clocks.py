@@ -32,8 +32,9 @@ def increasing(times: Array, columns: Columns, seen: NDArray[np.bool_]) -> NDArr
     if len(back):
         one, other = float(times[back[0]]), float(times[back[0] + 1])
         raise RecordingError(
-            f"its clock steps back from {one:.6g} to {other:.6g} s; if it begins anew with every push, cut by a"
-            " column that counts them, or give a folder with one file for each."
+            f"its clock steps back by {one - other:.6g} s, from {one:.15g} to {other:.15g} s; if it begins anew with"
+            " every push, cut by a column that counts them, or give a folder with one file for each; if it counts"
+            " arrivals, or only to a day or a largest number, name another clock."
         )
     later = np.diff(times, prepend=-np.inf) > 0.0
     if not later.all():

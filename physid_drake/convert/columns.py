@@ -40,6 +40,7 @@ class Columns:
         length: the unit of all lengths, where the file's preamble states one.
         rows: (n,) the line of each row in a text, or its index, for messages.
         unread: what else the log holds, by name, and why it is no column.
+        others: further tables in the same text.
     """
 
     source: str
@@ -49,6 +50,7 @@ class Columns:
     length: str | None = None
     rows: Sequence[int] = ()
     unread: Mapping[str, str] = field(default_factory=dict)
+    others: int = 0
 
     def find(self, name: str) -> str:
         """The column that a map means: by its whole name, or by the end of it where only one has that end.

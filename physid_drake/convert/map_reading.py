@@ -279,7 +279,9 @@ def _as_values(value: object) -> tuple[tuple[str, float | str], ...] | None:
     if not isinstance(value, dict) or not value:
         return None
     good = all(isinstance(k, str) and isinstance(v, str | int | float) for k, v in value.items())
-    return tuple((name, one if isinstance(one, str) else float(one)) for name, one in value.items()) if good else None
+    # True and False are texts in a table: YAML takes them for truth values.
+    plain = {name: str(one) if isinstance(one, bool) else one for name, one in value.items()} if good else {}
+    return tuple((name, one if isinstance(one, str) else float(one)) for name, one in plain.items()) if good else None
 
 
 def _turn(section: Section) -> Turn | None:

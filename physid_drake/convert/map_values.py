@@ -22,7 +22,9 @@ def unit_of(section: Section, kind: Mapping[str, float], what: str) -> str | Non
 
 
 def size_of_unit(section: Section, kind: Mapping[str, float], default: str) -> float:
-    """How large a section's unit is."""
+    """How large a section's unit is: one of a kind, or a number."""
+    if isinstance(section.values.get("unit"), int | float):
+        return positive(section, "unit", 1.0)
     return kind[unit_of(section, kind, "it") or default]
 
 

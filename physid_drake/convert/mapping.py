@@ -25,7 +25,7 @@ NORM_TOLERANCE: Final = 0.02
 ROTATIONS: Final = ("wxyz", "xyzw", "euler", "rotation_vector", "matrix", "yaw")
 """How a rotation is written; the quaternions by the order of their columns, a matrix row by row."""
 
-CUTS: Final = ("rest", "gap", "column", "times", "whole", "rows")
+CUTS: Final = ("rest", "gap", "column", "times", "whole", "sections", "rows")
 COUNTS: Final[Mapping[str, tuple[int, ...]]] = {
     "wxyz": (4,), "xyzw": (4,), "euler": (3,), "rotation_vector": (3,), "matrix": (9,),
     "yaw": (1,),

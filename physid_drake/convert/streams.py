@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -21,6 +22,7 @@ from physid_drake.convert.conventions import (
     with_offset,
     wxyz_of,
 )
+from physid_drake.convert.lost import lost_rows
 from physid_drake.convert.mapping import Clock, ForceMap, Map, PoseMap, Quantity, Rows, Turn, World
 from physid_drake.convert.units import ANGLES, FORCES, LENGTHS, SPEEDS, TIMES, factor
 from physid_drake.errors import RecordingError
@@ -160,6 +162,14 @@ def _placed(columns: Columns, pose: PoseMap, times: Array, chart: Map) -> PoseSt
             np.isfinite(turn).all(axis=1))  # fmt: skip
     if not seen.any():
         raise RecordingError("no row has all of its columns filled.")
+    lost = lost_rows(place[seen])
+    if lost.any():
+        seen[np.flatnonzero(seen)[lost]] = False
+        warnings.warn(
+            f"{columns.source}: {int(lost.sum())} rows hold one place far from those before and after: the track was"
+            " lost; left out.",
+            UserWarning, stacklevel=2,
+        )  # fmt: skip
     rows = np.flatnonzero(seen)[increasing(times[seen], columns, seen)]
     times, place = times[rows], place[rows]
     rotation = (
@@ -227,6 +237,11 @@ def _times(columns: Columns, clock: Clock, chart: Map, rows: Rows, count: int) -
         raise RecordingError(f"the map says {own.unit}, but times in column {shown(name)} are in {stated}.")
     unit = own.unit or stated or "s"
     scale = factor(unit, TIMES, f"times in column {shown(name)}") if own.rate is None else 1.0 / own.rate
+    if len(columns.numbers[name]) != count:
+        raise RecordingError(
+            f"column {shown(name)} has {len(columns.numbers[name])} times, but there are {count} rows; name the times"
+            " that belong to them."
+        )
     times: Array = columns.numbers[name] * scale + offset
     if own.fine is not None:
         times = times + 1e-9 * columns.stack([own.fine])[:, 0]

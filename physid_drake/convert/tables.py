@@ -128,6 +128,9 @@ def _log(where: Mapping[str, Path], chart: Map) -> Parts:
         if place not in read:
             read[place] = read_columns(where[key], chart, stream.rows.section)
         tables[key] = _picked(key, read[place], stream.rows)
+    if chart.cut.by == "sections":
+        return _sections(where["object"], chart)
+    _warn_of_more(tables, chart)
     if chart.cut.by == "rows":
         return [(f", row {row}", chart, dict.fromkeys(tables, part)) for row, part in _single_rows(tables["object"])]
     if chart.cut.by == "column" and chart.cut.column is not None:
@@ -135,12 +138,49 @@ def _log(where: Mapping[str, Path], chart: Map) -> Parts:
     return [("", chart, tables)]
 
 
+def _sections(file: Path, chart: Map) -> Parts:
+    """Each table of a text as a push; those that hold nothing of the object are left out."""
+    count = 1 + read_columns(file, chart, 1).others
+    parts: Parts = []
+    left: list[int] = []
+    for k in range(1, count + 1):
+        try:
+            columns = read_columns(file, chart, k)
+            columns.stack(chart.object.position.columns)
+        except RecordingError:
+            if count == 1:
+                raise
+            left.append(k)
+            continue
+        picked = {key: _picked(key, columns, stream.rows) for key, stream in _streams(chart).items()}
+        parts.append((f", section {k}", chart, picked))
+    if left:
+        said = listed([str(k) for k in left[:5]])
+        warnings.warn(
+            f"{named(file.name)}: section {said}{_more(left[4:])} hold no places of the object: left out.",
+            UserWarning, stacklevel=2,
+        )  # fmt: skip
+    return parts
+
+
+def _warn_of_more(tables: _Tables, chart: Map) -> None:
+    """Says that a text has more tables, where the map names none of them."""
+    others = max(columns.others for columns in tables.values())
+    if others and chart.dialect.section == 1 and all(one.rows.section is None for one in _streams(chart).values()):
+        warnings.warn(
+            f"{tables['object'].source}: {others} more tables are not read: a stream's section: 2 names another one,"
+            " and pushes: {cut: sections} takes each for a push.",
+            UserWarning, stacklevel=2,
+        )  # fmt: skip
+
+
 def _picked(key: str, columns: Columns, rows: Rows) -> Columns:
     """The rows in which columns have the values that a map asks for."""
     for name, value in rows.where:
         found = name if name in columns.texts else columns.find(name)
         there = np.array(columns.texts[found]) if found in columns.texts else columns.numbers[found]
-        wanted = str(value) if found in columns.texts else value
+        truth = {"True": 1.0, "False": 0.0}
+        wanted = str(value) if found in columns.texts else truth.get(str(value), value)
         chosen = np.flatnonzero(there == wanted)
         if not len(chosen):
             some = sorted({str(one) if found in columns.texts else f"{one:g}" for one in there.tolist()})
@@ -162,30 +202,40 @@ def _rows(columns: Columns, chosen: NDArray[np.intp], count: int) -> Columns:
 
 def _by_value(tables: _Tables, column: str, chart: Map) -> Parts:
     """A table's rows by the value of a column; of several tables, those in which it has the same one."""
-    runs: dict[str, list[tuple[float, NDArray[np.intp]]]] = {}
+    runs: dict[str, list[tuple[str, NDArray[np.intp]]]] = {}
     for key, columns in tables.items():
         try:
-            runs[key] = list(rows_by_value(columns.numbers[columns.find(column)]))
+            runs[key] = _runs(columns, column)
         except RecordingError as error:
             raise RecordingError(f"pushes: {error}") from error
         if [value for value, _ in runs[key]] != [value for value, _ in runs["object"]]:
             raise RecordingError(f"pushes: {shown(column)} has other values for {key} than for object.")
     body = tables["object"]
-    name = body.find(column)
+    name = column if column in body.texts else body.find(column)
     for value, count in Counter(value for value, _ in runs["object"]).items():
         if count > 1:
             warnings.warn(
-                f"{body.source}: {name} {value:g} comes in {count} pieces, and each is taken for a push.",
+                f"{body.source}: {name} {value} comes in {count} pieces, and each is taken for a push.",
                 UserWarning, stacklevel=2,
             )  # fmt: skip
     parts: Parts = []
     for k, (value, _) in enumerate(runs["object"]):
         cut: dict[str, Columns] = {}
         for key, columns in tables.items():
-            count = len(columns.numbers[columns.find(column)])
+            count = len(columns.texts.get(column) or columns.numbers[columns.find(column)])
             cut[key] = replace(_rows(columns, runs[key][k][1], count), texts={}, rows=())
-        parts.append((f", {name} {value:g}", chart, cut))
+        parts.append((f", {name} {value}", chart, cut))
     return parts
+
+
+def _runs(columns: Columns, column: str) -> list[tuple[str, NDArray[np.intp]]]:
+    """Rows in which a column keeps its number, or its text, and that; empty fields are between pushes."""
+    if column not in columns.texts:
+        return [(f"{value:g}", rows) for value, rows in rows_by_value(columns.numbers[columns.find(column)])]
+    texts = np.array(columns.texts[column])
+    edges = np.flatnonzero(texts[1:] != texts[:-1]) + 1
+    runs = [(str(texts[rows[0]]), rows) for rows in np.split(np.arange(len(texts)), edges) if len(rows)]
+    return [(text, rows) for text, rows in runs if text.strip()]
 
 
 def _single_rows(columns: Columns) -> Iterator[tuple[int, Columns]]:

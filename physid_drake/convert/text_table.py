@@ -79,7 +79,7 @@ def read_text_table(path: Path, dialect: Dialect | None = None) -> Columns:
         raise RecordingError(
             f"{text.where}: has {len(text.tables)} table(s), but section {dialect.section} is asked for."
         )
-    return _table(text, dialect.section, dialect.header_lines)
+    return replace(_table(text, dialect.section, dialect.header_lines), others=len(text.tables) - 1)
 
 
 def read_text_tables(path: Path, most: int) -> dict[int, Columns]:

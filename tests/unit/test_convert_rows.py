@@ -153,3 +153,90 @@ def test_a_unit_without_a_name_is_a_number(sealed: Recording, tmp_path: Path) ->
     (tmp_path / "map.yaml").write_text(chart.replace("0.00125", "-1"), encoding="utf-8")
     with pytest.raises(RecordingError, match=r"position.unit: must be positive, but got -1"):
         convert_table(tmp_path / "log.csv", tmp_path / "other", tmp_path / "map.yaml")
+
+
+def times_and_places(recording: Recording, count: int) -> list[np.ndarray]:
+    """Tables (n, 7) of pushes at 100 Hz: time, place of the object, place of the tip."""
+    tables = []
+    for push in recording.pushes[:count]:
+        assert push.hand is not None
+        times = np.arange(push.object.times[0], push.object.times[-1], 0.01)
+        both = [np.interp(times, s.times, s.positions[:, c]) for s in (push.object, push.hand) for c in range(3)]
+        tables.append(np.column_stack([times, *both]))
+    return tables
+
+
+PLAIN = (
+    HEAD + "time: {column: t}\n"
+    "object: {position: {columns: [x, y, z]}, rotation: none}\n"
+    "hand: {position: {columns: [hx, hy, hz]}, rotation: none}\n"
+)
+NAMES = "t,x,y,z,hx,hy,hz"
+
+
+def rows_of(table: np.ndarray) -> list[str]:
+    return [",".join(f"{v:.6f}" for v in row) for row in table]
+
+
+def test_tables_below_one_another_are_a_push_each_or_said(sealed: Recording, tmp_path: Path) -> None:
+    tables = times_and_places(sealed, 3)
+    text = "\n\n".join("\n".join([f"trial {k}", NAMES, *rows_of(table)]) for k, table in enumerate(tables))
+    (tmp_path / "log.csv").write_text(text + "\n\nsummary\na,b\n1,2\n3,4\n", encoding="utf-8")
+    (tmp_path / "map.yaml").write_text(PLAIN, encoding="utf-8")
+    with pytest.warns(UserWarning, match=r"log.csv: 3 more tables are not read: .* \{cut: sections\} takes each"):
+        assert len(convert_table(tmp_path / "log.csv", tmp_path / "first", tmp_path / "map.yaml").pushes) == 1
+    (tmp_path / "map.yaml").write_text(PLAIN + "pushes: {cut: sections}\n", encoding="utf-8")
+    with pytest.warns(UserWarning, match="section 4 hold no places of the object: left out"):
+        found = convert_table(tmp_path / "log.csv", tmp_path / "all", tmp_path / "map.yaml")
+    for table, push in zip(tables, found.pushes, strict=True):
+        assert np.abs(push.object.positions - table[:, 1:4]).max() < 1e-6
+
+
+def test_pushes_are_counted_by_a_text(sealed: Recording, tmp_path: Path) -> None:
+    tables = times_and_places(sealed, 3)
+    rows = [
+        f"{name},{row}"
+        for name, table in zip(("push_a", "", "push_b"), tables, strict=True)
+        for row in rows_of(table)
+    ]
+    (tmp_path / "log.csv").write_text("\n".join([f"trial,{NAMES}", *rows]), encoding="utf-8")
+    (tmp_path / "map.yaml").write_text(PLAIN + "pushes: {cut: column, column: trial}\n", encoding="utf-8")
+    found = convert_table(tmp_path / "log.csv", tmp_path / "recording", tmp_path / "map.yaml")
+    assert [push.note for push in found.pushes] == [
+        "log.csv, trial push_a, from 0 s",
+        "log.csv, trial push_b, from 0 s",
+    ]
+    assert np.abs(found.pushes[1].object.positions - tables[2][:, 1:4]).max() < 1e-6
+
+
+@pytest.mark.parametrize("sign", [(0.0, 0.0, 0.0), (0.9999, 0.9999, 0.9999), (-1.0, 0.0, 0.0)])
+def test_one_place_that_stands_for_none_is_left_out(
+    sign: tuple[float, ...], sealed: Recording, tmp_path: Path
+) -> None:
+    """For a quarter of a second, in a log whose zero is 0.3 m below the table's top."""
+    (table,) = times_and_places(sealed, 1)
+    table[:, [3, 6]] += 0.3
+    table[40:65, 1:4] = sign
+    (tmp_path / "log.csv").write_text("\n".join([NAMES, *rows_of(table)]), encoding="utf-8")
+    (tmp_path / "map.yaml").write_text(PLAIN + "world: {origin: [0, 0, 0.3]}\n", encoding="utf-8")
+    with pytest.warns(
+        UserWarning, match="25 rows hold one place far from those before and after: the track was lost"
+    ):
+        found = convert_table(tmp_path / "log.csv", tmp_path / "recording", tmp_path / "map.yaml")
+    assert len(found.pushes[0].object) == len(table) - 25
+
+
+def test_bodies_side_by_side_in_an_array(sealed: Recording, tmp_path: Path) -> None:
+    (table,) = times_and_places(sealed, 1)
+    np.savez(tmp_path / "log.npz", t=table[:, 0], p=table[:, 1:].reshape(-1, 2, 3), other=np.zeros(7))
+    chart = (
+        HEAD + "time: {column: t}\n"
+        'object: {position: {columns: ["p[0,0]", "p[0,1]", "p[0,2]"]}, rotation: none}\n'
+        'hand: {position: {columns: ["p[1,0]", "p[1,1]", "p[1,2]"]}, rotation: none}\n'
+    )
+    (tmp_path / "map.yaml").write_text(chart, encoding="utf-8")
+    found = convert_table(tmp_path / "log.npz", tmp_path / "recording", tmp_path / "map.yaml")
+    assert np.abs(found.pushes[0].object.positions - table[:, 1:4]).max() < 1e-12
+    (tmp_path / "map.yaml").write_text(chart.replace("column: t}", "column: other}"), encoding="utf-8")
+    with pytest.raises(RecordingError, match=r"object: column 'other' has 7 times, but there are \d+ rows"):
+        convert_table(tmp_path / "log.npz", tmp_path / "again", tmp_path / "map.yaml")
