@@ -156,7 +156,7 @@ def _columns_of_numbers(name: str, array: Any) -> dict[str, Array]:
 
 
 def _holds_bodies(array: Any, clocks: set[int]) -> bool:
-    """Whether the middle axis of an array counts bodies: it is short, and some plain array is as long as the first."""
+    """Whether the middle axis of an array counts bodies: it is short, and a plain array is as long as the first."""
     if isinstance(array, Unread) or array.ndim != 3 or array.dtype.kind not in "biuf" or _holds_matrices(array):
         return False
     samples, bodies, width = array.shape
