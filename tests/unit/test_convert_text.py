@@ -98,6 +98,31 @@ class TestTimes:
         rows = "2026-03-01,1,2\nyesterday,1,2\n2026-03-02,1,2\n"
         assert list(read(f"when,x,y\n{rows}", tmp_path).texts) == ["when"]
 
+    @pytest.mark.parametrize("sign", [".", ","])
+    def test_minutes_and_seconds_have_a_fraction(self, sign: str, tmp_path: Path) -> None:
+        stamps = ["00:58.50", "00:59.25", "01:00.00", "61:00.75"]
+        rows = "".join(f"{stamp.replace('.', sign)};1.5;2.5\n" for stamp in stamps)
+        assert read(f"t;x;y\n{rows}", tmp_path).numbers["t"].tolist() == [58.5, 59.25, 60.0, 3660.75]
+
+    def test_hours_and_minutes_are_not_told_from_minutes_and_seconds(self, tmp_path: Path) -> None:
+        assert list(read("t,x,y\n10:00,1,2\n10:01,1,2\n10:02,1,2\n", tmp_path).texts) == ["t"]
+
+    @pytest.mark.parametrize(
+        "stamp", ["01:00:00:{:02}", "01:00:00;{:02}", "01:00:00:{:03}", "2026-03-01 01:00:00:{:02}"]
+    )
+    def test_frames_of_a_timecode_are_no_part_of_a_second(self, stamp: str, tmp_path: Path) -> None:
+        rows = "".join(f"{stamp.format(k)},1,2\n" for k in range(4))
+        found = read(f"t,x,y\n{rows}", tmp_path)
+        assert list(found.texts) == ["t"]
+        with pytest.raises(
+            RecordingError, match=r"'t' holds timecode, with frames .*; give a column that counts, or r"
+        ):
+            found.find("t")
+
+    def test_milliseconds_behind_a_third_colon(self, tmp_path: Path) -> None:
+        rows = "".join(f"01:00:00:{250 * k:03},1,2\n" for k in range(4))
+        assert np.diff(read(f"t,x,y\n{rows}", tmp_path).numbers["t"]) == pytest.approx(0.25)
+
 
 def test_marks_of_lost_samples_are_empty_and_said(tmp_path: Path) -> None:
     """NDI writes -3.697314e28 where a tool is not seen."""
