@@ -17,7 +17,9 @@ EMPTY: Final = frozenset({"", "nan", "na", "n/a", "#n/a", "#na", "null", "none",
 ANY: Final = ".,"
 """Either sign, where it is not known yet which stands before decimals."""
 
-_WRITTEN: Final = re.compile(r"[+-]?[\d.,]*\d[\d.,]*(?:[eE][+-]?\d+)?")
+WRITTEN: Final = re.compile(r"[+-]?[\d.,]*\d[\d.,]*(?:[eE][+-]?\d+)?")
+"""What is meant for a number, whether or not its signs are in their places."""
+
 _ONE_GROUP: Final = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _SPACED: Final = re.compile(r"[+-]?[1-9]\d{0,2}(?:[ \u00a0\u202f]\d{3})+[.,]\d*")
 """Without decimals, two numbers in one field look the same."""
@@ -104,7 +106,7 @@ def _said(field: str) -> tuple[str, str] | None:
     """How surely a number tells the sign before decimals, and which; None if it tells nothing."""
     bare = _ungrouped(field)
     sign = max(".,", key=bare.rfind)
-    if sign not in bare or not _WRITTEN.fullmatch(bare):
+    if sign not in bare or not WRITTEN.fullmatch(bare):
         return None
     if _OTHER[sign] in bare:
         return ("both", sign) if bare.count(sign) == 1 else None

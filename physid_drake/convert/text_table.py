@@ -21,7 +21,7 @@ from typing import Final
 import numpy as np
 
 from physid_drake.convert.columns import Array, Columns, seconds_of, without_marks
-from physid_drake.convert.notation import ANY, decimal_of, is_empty, number_of, numbers_in
+from physid_drake.convert.notation import ANY, WRITTEN, decimal_of, is_empty, number_of, numbers_in
 from physid_drake.convert.text_sections import Rows, states_units, tables_in, unit_said
 from physid_drake.errors import RecordingError
 from physid_drake.files import FileError, read_bytes
@@ -32,6 +32,9 @@ MOST_CELLS: Final = 40_000_000
 """Of a table: an hour of thirty columns at 360 Hz."""
 
 MOST_COLUMNS: Final = 10_000
+
+_REMARKS: Final = re.compile(r"(comment|remark|note|bemerkung|kommentar|commentaire)(s|en|e)?", re.IGNORECASE)
+"""The last column's name, which rows may end before if all do: LabVIEW writes no field where nobody remarked."""
 
 SEPARATORS: Final = (",", ";", "\t", "|", " ")
 HEAD: Final = 20_000
@@ -152,7 +155,8 @@ def _width(where: str, header: list[list[str]], body: Rows) -> int:
     filled = max(len(_filled(row)) for row in body.fields)
     names = max((len(_filled(line)) for line in header), default=width)
     given = max(map(len, header), default=width)
-    if given < min(filled, width) or names > max(widths):
+    unremarked = set(widths) == {names - 1} and all(_REMARKS.fullmatch(line[-1]) for line in header[-1:] if line)
+    if given < min(filled, width) or (names > max(widths) and not unremarked):
         raise RecordingError(
             f"{where}: row {body.lines[0]}: has {width} fields, but the header above it names {names} columns;"
             " correct the header, or give 'header_lines: 0' in the map's 'source:', which calls them column 1 to"
@@ -311,7 +315,7 @@ def _columns(where: str, names: Sequence[str], units: dict[str, str], body: Rows
 
 
 def _no_number(place: str, field: str, decimal: str) -> RecordingError:
-    if math.isfinite(number_of(field, ANY)):
+    if WRITTEN.fullmatch(field):
         sign, other = ("comma", "point") if decimal == "," else ("point", "comma")
         return RecordingError(
             f"{place}: {shown(field)} is no number where a {sign} stands before decimals, as it does in this table,"
