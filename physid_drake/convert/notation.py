@@ -20,6 +20,7 @@ ANY: Final = ".,"
 WRITTEN: Final = re.compile(r"[+-]?[\d.,]*\d[\d.,]*(?:[eE][+-]?\d+)?")
 """What is meant for a number, whether or not its signs are in their places."""
 
+_USUAL: Final = re.compile(r"[+-]?\d+([.,])\d*")
 _ONE_GROUP: Final = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}")
 _SPACED: Final = re.compile(r"[+-]?[1-9]\d{0,2}(?:[ \u00a0\u202f]\d{3})+[.,]\d*")
 """Without decimals, two numbers in one field look the same."""
@@ -104,6 +105,9 @@ def _ungrouped(field: str) -> str:
 
 def _said(field: str) -> tuple[str, str] | None:
     """How surely a number tells the sign before decimals, and which; None if it tells nothing."""
+    usual = _USUAL.fullmatch(field)
+    if usual:
+        return ("either" if _ONE_GROUP.fullmatch(field) else "one", usual[1])
     bare = _ungrouped(field)
     sign = max(".,", key=bare.rfind)
     if sign not in bare or not WRITTEN.fullmatch(bare):
@@ -112,4 +116,4 @@ def _said(field: str) -> tuple[str, str] | None:
         return ("both", sign) if bare.count(sign) == 1 else None
     if bare.count(sign) > 1:
         return ("both", _OTHER[sign]) if _GROUPED[_OTHER[sign]].fullmatch(bare) else None
-    return ("either" if bare == field and _ONE_GROUP.fullmatch(bare) else "one", sign)
+    return "one", sign

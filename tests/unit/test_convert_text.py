@@ -164,7 +164,7 @@ class TestNotation:
         with pytest.raises(RecordingError, match=r"row 3: column 'x': '1\.2345,6' is no number where a comma stands"):
             read("t;x\n0,01;1.234,5\n0,02;1.2345,6\n0,03;5\n0,04;5\n", tmp_path)
         with pytest.raises(RecordingError, match=r"column 'x': '0\.512' is no number"):
-            read("t;x\n0,01;0.512\n0,02;0.513\n0,03;0.514\n", tmp_path)
+            read("t;x;y\n0,01;0.512;0,1\n0,02;0.513;0,1\n0,03;0.514;0,1\n", tmp_path)
 
     def test_what_nothing_tells_is_asked_for(self, tmp_path: Path) -> None:
         text = "t;x\n1.234;1,234\n2.234;2,345\n3.234;3,456\n"
