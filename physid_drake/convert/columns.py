@@ -7,15 +7,17 @@ import re
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime, time
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from physid_drake.convert.time_words import is_timecode, seconds_of
 from physid_drake.convert.units import UNITS
 from physid_drake.errors import RecordingError
 from physid_drake.wording import shown
+
+__all__ = ["Array", "Columns", "seconds_of", "without_marks"]
 
 Array = NDArray[np.float64]
 
@@ -67,7 +69,13 @@ class Columns:
             raise RecordingError(f"column {shown(name)} is the end of {_listed(ends)}; give more of the name.")
         if name in self.texts:
             first = next((text for text in self.texts[name] if text), "")
-            raise RecordingError(f"column {shown(name)} holds text, such as {shown(first)}; give one of numbers.")
+            said = f"column {shown(name)} holds text, such as {shown(first)}; give one of numbers."
+            if is_timecode(self.texts[name]):
+                said = (
+                    f"column {shown(name)} holds timecode, with frames behind the seconds, such as {shown(first)};"
+                    " give a column that counts, or rate_hz."
+                )
+            raise RecordingError(said)
         if name in self.unread:
             raise RecordingError(f"column {shown(name)} cannot be read: {self.unread[name]}.")
         raise RecordingError(f"{self.source} has no column {shown(name)}; {self._offer(name)}")
@@ -113,29 +121,6 @@ def without_marks(where: str, numbers: Mapping[str, Array]) -> dict[str, Array]:
             stacklevel=2,
         )
     return {name: np.where(marked[name], np.nan, v) if name in marked else v for name, v in numbers.items()}
-
-
-def seconds_of(texts: Sequence[str]) -> Array | None:
-    """Dates and times of ISO 8601 as seconds since 1970, times of the day as seconds; None if one is neither.
-
-    Where no zone is given, it is that of Greenwich: where a clock begins does not matter. Empty ones are NaN.
-    """
-    try:
-        return np.array([_second(text) if text else np.nan for text in texts]) if any(texts) else None
-    except (ValueError, OverflowError):
-        return None
-
-
-def _second(text: str) -> float:
-    if len(text) > 2 and ":" in text[1:3]:
-        bare, _, half = text.partition(" ")
-        day = time.fromisoformat(bare.zfill(len(bare) + (bare[1] == ":")))
-        hour = {"": day.hour, "AM": day.hour % 12, "PM": day.hour % 12 + 12}.get(half.upper())
-        if hour is None:
-            raise ValueError(half)
-        return 3600.0 * hour + 60.0 * day.minute + day.second + 1e-6 * day.microsecond
-    date = datetime.fromisoformat(text)
-    return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
 
 
 def _listed(names: Sequence[str], most: int = 8) -> str:

@@ -5,10 +5,10 @@ A line that begins with ``#`` is a header if it names every column, as NumPy's a
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from physid_drake.convert.notation import is_empty, numbers_in
 from physid_drake.convert.units import UNITS
 
 
@@ -20,28 +20,33 @@ class Rows:
     lines: list[int]
 
 
-def _begins(rows: Rows, k: int, decimal: str) -> bool:
-    """Whether a table's numbers may begin with a row: two or more, half of what is there, and more below."""
+def _begins(rows: Rows, k: int) -> bool:
+    """Whether a table's numbers may begin with a row: two or more, half of what is there, and more below.
+
+    Where all but the first are empty, nothing was seen yet.
+    """
     fields = rows.fields[k]
     if len(fields) < 2:
         return False
-    numbers, there = numbers_in(fields, decimal), len(_there(fields))
+    numbers, there = numbers_in(fields), sum(not is_empty(field) for field in fields)
     following = rows.fields[k + 1] if k + 1 < len(rows.fields) else []
     if fields and fields[0].startswith("#") and not (following and following[0].startswith("#")):
         return False
-    return numbers >= 2 and 2 * numbers >= there and numbers_in(following, decimal) > 0
+    if numbers == there == 1 and len(fields) == len(following):
+        return numbers_in(fields[:1]) == numbers_in(following[:1]) == 1
+    return numbers >= 2 and 2 * numbers >= there and numbers_in(following) > 0
 
 
-def tables_in(rows: Rows, decimal: str) -> list[tuple[list[list[str]], Rows]]:
+def tables_in(rows: Rows) -> list[tuple[list[list[str]], Rows]]:
     """Header lines and body of every table in the file: a body lasts until a line with one word."""
     found: list[tuple[list[list[str]], Rows]] = []
     k, bottom = 0, 0
     while k < len(rows.fields):
-        if not _begins(rows, k, decimal):
+        if not _begins(rows, k):
             k += 1
             continue
-        header = _header(rows, k, bottom, decimal)
-        bottom = _end(rows, k, decimal)
+        header = _header(rows, k, bottom)
+        bottom = _end(rows, k)
         width = len(rows.fields[k])
         kept = [j for j in range(k, bottom) if _there(rows.fields[j]) and not _is_remark(rows.fields[j], width)]
         body = Rows(fields=[rows.fields[j] for j in kept], lines=[rows.lines[j] for j in kept])
@@ -50,14 +55,14 @@ def tables_in(rows: Rows, decimal: str) -> list[tuple[list[list[str]], Rows]]:
     return found
 
 
-def _header(rows: Rows, k: int, bottom: int, decimal: str) -> list[list[str]]:
+def _header(rows: Rows, k: int, bottom: int) -> list[list[str]]:
     """Lines of the header of the numbers from row ``k`` on, none above ``bottom``; of comments, one that names."""
     width, header = len(rows.fields[k]), list[list[str]]()
     for j in range(_below_header(rows, k, bottom) - 1, bottom - 1, -1):
         line = rows.fields[j]
         if line and line[0].startswith("#") and (line[0] != "#" or len(line) != width):
-            line = _bare(line, width, decimal)
-        if not _is_header(line, width, decimal):
+            line = _bare(line, width)
+        if not _is_header(line, width):
             break
         header.insert(0, line)
         if line is not rows.fields[j] and not states_units(line):
@@ -81,24 +86,24 @@ def _is_remark(fields: Sequence[str], width: int) -> bool:
     return fields[0].startswith("#") and len(fields) != width
 
 
-def _bare(fields: Sequence[str], width: int, decimal: str) -> list[str]:
+def _bare(fields: Sequence[str], width: int) -> list[str]:
     """A comment's names of all columns; none if it does not name each."""
     first = fields[0].lstrip("#").strip()
     names = [first, *fields[1:]] if first else list(fields[1:])
-    return names if len(names) == width and not numbers_in(names, decimal) else []
+    return names if len(names) == width and not numbers_in(names) else []
 
 
-def _is_header(fields: Sequence[str], width: int, decimal: str) -> bool:
+def _is_header(fields: Sequence[str], width: int) -> bool:
     """Whether a line is one of a header, and not of the preamble's pairs of a key and its value above it."""
     there = len(_there(fields))
     if len(fields) == width or (len(fields) == width - 1 and there > 1):
         return there > 0
     # Names over the first column of each body may end before the table does.
     carried = not fields or not fields[0]
-    return there > 0 and not numbers_in(fields, decimal) and (carried or 2 * len(fields) >= width)
+    return there > 0 and not numbers_in(fields) and (carried or 2 * len(fields) >= width)
 
 
-def _end(rows: Rows, start: int, decimal: str) -> int:
+def _end(rows: Rows, start: int) -> int:
     """Index behind the last row of a table; a blank line within it is none of its rows."""
     width, k = len(rows.fields[start]), start
     while k < len(rows.fields):
@@ -107,9 +112,9 @@ def _end(rows: Rows, start: int, decimal: str) -> int:
             after = next((j for j in range(k, len(rows.fields)) if _there(rows.fields[j])), len(rows.fields))
             if after == len(rows.fields) or len(rows.fields[after]) != width:
                 return k
-            k = after if numbers_in(rows.fields[after], decimal) else len(rows.fields)
+            k = after if numbers_in(rows.fields[after]) else len(rows.fields)
             continue
-        if len(_there(fields)) == 1 and not numbers_in(fields, decimal):
+        if len(_there(fields)) == 1 and not numbers_in(fields):
             return k
         k += 1
     return k
@@ -127,23 +132,3 @@ def states_units(line: Sequence[str]) -> bool:
 def unit_said(field: str) -> str:
     """The unit in a field, which may stand in brackets."""
     return field.strip("()[] ")
-
-
-def numbers_in(fields: Sequence[str], decimal: str) -> int:
-    """How many fields hold numbers."""
-    return sum(math.isfinite(number_of(field, decimal)) for field in fields)
-
-
-def number_of(field: str, decimal: str) -> float:
-    """A field's number; NaN where it holds none. Python alone reads 1_000 and other scripts' digits."""
-    if decimal == ",":
-        if "." in field and "," in field:
-            field = field.replace(".", "")
-        field = field.replace(",", ".")
-    if not field or "_" in field or not field.isascii():
-        return math.nan
-    try:
-        value = float(field)
-    except ValueError:
-        return math.nan
-    return value if math.isfinite(value) else math.nan

@@ -21,7 +21,8 @@ from typing import Final
 import numpy as np
 
 from physid_drake.convert.columns import Array, Columns, seconds_of, without_marks
-from physid_drake.convert.text_sections import Rows, number_of, states_units, tables_in, unit_said
+from physid_drake.convert.notation import ANY, WRITTEN, decimal_of, is_empty, number_of, numbers_in
+from physid_drake.convert.text_sections import Rows, states_units, tables_in, unit_said
 from physid_drake.errors import RecordingError
 from physid_drake.files import FileError, read_bytes
 from physid_drake.wording import named, one_line, shown
@@ -32,14 +33,15 @@ MOST_CELLS: Final = 40_000_000
 
 MOST_COLUMNS: Final = 10_000
 
+_REMARKS: Final = re.compile(r"(comment|remark|note|bemerkung|kommentar|commentaire)(s|en|e)?", re.IGNORECASE)
+"""The last column's name, which rows may end before if all do: LabVIEW writes no field where nobody remarked."""
+
 SEPARATORS: Final = (",", ";", "\t", "|", " ")
 HEAD: Final = 20_000
 """Characters at the head of a file, in which its preamble is."""
 
 LOOKED_AT: Final = 400
 """Lines at the head of a file that tell its separator and header."""
-
-EMPTY: Final = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--"})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,10 +104,11 @@ def read_text_tables(path: Path, most: int) -> dict[int, Columns]:
 
 @dataclass(frozen=True, kw_only=True)
 class _Text:
-    """What a file of text holds: its name, how decimals are written, a unit of length, headers and rows."""
+    """What a file of text holds: its name, how it is written, a unit of length, headers and rows."""
 
     where: str
-    decimal: str
+    separator: str
+    decimal: str | None
     length: str | None
     tables: list[tuple[list[list[str]], Rows]]
 
@@ -118,9 +121,8 @@ def _read(path: Path, dialect: Dialect) -> _Text:
     where = named(path.name)
     text = "".join(text.splitlines(keepends=True)[dialect.skip_lines :])
     separator = dialect.separator or _separator(text)
-    decimal = dialect.decimal or ("," if separator != "," and _has_decimal_commas(text, separator) else ".")
     try:
-        tables = tables_in(_split(text, separator), decimal)
+        tables = tables_in(_split(text, separator))
     except csv.Error as error:
         raise RecordingError(f"{where}: no readable table: {one_line(error)}.") from error
     if not tables:
@@ -128,7 +130,7 @@ def _read(path: Path, dialect: Dialect) -> _Text:
             f"{where}: no table of numbers was found, separated by {shown(separator)}; does it hold two columns and"
             " two rows of numbers? A map's 'source:' may say how it is written."
         )
-    return _Text(where=where, decimal=decimal, length=_length_unit(text), tables=tables)
+    return _Text(where=where, separator=separator, decimal=dialect.decimal, length=_length_unit(text), tables=tables)
 
 
 def _table(text: _Text, section: int, header_lines: int | None) -> Columns:
@@ -137,7 +139,8 @@ def _table(text: _Text, section: int, header_lines: int | None) -> Columns:
     if header_lines is not None:
         header = header[max(0, len(header) - header_lines) :]
     names, units = _names(header, _width(text.where, header, body))
-    return replace(_columns(text.where, names, units, body, text.decimal), length=text.length)
+    decimal = text.decimal or decimal_of(text.where, body.fields, text.separator)
+    return replace(_columns(text.where, names, units, body, decimal), length=text.length)
 
 
 def _width(where: str, header: list[list[str]], body: Rows) -> int:
@@ -152,7 +155,8 @@ def _width(where: str, header: list[list[str]], body: Rows) -> int:
     filled = max(len(_filled(row)) for row in body.fields)
     names = max((len(_filled(line)) for line in header), default=width)
     given = max(map(len, header), default=width)
-    if given < min(filled, width) or names > max(widths):
+    unremarked = set(widths) == {names - 1} and all(_REMARKS.fullmatch(line[-1]) for line in header[-1:] if line)
+    if given < min(filled, width) or (names > max(widths) and not unremarked):
         raise RecordingError(
             f"{where}: row {body.lines[0]}: has {width} fields, but the header above it names {names} columns;"
             " correct the header, or give 'header_lines: 0' in the map's 'source:', which calls them column 1 to"
@@ -218,10 +222,10 @@ def _separator(text: str) -> str:
     head = text[:200_000].splitlines()[:LOOKED_AT]
 
     def score(separator: str) -> tuple[int, int]:
-        widths = [_numeric(_fields(line, separator), ".,") for line in head]
+        widths = [numbers_in(_fields(line, separator)) for line in head]
         usual = max(set(widths), key=lambda w: (widths.count(w) * (w > 1), w), default=0)
         # A decimal comma cuts numbers into two, so what separates without it goes first.
-        clean = sum(_numeric(_fields(line, separator), ".,") == len(_fields(line, separator)) for line in head)
+        clean = sum(numbers_in(_fields(line, separator)) == len(_fields(line, separator)) for line in head)
         return (widths.count(usual) if usual > 1 else 0, clean)
 
     if any(score(one)[0] > 1 for one in ("\t", ";", "|")):
@@ -233,18 +237,6 @@ def _fields(line: str, separator: str) -> list[str]:
     if separator == " ":
         return line.split()
     return [field.strip().strip('"') for field in line.split(separator)]
-
-
-def _numeric(fields: Sequence[str], decimals: str) -> int:
-    return sum(any(math.isfinite(number_of(field, decimal)) for decimal in decimals) for field in fields)
-
-
-def _has_decimal_commas(text: str, separator: str) -> bool:
-    head = text[:200_000].splitlines()[:LOOKED_AT]
-    fields = [field for line in head for field in _fields(line, separator)]
-    commas = sum(field.count(",") == 1 and math.isfinite(number_of(field, ",")) for field in fields)
-    points = sum(field.count(".") == 1 and math.isfinite(number_of(field, ".")) for field in fields)
-    return commas > points
 
 
 def _split(text: str, separator: str) -> Rows:
@@ -304,19 +296,31 @@ def _columns(where: str, names: Sequence[str], units: dict[str, str], body: Rows
     for k, name in enumerate(names):
         fields = [row[k] if k < len(row) else "" for row in body.fields]
         values = np.array([number_of(field, decimal) for field in fields])
-        wrong = [j for j, field in enumerate(fields) if not math.isfinite(values[j]) and field.lower() not in EMPTY]
-        if 2 * len(wrong) > len(fields):
-            times = seconds_of(fields)
+        there = [j for j, field in enumerate(fields) if not is_empty(field)]
+        wrong = [j for j in there if not math.isfinite(values[j])]
+        # Points in a table of decimal commas may be of either kind, so that no column of theirs is taken for words.
+        words = [j for j in wrong if decimal == "." or math.isnan(number_of(fields[j], ANY))]
+        if 2 * len(words) > len(there):
+            times = seconds_of(["" if is_empty(field) else field for field in fields])
             if times is None:
                 texts[name] = fields
             else:
                 numbers[name], units[name] = times, "s"
             continue
         if wrong:
-            raise RecordingError(
-                f"{where}: row {body.lines[wrong[0]]}: column {shown(name)}: must be a finite number, but got"
-                f" {shown(fields[wrong[0]])}; leave the field empty if there is no sample."
-            )
+            raise _no_number(f"{where}: row {body.lines[wrong[0]]}: column {shown(name)}", fields[wrong[0]], decimal)
         numbers[name] = values
     numbers = without_marks(where, numbers)
     return Columns(source=where, numbers=numbers, texts=texts, units=units, rows=body.lines)
+
+
+def _no_number(place: str, field: str, decimal: str) -> RecordingError:
+    if WRITTEN.fullmatch(field):
+        sign, other = ("comma", "point") if decimal == "," else ("point", "comma")
+        return RecordingError(
+            f"{place}: {shown(field)} is no number where a {sign} stands before decimals, as it does in this table,"
+            f" and a {other} between groups of three digits; write all numbers alike."
+        )
+    return RecordingError(
+        f"{place}: must be a finite number, but got {shown(field)}; leave the field empty if there is no sample."
+    )
