@@ -11,7 +11,8 @@ import numpy as np
 
 from physid_drake.convert.bodies import Body, filled, up_of
 from physid_drake.convert.columns import Columns
-from physid_drake.convert.units import FORCES, LENGTHS
+from physid_drake.convert.names import unit_of
+from physid_drake.convert.units import FORCES, LENGTHS, symbol_of
 
 FAR_AWAY: Final = 0.3
 """m from the table's top, along the vertical: the source's frame is that of a camera."""
@@ -105,7 +106,7 @@ def pose_lines(key: str, body: Body | None, columns: Columns, doubt: str, own: S
     else:
         values = np.concatenate([columns.numbers[name] for name in body.rotation])
         likely = "deg" if np.nanmax(np.abs(values), initial=0.0) > 2.5 * np.pi else "rad"
-        unit = columns.unit_of(body.rotation[0]) or likely
+        unit = symbol_of(columns.unit_of(body.rotation[0]) or likely)
         order = f", order: {body.order}" if body.kind == "euler" else ""
         lines.append(
             f"  rotation: {{columns: {listed(body.rotation)}, as: {body.kind}{order}, unit: {unit}}}   # deg or rad?"
@@ -117,7 +118,8 @@ def pose_lines(key: str, body: Body | None, columns: Columns, doubt: str, own: S
 
 def force_lines(force: Body, columns: Columns, own: Sequence[str]) -> list[str]:
     """What a map says of the force; ``own`` says where its columns are."""
-    unit = next((columns.units[n] for n in force.force if columns.units.get(n) in FORCES), "N")
+    stated = (unit_of(name, columns)[1] for name in force.force)
+    unit = next((one for one in stated if one in FORCES), "N")
     return [
         f"force: {{{''.join(f'{key}, ' for key in own)}columns: {listed(force.force)}, unit: {unit},"
         " axes: world, acts_on: object}"

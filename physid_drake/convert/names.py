@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from physid_drake.convert.columns import Columns
-from physid_drake.convert.units import ANGLES, FORCES, LENGTHS
+from physid_drake.convert.units import ANGLES, FORCES, LENGTHS, WORDS, symbol_of
 
 WANTED: Final = frozenset(
     ("desired", "des", "cmd", "command", "commanded", "setpoint", "goal", "ref", "reference", "planned", "next")
@@ -46,7 +46,10 @@ _LEADING: Final = re.compile(
 )
 _UNIT: Final = re.compile(
     r"^(?P<name>.*?)[\s_]*(?:[\[(](?P<bracketed>{0})[\])]|(?<=[\s_])(?P<bare>{0}))$".format(
-        "|".join(sorted([*LENGTHS, *ANGLES, *FORCES], key=len, reverse=True))
+        "|".join(
+            [f"(?i:{word})" for word in sorted(WORDS, key=len, reverse=True)]
+            + sorted([*LENGTHS, *ANGLES, *FORCES], key=len, reverse=True)
+        )
     )
 )
 _OVER: Final = re.compile(r"[\s_./:\-]x(\W.*)?$", re.IGNORECASE)
@@ -102,9 +105,8 @@ def unit_of(name: str, columns: Columns) -> tuple[str, str | None]:
     bare = _AGAIN.sub("", name)
     match = _UNIT.match(bare)
     stated = columns.units.get(name)
-    if match is None:
-        return bare, stated
-    return match["name"], stated or match["bracketed"] or match["bare"]
+    unit = stated or (match and (match["bracketed"] or match["bare"]))
+    return match["name"] if match else bare, symbol_of(unit) if unit else None
 
 
 def words_of(name: str) -> list[str]:

@@ -371,3 +371,27 @@ def test_zarr_is_refused_with_what_to_do(tmp_path: Path) -> None:
     (tmp_path / ".zgroup").write_text("{}")
     with pytest.raises(ValueError, match="holds zarr, which is not read; save its arrays as npz"):
         guess_map(tmp_path)
+
+
+class TestUnits:
+    """Words for units are their symbols."""
+
+    def test_words_in_brackets(self, tmp_path: Path) -> None:
+        columns = {
+            "time [sec]": TAKE["t"], **named("obj_", tuple(f"{a} [Meters]" for a in XYZ), OBJECT),
+            "obj_yaw [degrees]": np.degrees(TAKE["yaw"]),
+            **named("tip_", tuple(f"{a} (millimetres)" for a in XYZ), 1e3 * HAND),
+        }  # fmt: skip
+        (tmp_path / "log.csv").write_text(csv(columns))
+        chart = guessed(tmp_path / "log.csv")
+        assert chart["object"]["position"]["unit"] == "m" and chart["hand"]["position"]["unit"] == "mm"
+        assert chart["object"]["rotation"] == {"columns": ["obj_yaw [degrees]"], "as": "yaw", "unit": "deg"}
+
+    def test_a_wrong_unit_is_refused(self, tmp_path: Path) -> None:
+        columns = {"t": TAKE["t"], **named("obj_", tuple(f"{a} [meters]" for a in XYZ), OBJECT)}
+        (tmp_path / "log.csv").write_text(csv(columns))
+        text = guess_map(tmp_path / "log.csv").text
+        assert "unit: m}" in text
+        (tmp_path / "map.yaml").write_text(text.replace("unit: m}", "unit: mm}"))
+        with pytest.raises(ValueError, match="the map says mm, but the table's header says meters"):
+            convert_table(tmp_path / "log.csv", tmp_path / "out", tmp_path / "map.yaml")
