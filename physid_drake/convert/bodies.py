@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -202,15 +202,18 @@ def _read_named(body: Body, quantity: str, axes: _Found, columns: Columns) -> No
 
 
 def _read_turn(body: Body, axes: _Found, columns: Columns) -> None:
-    """The rotation that stands beside a place, each axis with a letter of its own."""
-    for wanted in (("qx", "qy", "qz", "qw"), ("qx", "qy", "qz", "q0")):
-        four = _in_order(axes, wanted)
-        if four and _is_quaternion(four, columns):
-            _set_quaternion(body, four, columns)
-            return
-    four = _in_order(axes, ("q0", "q1", "q2", "q3"))
-    if four and _is_quaternion(four, columns):
-        body.rotation = four
+    """The rotation that stands beside a place, each axis with a letter of its own.
+
+    Four columns of norm 1 are a quaternion, whatever they are called, before three of them are angles.
+    """
+    used = {*body.position, *body.force}
+    for four in _fours({axis: name for axis, name in axes.items() if name not in used}, columns):
+        last = {axis[-1]: name for axis, name in axes.items() if name in four}
+        by_name = _in_order(last, "xyzw") or _in_order(last, "xyz0")
+        if by_name:
+            _set_quaternion(body, by_name, columns)
+        else:
+            body.rotation = four
         return
     for kind, names in (
         ("euler", ("yaw", "pitch", "roll")),
@@ -222,6 +225,16 @@ def _read_turn(body: Body, axes: _Found, columns: Columns) -> None:
         if found:
             body.rotation, body.kind = found, kind
             return
+
+
+def _fours(axes: _Found, columns: Columns) -> Iterator[list[str]]:
+    """Four columns that follow one another and have norm 1 in every row."""
+    places = list(columns.numbers)
+    names = sorted(axes.values(), key=places.index)
+    for k in range(len(names) - 3):
+        four = names[k : k + 4]
+        if _is_quaternion(four, columns, every=True):
+            yield four
 
 
 def _angles(axes: _Found) -> list[str]:
@@ -312,9 +325,13 @@ def _has_height(names: Sequence[str], columns: Columns) -> bool:
     return bool(ways[0] < FLAT * ways[-1])
 
 
-def _is_quaternion(names: Sequence[str], columns: Columns) -> bool:
+def _is_quaternion(names: Sequence[str], columns: Columns, *, every: bool = False) -> bool:
+    """Whether rows have norm 1: most of them, or every one but those of zeros, in which nothing was seen."""
     values = filled(names, columns)
-    return len(values) > 0 and bool(np.median(np.abs(np.linalg.norm(values, axis=1) - 1.0)) < UNIT)
+    if every:
+        values = values[(values != 0.0).any(axis=1)]
+    off = np.abs(np.linalg.norm(values, axis=1) - 1.0)
+    return len(values) > 0 and bool((np.max if every else np.median)(off) < UNIT)
 
 
 def _is_matrix(names: Sequence[str], columns: Columns) -> bool:

@@ -395,3 +395,23 @@ class TestUnits:
         (tmp_path / "map.yaml").write_text(text.replace("unit: m}", "unit: mm}"))
         with pytest.raises(ValueError, match="the map says mm, but the table's header says meters"):
             convert_table(tmp_path / "log.csv", tmp_path / "out", tmp_path / "map.yaml")
+
+
+@pytest.mark.parametrize(
+    ("names", "turns", "kind"),
+    [
+        (("rx", "ry", "rz", "rw"), TAKE["xyzw"], "xyzw"),
+        (("obj_a", "obj_b", "obj_c", "obj_d"), TAKE["xyzw"], "xyzw"),
+        (("obj_q1", "obj_q2", "obj_q3", "obj_q4"), WXYZ, "wxyz"),
+        (("objRotationX", "objRotationY", "objRotationZ", "objRotationW"), TAKE["xyzw"], "xyzw"),
+    ],
+)
+def test_four_columns_of_norm_one_are_a_quaternion(
+    names: tuple[str, ...], turns: np.ndarray, kind: str, tmp_path: Path
+) -> None:
+    place = "" if names[0] == "rx" else "obj_" if "_" in names[0] else "objTranslation"
+    axes = ("tx", "ty", "tz") if not place else XYZ if place == "obj_" else ("X", "Y", "Z")
+    columns = {"t": TAKE["t"], **named(place, axes, OBJECT), **named("", names, turns), **named("tip_", XYZ, HAND)}
+    (tmp_path / "log.csv").write_text(csv(columns))
+    chart = guessed(tmp_path / "log.csv")
+    assert_poses(chart, [f"{place}{a}" for a in axes], [f"tip_{a}" for a in XYZ], list(names), kind)
