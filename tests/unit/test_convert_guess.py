@@ -415,3 +415,29 @@ def test_four_columns_of_norm_one_are_a_quaternion(
     (tmp_path / "log.csv").write_text(csv(columns))
     chart = guessed(tmp_path / "log.csv")
     assert_poses(chart, [f"{place}{a}" for a in axes], [f"tip_{a}" for a in XYZ], list(names), kind)
+
+
+@pytest.mark.parametrize("summary", ["push,surface,operator\n1,oak,AB\n2,oak,AB\n", "push,speed\n1,50\n2,50\n3,50\n"])
+def test_files_of_another_kind_beside_those_of_the_pushes(summary: str, tmp_path: Path) -> None:
+    columns = {"t": TAKE["t"], **named("obj_", XYZ, OBJECT), **named("tip_", XYZ, HAND)}
+    for k in range(3):
+        (tmp_path / f"push_{k:02d}.csv").write_text(csv(columns))
+    assert "file" not in guessed(tmp_path)["object"]
+    (tmp_path / "a_summary.csv").write_text(summary)
+    chart = guessed(tmp_path)
+    assert chart["object"]["file"] == chart["hand"]["file"] == "push_*.csv"
+    assert chart["pushes"] == {"cut": "whole"}
+
+
+def test_bodies_that_are_told_apart_by_words(tmp_path: Path) -> None:
+    lines = ["time,x,y,z,role,valid"]
+    for k, t in enumerate(TAKE["t"]):
+        for role, places in (("alpha", OBJECT), ("beta", HAND)):
+            lines.append(
+                f"{t:.2f}," + ",".join(f"{v:.9g}" for v in places[k]) + f",{role},{'yes' if k % 50 else 'no'}"
+            )
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    text = guess_map(tmp_path / "log.csv").text
+    chart = yaml.safe_load(text)
+    assert chart["object"]["where"] == {"role": "alpha"} and chart["hand"]["where"] == {"role": "beta"}
+    assert "# not used of role alpha: valid" in text
