@@ -12,13 +12,10 @@ import numpy as np
 from physid_drake.convert.bodies import Body, filled, up_of
 from physid_drake.convert.columns import Columns
 from physid_drake.convert.names import unit_of
-from physid_drake.convert.units import FORCES, LENGTHS, symbol_of
+from physid_drake.convert.units import FORCES, LENGTHS, likely_length, symbol_of
 
 FAR_AWAY: Final = 0.3
 """m from the table's top, along the vertical: the source's frame is that of a camera."""
-
-METRES, CENTIMETRES = 5.0, 60.0
-"""Places on a table that are nowhere larger are in m, or in cm."""
 
 _OTHERS: Final = {"wxyz": "xyzw", "xyzw": "wxyz", "matrix": "inverse: true, if it is written column by column"}
 
@@ -77,9 +74,8 @@ def _world_lines(body: Body, columns: Columns) -> list[str]:
 def set_units(bodies: Sequence[Body], columns: Columns) -> str:
     """Gives all bodies a unit of length: the header's, else one that fits a table; the doubt that is left."""
     stated = next((body.unit for body in bodies if body.unit in LENGTHS), columns.length)
-    values = [np.abs(columns.numbers[name]) for body in bodies for name in body.position]
-    largest = max((float(np.nanmax(one, initial=0.0)) for one in values), default=0.0)
-    likely = "m" if largest < METRES else "cm" if largest < CENTIMETRES else "mm"
+    values = [columns.numbers[name] for body in bodies for name in body.position]
+    likely = likely_length(np.concatenate(values) if values else np.zeros(0))
     for body in bodies:
         body.unit = body.unit if body.unit in LENGTHS else stated or likely
     return "" if stated else "   # m, cm, inch or mm?"

@@ -132,7 +132,7 @@ def is_wanted(name: str, others: Sequence[str]) -> bool:
 def _fourth(bare: str, names: Set[str]) -> Part | None:
     """What a name says that ends in ``d`` beside others in ``a``, ``b`` and ``c``: alone, it is what was desired."""
     siblings = [bare[:-1] + (letter if bare[-1:] == "d" else letter.upper()) for letter in "abc"]
-    if bare[-1:] not in ("d", "D") or not names.issuperset(siblings):
+    if bare[-1:] not in ("d", "D") or not set(siblings) <= names:
         return None
     first = _part(siblings[0])
     return None if first is None or first.axis != "a" else replace(first, axis="d")

@@ -6,6 +6,9 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from physid_drake.errors import RecordingError
 from physid_drake.wording import shown
 
@@ -70,7 +73,16 @@ TIMES: Final = Units({"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9})
 
 SPEEDS: Final = Units({"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2})
 
+METRES, CENTIMETRES = 5.0, 60.0
+"""Places on a table that are nowhere larger are in m, or in cm."""
+
 UNITS: Final = _Written({**LENGTHS, **ANGLES, **FORCES, **TIMES})
+
+
+def likely_length(places: NDArray[np.float64]) -> str:
+    """The unit that places on a table have by how large they are."""
+    largest = float(np.nanmax(np.abs(places), initial=0.0))
+    return "m" if largest < METRES else "cm" if largest < CENTIMETRES else "mm"
 
 
 def factor(unit: str, kind: Mapping[str, float], what: str) -> float:

@@ -441,3 +441,17 @@ def test_bodies_that_are_told_apart_by_words(tmp_path: Path) -> None:
     chart = yaml.safe_load(text)
     assert chart["object"]["where"] == {"role": "alpha"} and chart["hand"]["where"] == {"role": "beta"}
     assert "# not used of role alpha: valid" in text
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e3])
+def test_what_never_moves_has_no_role(scale: float, tmp_path: Path) -> None:
+    """The ground, or a table, which is tracked as well."""
+    still = np.tile([0.3, 0.0, 0.2], (N, 1)) + 1e-4 * np.random.default_rng(2).normal(size=(N, 3))
+    columns = {"t": TAKE["t"]}
+    for body, places in (("ground_plane", still), ("eraser", OBJECT), ("stick", HAND)):
+        columns |= named(f"{body}.position.", XYZ, scale * places)
+        columns |= named(f"{body}.orientation.", (*XYZ, "w"), TAKE["xyzw"] if body == "eraser" else STILL)
+    (tmp_path / "log.csv").write_text(csv(columns))
+    chart = guessed(tmp_path / "log.csv")
+    assert chart["object"]["position"]["columns"][0] == "eraser.position.x"
+    assert chart["hand"]["position"]["columns"][0] == "stick.position.x"
