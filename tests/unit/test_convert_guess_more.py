@@ -46,7 +46,7 @@ class TestUnits:
         text = guess_map(tmp_path / "log.csv").text
         assert "unit: m}" in text
         (tmp_path / "map.yaml").write_text(text.replace("unit: m}", "unit: mm}"))
-        with pytest.raises(ValueError, match="the map says mm, but the table's header says meters"):
+        with pytest.raises(ValueError, match="the map says mm, but the table's header says m"):
             convert_table(tmp_path / "log.csv", tmp_path / "out", tmp_path / "map.yaml")
 
 
