@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -27,6 +28,9 @@ UNIT: Final = 0.02
 
 MOST_OF_ONE: Final = 7
 """Columns of one array that is the whole log, and holds no more than one body's place and rotation."""
+
+_ARRAY: Final = re.compile(r"\[?[\d,]+\]?$")
+"""What follows an array's name in those of its columns."""
 
 FORCE_WORDS: Final = frozenset(("f", "fext", "ft", "force", "forces", "wrench", "netft", "loadcell", "fts"))
 
@@ -90,7 +94,11 @@ def bodies_of(columns: Columns) -> list[Body]:
         if len(body.rotation) == 4 and not body.named:
             body.kind, body.sure = _order_of(body.rotation, body.position, columns)
         body.wanted = is_wanted(body.name, [other.name for other in kept])
-    return kept or _nameless(columns)
+    if not any(body.rotation for body in kept):
+        # What turns may stand in an array of a state, such as MuJoCo's qpos.
+        used = {name for body in kept for name in body.position + body.force}
+        kept += [body for body in _nameless(columns) if (body.rotation or not kept) and not used & set(body.position)]
+    return kept
 
 
 def up_of(place: Sequence[str], columns: Columns) -> int | None:
@@ -121,13 +129,31 @@ def _groups(columns: Columns) -> dict[tuple[str, str], _Found]:
     found: dict[tuple[str, str], _Found] = {}
     for name, part in parts_of(columns).items():
         found.setdefault((part.owner, part.quantity), {}).setdefault(part.axis, name)
-    return found
+    split: dict[tuple[str, str], _Found] = {}
+    for (owner, quantity), axes in found.items():
+        split |= {(owner + row, quantity): own for row, own in _rows_of(axes, columns)}
+    return split
+
+
+def _rows_of(axes: _Found, columns: Columns) -> Iterator[tuple[str, _Found]]:
+    """Each row of an array of two indices by itself, as of one body each, unless the array is a matrix."""
+    matrix = _in_order(axes, [f"{i},{j}" for i in range(3) for j in range(3)])
+    if "0,0" not in axes or (matrix and _is_matrix(matrix, columns)):
+        yield "", axes
+        return
+    rows: dict[str, _Found] = {}
+    for axis, name in axes.items():
+        row, _, column = axis.partition(",")
+        rows.setdefault(f"[{row}]", {})[column] = name
+    yield from rows.items()
 
 
 def _read(owner: str, quantity: str, axes: _Found, columns: Columns) -> Body:
     """What one group of columns is."""
     body = Body(name=owner)
+    # MATLAB counts from 1.
     numbered = _in_order(axes, [str(k) for k in range(len(axes))])
+    numbered = numbered or _in_order(axes, [str(k + 1) for k in range(len(axes))])
     quantity = _by_unit(next(iter(axes.values())), columns) or quantity
     if "0,0" in axes:
         _read_matrix(body, axes)
@@ -144,7 +170,7 @@ def _by_unit(name: str, columns: Columns) -> str:
     """What a column without a word for it must be by its unit; nothing if it may be a place."""
     unit = unit_of(name, columns)[1]
     part = axis_of(name, columns)
-    if part not in ("x", "0"):
+    if part not in ("x", "0", "1"):
         return ""
     return "turn" if unit in ANGLES else "force" if unit in FORCES else ""
 
@@ -202,15 +228,18 @@ def _read_named(body: Body, quantity: str, axes: _Found, columns: Columns) -> No
 
 
 def _read_turn(body: Body, axes: _Found, columns: Columns) -> None:
-    """The rotation that stands beside a place, each axis with a letter of its own."""
-    for wanted in (("qx", "qy", "qz", "qw"), ("qx", "qy", "qz", "q0")):
-        four = _in_order(axes, wanted)
-        if four and _is_quaternion(four, columns):
-            _set_quaternion(body, four, columns)
-            return
-    four = _in_order(axes, ("q0", "q1", "q2", "q3"))
-    if four and _is_quaternion(four, columns):
-        body.rotation = four
+    """The rotation that stands beside a place, each axis with a letter of its own.
+
+    Four columns of norm 1 are a quaternion, whatever they are called, before three of them are angles.
+    """
+    used = {*body.position, *body.force}
+    for four in _fours({axis: name for axis, name in axes.items() if name not in used}, columns):
+        last = {axis[-1]: name for axis, name in axes.items() if name in four}
+        by_name = _in_order(last, "xyzw") or _in_order(last, "xyz0")
+        if by_name:
+            _set_quaternion(body, by_name, columns)
+        else:
+            body.rotation = four
         return
     for kind, names in (
         ("euler", ("yaw", "pitch", "roll")),
@@ -222,6 +251,16 @@ def _read_turn(body: Body, axes: _Found, columns: Columns) -> None:
         if found:
             body.rotation, body.kind = found, kind
             return
+
+
+def _fours(axes: _Found, columns: Columns) -> Iterator[list[str]]:
+    """Four columns that follow one another and have norm 1 in every row."""
+    places = list(columns.numbers)
+    names = sorted(axes.values(), key=places.index)
+    for k in range(len(names) - 3):
+        four = names[k : k + 4]
+        if _is_quaternion(four, columns, every=True):
+            yield four
 
 
 def _angles(axes: _Found) -> list[str]:
@@ -237,23 +276,36 @@ def _set_quaternion(body: Body, names: Sequence[str], columns: Columns) -> None:
 
 
 def _nameless(columns: Columns) -> list[Body]:
-    """Bodies of columns that have no names, by their numbers: quaternions with a place before or behind, triples."""
-    names = [name for name, values in columns.numbers.items() if not rises(values)]
-    bodies: list[Body] = []
-    found = _transform(names, columns) if len(names) in (12, 16) else None
+    """Bodies of columns that have no names, by their numbers, each of one array."""
+    whole: dict[str, list[str]] = {}
+    for name in columns.numbers:
+        whole.setdefault(_ARRAY.sub("", unit_of(name, columns)[0]), []).append(name)
+    alone = [names[0] for names in whole.values() if len(names) == 1]
+    arrays = [alone, *(names for names in whole.values() if len(names) > 1)]
+    bodies = [body for names in arrays for body in _in_array(names, columns)]
+    for body in bodies:
+        body.doubt = "   # CHANGE? taken by its numbers alone: the columns have no names"
+        body.wanted = is_wanted(body.name, [other.name for other in bodies])
+    return sorted(bodies, key=lambda body: list(columns.numbers).index(body.position[0]))
+
+
+def _in_array(array: Sequence[str], columns: Columns) -> list[Body]:
+    """Transforms, or quaternions with a place before or behind and the triples beside them."""
+    names = [name for name in array if not rises(columns.numbers[name])]
+    owner = _ARRAY.sub("", array[0]) if len(array) > 1 else "?"
+    owner = "?" if owner.strip() in ("", "column") else owner
+    found = _transform(array, columns) if len(array) in (12, 16) else None
     if found:
-        bodies.append(Body(name="?", position=found[1], rotation=found[0], kind="matrix"))
-        names = []
-    while found := _with_quaternion(names, columns):
-        turn, place = found
+        return [Body(name=owner, position=found[1], rotation=found[0], kind="matrix")]
+    bodies: list[Body] = []
+    while with_turn := _with_quaternion(names, columns):
+        turn, place = with_turn
         kind, sure = _order_of(turn, place, columns)
-        bodies.append(Body(name="?", position=place, rotation=turn, kind=kind, sure=sure))
+        bodies.append(Body(name=owner, position=place, rotation=turn, kind=kind, sure=sure))
         names = [name for name in names if name not in turn + place]
     for run in _runs(names, list(columns.numbers)) if bodies else ():
         if len(run) in (2, 3):
-            bodies.append(Body(name="?", position=run))
-    for body in bodies:
-        body.doubt = "   # CHANGE? taken by its numbers alone: the columns have no names"
+            bodies.append(Body(name=owner, position=run))
     return bodies
 
 
@@ -308,13 +360,18 @@ def _has_height(names: Sequence[str], columns: Columns) -> bool:
     values = filled(names, columns)
     if not len(values):
         return True
-    ways = np.sort(_ways(values))
-    return bool(ways[0] < FLAT * ways[-1])
+    ways = _ways(values)
+    # What is never below 0, and goes no farther than the others, is the height of what is lifted at times.
+    return bool(ways.min() < FLAT * ways.max() or (values[:, 2].min() >= 0.0 and ways[2] < ways.max()))
 
 
-def _is_quaternion(names: Sequence[str], columns: Columns) -> bool:
+def _is_quaternion(names: Sequence[str], columns: Columns, *, every: bool = False) -> bool:
+    """Whether rows have norm 1: most of them, or every one but those of zeros, in which nothing was seen."""
     values = filled(names, columns)
-    return len(values) > 0 and bool(np.median(np.abs(np.linalg.norm(values, axis=1) - 1.0)) < UNIT)
+    if every:
+        values = values[(values != 0.0).any(axis=1)]
+    off = np.abs(np.linalg.norm(values, axis=1) - 1.0)
+    return len(values) > 0 and bool((np.max if every else np.median)(off) < UNIT)
 
 
 def _is_matrix(names: Sequence[str], columns: Columns) -> bool:

@@ -6,10 +6,12 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from physid_drake.convert.bodies import Body, bodies_of, rises
 from physid_drake.convert.columns import Columns
@@ -87,11 +89,46 @@ def log_of(source: Path) -> Log:
             for pattern, group in list(kinds.items())[:MOST_TABLES]
         ]
         return Log(tables=tables, whole=len(next(iter(kinds.values()))) > 1)
-    return Log(tables=_tables(files[0]), whole=len(files) > 1)
+    pattern, alike = _most(files)
+    return Log(tables=_tables(alike[0], pattern), whole=len(files) > 1)
 
 
-def _tables(file: Path) -> list[Table]:
-    """The tables of one file."""
+def _most(files: Sequence[Path]) -> tuple[str | None, Sequence[Path]]:
+    """The files of the kind of most, by their names, and a pattern for them if others lie beside them."""
+    alike = max(_by_name(files).values(), key=len)
+    others = [file for file in files if file not in alike]
+    usual = _names_in(alike[0]) if len(alike) > len(others) else None
+    if usual is None or all(_names_in(file) == usual for file in others[:MOST_TABLES]):
+        return None, files
+    pattern = next(iter(_patterns([list(alike)], files)), None)
+    return pattern, files if pattern is None else alike
+
+
+def _names_in(file: Path) -> frozenset[str] | None:
+    """The columns of numbers of a file; None if it holds no table."""
+    try:
+        return frozenset(read_columns(file).numbers)
+    except RecordingError:
+        return None
+
+
+def _by_name(files: Sequence[Path]) -> dict[str, list[Path]]:
+    """Files by their names, which may differ in numbers."""
+    found: dict[str, list[Path]] = {}
+    for file in files:
+        found.setdefault(re.sub(r"\d+", "0", file.name), []).append(file)
+    return found
+
+
+def _tables(file: Path, pattern: str | None = None) -> list[Table]:
+    """The tables of one file; ``pattern`` is that of all that are like it, where others lie beside them."""
+    tables = _tables_in(file)
+    for table in tables if pattern else ():
+        table.keys = (f"file: {quoted(pattern or '')}", *table.keys)
+    return tables
+
+
+def _tables_in(file: Path) -> list[Table]:
     texts = {} if file.suffix.lower() in ARRAYS else read_text_tables(file, MOST_TABLES)
     if len(texts) > 1:
         return [
@@ -113,7 +150,8 @@ def _tables(file: Path) -> list[Table]:
 def _by_id(columns: Columns) -> list[Table]:
     """Rows of each body, where bodies take turns and the times rise in those of each; none if they do not."""
     for name in [*columns.numbers, *columns.texts]:
-        if not ID_WORDS & set(words_of(name)) and name != "column 1":
+        called = ID_WORDS & set(words_of(name)) or name == "column 1"
+        if not called and not _takes_turns(columns.texts.get(name, ())):
             continue
         values: Sequence[Any] = columns.texts[name] if name in columns.texts else columns.numbers[name].tolist()
         own = sorted(set(values))
@@ -125,16 +163,27 @@ def _by_id(columns: Columns) -> list[Table]:
     return []
 
 
+def _takes_turns(texts: Sequence[str]) -> bool:
+    """Whether words change from most rows to the next, as the names of bodies do; what is valid does not."""
+    changes = sum(one != other for one, other in pairwise(texts))
+    return all(texts) and 2 * changes > len(texts)
+
+
 def _rows_of(columns: Columns, name: str, value: float | str) -> Table:
     """The rows in which a column has a value."""
     kept = np.array([one == value for one in (columns.texts if name in columns.texts else columns.numbers)[name]])
     numbers = {n: v[kept] for n, v in columns.numbers.items() if len(v) == len(kept) and n != name}
+    texts = {n: _picked(v, kept) for n, v in columns.texts.items() if len(v) == len(kept) and n != name}
     said = quoted(value) if isinstance(value, str) else f"{value:g}"
     return Table(
-        columns=replace(columns, numbers=numbers),
+        columns=replace(columns, numbers=numbers, texts=texts),
         keys=(f"where: {{{quoted(name)}: {said}}}",),
         label=f"{name} {value if isinstance(value, str) else said}",
     )
+
+
+def _picked(texts: Sequence[str], kept: NDArray[np.bool_]) -> list[str]:
+    return [text for text, there in zip(texts, kept, strict=True) if there]
 
 
 def _kinds(files: Sequence[Path]) -> Mapping[str, list[Path]]:
@@ -142,9 +191,7 @@ def _kinds(files: Sequence[Path]) -> Mapping[str, list[Path]]:
 
     Those of a kind have the same columns, or names that differ in numbers only; there are equally many of each.
     """
-    by_name: dict[str, list[Path]] = {}
-    for file in files:
-        by_name.setdefault(re.sub(r"\d+", "0", file.name), []).append(file)
+    by_name = _by_name(files)
     most = max(map(len, by_name.values()))
     # A file of notes beside many of pushes is none of them.
     groups = [group for group in by_name.values() if len(group) == most or most == 1]

@@ -11,13 +11,11 @@ import numpy as np
 
 from physid_drake.convert.bodies import Body, filled, up_of
 from physid_drake.convert.columns import Columns
-from physid_drake.convert.units import FORCES, LENGTHS
+from physid_drake.convert.names import unit_of
+from physid_drake.convert.units import FORCES, LENGTHS, likely_length, symbol_of
 
 FAR_AWAY: Final = 0.3
 """m from the table's top, along the vertical: the source's frame is that of a camera."""
-
-METRES, CENTIMETRES = 5.0, 60.0
-"""Places on a table that are nowhere larger are in m, or in cm."""
 
 _OTHERS: Final = {"wxyz": "xyzw", "xyzw": "wxyz", "matrix": "inverse: true, if it is written column by column"}
 
@@ -76,9 +74,8 @@ def _world_lines(body: Body, columns: Columns) -> list[str]:
 def set_units(bodies: Sequence[Body], columns: Columns) -> str:
     """Gives all bodies a unit of length: the header's, else one that fits a table; the doubt that is left."""
     stated = next((body.unit for body in bodies if body.unit in LENGTHS), columns.length)
-    values = [np.abs(columns.numbers[name]) for body in bodies for name in body.position]
-    largest = max((float(np.nanmax(one, initial=0.0)) for one in values), default=0.0)
-    likely = "m" if largest < METRES else "cm" if largest < CENTIMETRES else "mm"
+    values = [columns.numbers[name] for body in bodies for name in body.position]
+    likely = likely_length(np.concatenate(values) if values else np.zeros(0))
     for body in bodies:
         body.unit = body.unit if body.unit in LENGTHS else stated or likely
     return "" if stated else "   # m, cm, inch or mm?"
@@ -105,7 +102,7 @@ def pose_lines(key: str, body: Body | None, columns: Columns, doubt: str, own: S
     else:
         values = np.concatenate([columns.numbers[name] for name in body.rotation])
         likely = "deg" if np.nanmax(np.abs(values), initial=0.0) > 2.5 * np.pi else "rad"
-        unit = columns.unit_of(body.rotation[0]) or likely
+        unit = symbol_of(columns.unit_of(body.rotation[0]) or likely)
         order = f", order: {body.order}" if body.kind == "euler" else ""
         lines.append(
             f"  rotation: {{columns: {listed(body.rotation)}, as: {body.kind}{order}, unit: {unit}}}   # deg or rad?"
@@ -117,7 +114,8 @@ def pose_lines(key: str, body: Body | None, columns: Columns, doubt: str, own: S
 
 def force_lines(force: Body, columns: Columns, own: Sequence[str]) -> list[str]:
     """What a map says of the force; ``own`` says where its columns are."""
-    unit = next((columns.units[n] for n in force.force if columns.units.get(n) in FORCES), "N")
+    stated = (unit_of(name, columns)[1] for name in force.force)
+    unit = next((one for one in stated if one in FORCES), "N")
     return [
         f"force: {{{''.join(f'{key}, ' for key in own)}columns: {listed(force.force)}, unit: {unit},"
         " axes: world, acts_on: object}"

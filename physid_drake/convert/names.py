@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Final
 
 from physid_drake.convert.columns import Columns
-from physid_drake.convert.units import ANGLES, FORCES, LENGTHS
+from physid_drake.convert.units import ANGLES, FORCES, LENGTHS, WORDS, symbol_of
 
 WANTED: Final = frozenset(
     ("desired", "des", "cmd", "command", "commanded", "setpoint", "goal", "ref", "reference", "planned", "next")
@@ -36,8 +36,8 @@ NO_PLACES: Final = frozenset(
 
 _AXIS: Final = re.compile(
     r"^(?P<stem>.*?)[\s_./\-:]*"
-    r"(?P<axis>q[wxyz]|(?<![a-z])q[0-3]|[rtf][xyz]|(?<![a-z])[vw][xyz]|[xyzw](?=\d*$)|roll|pitch|yaw|phi|theta|heading"
-    r"|(?<![a-z0-9])[abc]|\[\d+\]|\[\d,\d\]|(?<=_)\d+)"
+    r"(?P<axis>q[wxyz]|(?<![a-z])q[0-4]|[rtf][xyz]|(?<![a-z])rw|(?<![a-z])[vw][xyz]|[xyzw](?=\d*$)|roll|pitch|yaw|phi|theta|heading"
+    r"|(?<![a-z0-9])[abc]|\[\d+\]|\[\d+,\d+\]|(?<=_)\d+)"
     r"(?P<digit>\d*)$",
     re.IGNORECASE,
 )
@@ -46,7 +46,10 @@ _LEADING: Final = re.compile(
 )
 _UNIT: Final = re.compile(
     r"^(?P<name>.*?)[\s_]*(?:[\[(](?P<bracketed>{0})[\])]|(?<=[\s_])(?P<bare>{0}))$".format(
-        "|".join(sorted([*LENGTHS, *ANGLES, *FORCES], key=len, reverse=True))
+        "|".join(
+            [f"(?i:{word})" for word in sorted(WORDS, key=len, reverse=True)]
+            + sorted([*LENGTHS, *ANGLES, *FORCES], key=len, reverse=True)
+        )
     )
 )
 _OVER: Final = re.compile(r"[\s_./:\-]x(\W.*)?$", re.IGNORECASE)
@@ -55,11 +58,14 @@ _SPEEDS: Final = frozenset(("vx", "vy", "vz", "wx", "wy", "wz"))
 _AGAIN: Final = re.compile(r" \(column \d+\)$")
 """What the reader adds to a name that was there before."""
 
+_BEGINS: Final = r"(?:\b|(?-i:(?<=[a-z0-9])(?=[A-Z])))"
+"""Where a word begins, as in ``GlobalRotation``."""
+
 _QUANTITIES: Final[Sequence[tuple[str, str]]] = (
     ("force", r"force|wrench|ft"),
     ("vector", r"rvec|rotvec|rodrigues|rotation vector|axis angle"),
     ("turn", r"rotation|rot|orientation|quat\w*|euler\w*|rpy"),
-    ("place", r"position|pos|translation|place|xyz|tvec|p"),
+    ("place", r"position|x?pos|translation|place|xyz|tvec|p"),
     ("pose", r"pose|transform|state"),
     ("q", r"q"),
 )
@@ -84,8 +90,9 @@ class Part:
 def parts_of(columns: Columns) -> dict[str, Part]:
     """What the names say of the columns that have an axis, but for what is no place, no rotation and no force."""
     found: dict[str, Part] = {}
+    bare = {name: unit_of(name, columns)[0] for name in columns.numbers}
     for name in columns.numbers:
-        part = _part(unit_of(name, columns)[0])
+        part = _fourth(bare[name], set(bare.values())) or _part(bare[name])
         if part is not None and not NO_PLACES & set(words_of(part.owner)) and part.axis not in _SPEEDS:
             found[name] = part
     return _with_owners(found)
@@ -102,9 +109,8 @@ def unit_of(name: str, columns: Columns) -> tuple[str, str | None]:
     bare = _AGAIN.sub("", name)
     match = _UNIT.match(bare)
     stated = columns.units.get(name)
-    if match is None:
-        return bare, stated
-    return match["name"], stated or match["bracketed"] or match["bare"]
+    unit = stated or (match and (match["bracketed"] or match["bare"]))
+    return match["name"] if match else bare, symbol_of(unit) if unit else None
 
 
 def words_of(name: str) -> list[str]:
@@ -123,6 +129,15 @@ def is_wanted(name: str, others: Sequence[str]) -> bool:
     )
 
 
+def _fourth(bare: str, names: Set[str]) -> Part | None:
+    """What a name says that ends in ``d`` beside others in ``a``, ``b`` and ``c``: alone, it is what was desired."""
+    siblings = [bare[:-1] + (letter if bare[-1:] == "d" else letter.upper()) for letter in "abc"]
+    if bare[-1:] not in ("d", "D") or not set(siblings) <= names:
+        return None
+    first = _part(siblings[0])
+    return None if first is None or first.axis != "a" else replace(first, axis="d")
+
+
 def _part(bare: str) -> Part | None:
     match = _AXIS.match(bare)
     if match is not None:
@@ -134,7 +149,7 @@ def _part(bare: str) -> Part | None:
 def _of_stem(stem: str, axis: str) -> Part:
     spaced = stem.replace("_", " ")
     for kind, words in _QUANTITIES:
-        last = re.match(rf"^(?P<owner>.*?)[\s_./\-:]*\b(?:{words})$", spaced, re.IGNORECASE)
+        last = re.match(rf"^(?P<owner>.*?)[\s_./\-:]*{_BEGINS}(?:{words})$", spaced, re.IGNORECASE)
         if last:
             return Part(owner=stem[: len(last["owner"])], quantity=kind, axis=axis)
     for kind, words in _QUANTITIES:

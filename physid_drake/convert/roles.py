@@ -12,9 +12,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from physid_drake.convert.bag_roles import FIRST
+from physid_drake.convert.bag_roles import MOVES as LEAVES
 from physid_drake.convert.bodies import Body, filled
 from physid_drake.convert.columns import Array, Columns
 from physid_drake.convert.names import words_of
+from physid_drake.convert.units import LENGTHS, likely_length
 
 OBJECT_WORDS: Final = ("object", "obj", "mug", "box", "block", "cube", "slider", "target", "item", "payload")
 HAND_WORDS: Final = (
@@ -66,8 +69,12 @@ def roles_of(
         columns: where those of a body are; None if only names can be compared.
         times: in s, of the rows of a body's columns, as far as they are known.
     """
-    placed = [body for body in bodies if body.position and not body.wanted]
-    hand = _called(HAND_WORDS, placed) or _called(HAND_WORDS, [b for b in bodies if b.position and b.wanted])
+    there = [body for body in bodies if body.position]
+    if columns is not None:
+        # What never moves has no role, unless nothing does.
+        there = [body for body in there if _leaves(body, columns(body))] or there
+    placed = [body for body in there if not body.wanted]
+    hand = _called(HAND_WORDS, placed) or _called(HAND_WORDS, [body for body in there if body.wanted])
     body = _called(OBJECT_WORDS, [one for one in placed if one is not hand])
     rest = [one for one in placed if one is not hand and one is not body]
     named = hand is not None or body is not None
@@ -106,6 +113,16 @@ def _likely_object(
         return _way(one, columns(one)) > 0.0, apart, bool(one.rotation), len(filled(one.position, columns(one)))
 
     return max(bodies, key=worth, default=None)
+
+
+def _leaves(body: Body, columns: Columns) -> bool:
+    """Whether a body is ever farther from where it was at first than a tracker's noise brings it."""
+    values = filled(body.position, columns)
+    stated = body.unit or ""
+    unit = stated if stated in LENGTHS else columns.length or likely_length(values)
+    away = np.linalg.norm(values - np.median(values[:FIRST], axis=0), axis=1) * LENGTHS[unit] > LEAVES
+    # Once is an outlier.
+    return bool((away[1:] & away[:-1]).any())
 
 
 def _way(body: Body, columns: Columns) -> float:
