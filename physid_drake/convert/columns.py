@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from physid_drake.convert.time_words import is_timecode, seconds_of
-from physid_drake.convert.units import UNITS
+from physid_drake.convert.units import UNITS, symbol_of
 from physid_drake.errors import RecordingError
 from physid_drake.wording import shown
 
@@ -85,7 +85,8 @@ class Columns:
         found = self.find(name)
         bracketed = _BRACKETED.search(found)
         inside = bracketed[1].strip() if bracketed else None
-        return self.units.get(found) or (inside if inside in UNITS else None)
+        said = self.units.get(found) or (inside if inside in UNITS else None)
+        return None if said is None else symbol_of(said)
 
     def stack(self, names: Sequence[str]) -> Array:
         """Columns (n, k) side by side.

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from physid_drake.convert.mapping import NORM_TOLERANCE
-from physid_drake.convert.units import factor
+from physid_drake.convert.units import factor, symbol_of
 from physid_drake.recording.description import Section
 
 
@@ -18,7 +18,7 @@ def unit_of(section: Section, kind: Mapping[str, float], what: str) -> str | Non
     unit = section.text("unit")
     with section.naming("unit"):
         factor(unit, kind, what)
-    return unit
+    return symbol_of(unit)
 
 
 def size_of_unit(section: Section, kind: Mapping[str, float], default: str) -> float:

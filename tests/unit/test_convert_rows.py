@@ -47,7 +47,8 @@ def changed(writer: str, recording: Recording, folder: Path, *changes: tuple[str
         ("frames", [("section: 2", "section: 3")], "has 2 table.s., but section 3 is asked for"),
         ("control.csv", [("[sec, nanosec]}", "[sec, nanosec], unit: s}")], "columns: are of seconds and nanosec"),
         ("control.csv", [("[tip_x, tip_y, tip_z]", "[mug_x, mug_y, mug_z]")], "hand: its columns are those of"),
-        ("take.csv", [("(Seconds)}", "(Seconds), unit: ms}")], "of 0.0395 s .* 8.33e-06 s apart; correct the"),
+        ("take.csv", [("(Seconds)}", "(Seconds), unit: ms}")], "the map says ms, but times in column .* are in s"),
+        ("detections.csv", [("unit: ns", "unit: us")], "rest twice for 0.5 s in .* poses 10 s apart; correct the"),
     ],
 )  # fmt: skip
 @pytest.mark.filterwarnings("ignore::UserWarning")
@@ -240,3 +241,23 @@ def test_bodies_side_by_side_in_an_array(sealed: Recording, tmp_path: Path) -> N
     (tmp_path / "map.yaml").write_text(chart.replace("column: t}", "column: other}"), encoding="utf-8")
     with pytest.raises(RecordingError, match=r"object: column 'other' has 7 times, but there are \d+ rows"):
         convert_table(tmp_path / "log.npz", tmp_path / "again", tmp_path / "map.yaml")
+
+
+@pytest.mark.parametrize(
+    ("header", "unit", "said"),
+    [
+        ("yaw [degrees]", "rad", "the map says rad, but the table's header says deg"),
+        ("yaw [degrees]", "degrees", None), ("yaw [deg]", "degrees", None), ("yaw [°]", "deg", None),
+    ],
+)  # fmt: skip
+def test_units_in_words(header: str, unit: str, said: str | None, sealed: Recording, tmp_path: Path) -> None:
+    (table,) = times_and_places(sealed, 1)
+    rows = [f"{row},0" for row in rows_of(table)]
+    (tmp_path / "log.csv").write_text("\n".join([f"{NAMES},{header}", *rows]), encoding="utf-8")
+    turn = f'rotation: {{columns: ["{header}"], as: yaw, unit: {unit}}}'
+    (tmp_path / "map.yaml").write_text(PLAIN.replace("rotation: none", turn, 1), encoding="utf-8")
+    if said is None:
+        assert convert_table(tmp_path / "log.csv", tmp_path / "recording", tmp_path / "map.yaml").pushes
+        return
+    with pytest.raises(RecordingError, match=said):
+        convert_table(tmp_path / "log.csv", tmp_path / "recording", tmp_path / "map.yaml")
